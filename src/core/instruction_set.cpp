@@ -73,7 +73,7 @@ const std::vector<InstructionSet>& available_instruction_sets() {
 
 InstructionSet best_instruction_set() {
   if (available_instruction_sets().empty()) {
-    throw InvalidArgument(
+    throw Error(
         fmt::format("instruction sets of this binary = {}, of which this processor runs none: "
                     "build risley on this "
                     "machine, or for all processors with cmake -DRISLEY_INSTRUCTION_SETS=all",

@@ -50,7 +50,7 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   settings.provenance = [&] {
     Provenance provenance = hashes.with_inputs(options.provenance);
     provenance.emplace_back("calibration", options.calibration);
-    if (std::filesystem::exists(options.calibration)) {
+    if (std::filesystem::is_regular_file(options.calibration)) {
       provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
     }
     return provenance;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/provenance.hpp"
 
+#include <filesystem>
+
 #include <fmt/format.h>
 
 #include "risley/core/require.hpp"
@@ -10,10 +12,22 @@
 
 namespace risley::jobs {
 
+namespace {
+
+/// Pipes and the like: who reads them again waits forever, or finds nothing.
+bool is_read_once(const std::string& path) {
+  const auto type = std::filesystem::status(path).type();
+  using Type = std::filesystem::file_type;
+  return type == Type::fifo || type == Type::character || type == Type::socket;
+}
+
+}  // namespace
+
 struct InputHashes::Input {
   recordings::Source source;
-  std::vector<std::pair<std::string, std::string>> hashes{};  ///< file and SHA-256
-  parallel::TaskGroup task{};                                 ///< that finds them
+  /// Files and their SHA-256, which is empty for what can be read only once.
+  std::vector<std::pair<std::string, std::string>> hashes{};
+  parallel::TaskGroup task{};  ///< that finds them
 
   /// Appends them. @param count  inputs so far
   void add_to(Provenance& provenance, std::size_t& count) {
@@ -25,7 +39,10 @@ struct InputHashes::Input {
     };
     task.wait();
     if (source.recording()) add(source.name());
-    for (const auto& [file, hash] : hashes) provenance.emplace_back(add(file) + "_sha256", hash);
+    for (const auto& [file, hash] : hashes) {
+      const std::string name = add(file);
+      if (!hash.empty()) provenance.emplace_back(name + "_sha256", hash);
+    }
   }
 };
 
@@ -34,7 +51,7 @@ InputHashes::InputHashes(const std::vector<recordings::Source>& inputs, const Pr
     Input& input = *inputs_.emplace_back(new Input{source});
     input.task.run([&input, own = progress.silent()] {
       for (const std::string& file : recordings::recording_files(input.source)) {
-        input.hashes.emplace_back(file, io::sha256_of_file(file, own));
+        input.hashes.emplace_back(file, is_read_once(file) ? "" : io::sha256_of_file(file, own));
       }
     });
   }

@@ -29,7 +29,7 @@ int main() {
   }
   try {
     std::printf("kernels for %s\n", to_string(best_instruction_set()).c_str());
-  } catch (const InvalidArgument& error) {
+  } catch (const Error& error) {
     std::puts(error.what());
     return 3;
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/sha256.hpp"
@@ -60,6 +61,12 @@ TEST_F(InputHashesTest, TellOfAMissingFileWhenItIsAskedFor) {
   EXPECT_THROW(hashes.with_input({}, 1), FileError);
   EXPECT_THROW(hashes.with_input({}, 2), InvalidArgument);
   EXPECT_THROW(with_inputs({}, {a, missing}), FileError);
+}
+
+TEST_F(InputHashesTest, AreNotThoseOfPipesWhichWouldWaitForever) {
+  const std::string pipe = folder_.file("pipe");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(with_inputs({}, {pipe}), (Provenance{{"input", pipe}}));
 }
 
 TEST_F(InputHashesTest, AreGivenUpWithTheWork) {

@@ -17,10 +17,11 @@ std::string to_string(InstructionSet set);
 /// was built for another kind of processor (RISLEY_INSTRUCTION_SETS).
 const std::vector<InstructionSet>& available_instruction_sets();
 
-/// The last of available_instruction_sets(). @throws InvalidArgument when there is none
+/// The last of available_instruction_sets(). @throws Error when there is none
 InstructionSet best_instruction_set();
 
-/// @throws InvalidArgument when this binary does not hold it or this processor does not run it
+/// @throws InvalidArgument when this binary does not hold it or this processor does not run it,
+///         and as best_instruction_set()
 void check_available(InstructionSet set);
 
 /// The copies of one kernel, a function of plain arguments: nullptr where the binary has none, and

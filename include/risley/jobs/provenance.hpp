@@ -28,7 +28,7 @@ class InputHashes {
   InputHashes& operator=(const InputHashes&) = delete;
 
   /// Appends those of every input: "input", "input_sha256", "input_2", ...; of a folder of ROS 2
-  /// those of each of its files, of columns in memory the name alone.
+  /// those of each of its files, of columns in memory, and of pipes, the name alone.
   /// @throws FileError, Cancelled
   Provenance with_inputs(Provenance provenance);
   /// The same of one alone, as the only input. @param input  its place, from 0
