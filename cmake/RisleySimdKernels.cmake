@@ -3,8 +3,6 @@
 # A kernel (src/<layer>/<name>_kernel.cpp) is one source, compiled once per instruction set into the
 # same binary; the code beside it picks one at run time. Only these files get wide-instruction flags,
 # and tests/architecture checks that nothing compiled with them can leak into the rest.
-set(RISLEY_INSTRUCTION_SETS all CACHE STRING
-    "Instruction sets of the kernels: all, native (the best of this processor), or a list of baseline, avx2, avx512")
 set(known_sets baseline)
 set(flags_baseline "")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")

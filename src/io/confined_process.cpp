@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <mutex>
 #include <new>
 #include <utility>
 
@@ -18,6 +19,8 @@
 #include <sys/time.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include "io/fork_lock.hpp"
 
 namespace risley::io {
 namespace {
@@ -125,11 +128,13 @@ ConfinedProcess::ConfinedProcess(const Service& service, const Progress& progres
     throw ProcessEnded(
         fmt::format("no connection to the process that reads the file: {}", std::strerror(errno)));
   }
-  child_ = ::fork();
-  if (child_ == 0) {
-    serve(ends[1], service);
+  int problem = 0;
+  {
+    const std::scoped_lock alone(fork_lock());
+    child_ = ::fork();
+    problem = errno;
   }
-  const int problem = errno;
+  if (child_ == 0) serve(ends[1], service);
   ::close(ends[1]);
   socket_ = ends[0];
   if (child_ < 0) {

@@ -8,10 +8,14 @@
 #include <cstdlib>
 #include <numeric>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <openssl/evp.h>
 #include <unistd.h>
+
+#include "risley/io/sha256.hpp"
 
 namespace risley::io::confined_process_test {
 
@@ -38,6 +42,28 @@ TEST(ConfinedProcess, AnswersRequestAfterRequest) {
   std::iota(long_one.begin(), long_one.end(), '\0');
   EXPECT_EQ(process.ask(long_one), "3: " + long_one);
   EXPECT_EQ(asked, 0);
+}
+
+TEST(ConfinedProcess, UsesOpenSslWhateverOtherThreadsDidWithItWhenItWasForked) {
+  std::atomic<bool> done{false};
+  std::vector<std::jthread> hashing;
+  for (int i = 0; i < 2; ++i) {
+    hashing.emplace_back([&] {
+      while (!done) sha256("some text");
+    });
+  }
+  for (int i = 0; i < 100; ++i) {
+    // As NetCDF's library does, not by ours.
+    ConfinedProcess process([](std::string_view request) {
+      std::string digest(EVP_MAX_MD_SIZE, '\0');
+      unsigned int length = 0;
+      EVP_Digest(request.data(), request.size(), reinterpret_cast<unsigned char*>(digest.data()),
+                 &length, EVP_sha256(), nullptr);
+      return digest.substr(0, length);
+    });
+    ASSERT_THAT(process.ask("abc"), ::testing::StartsWith("\xba\x78\x16\xbf")) << i;
+  }
+  done = true;
 }
 
 TEST(ConfinedProcess, ACrashEndsTheChildAlone) {
