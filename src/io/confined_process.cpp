@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
-#include <mutex>
 #include <new>
 #include <utility>
 
@@ -130,7 +129,7 @@ ConfinedProcess::ConfinedProcess(const Service& service, const Progress& progres
   }
   int problem = 0;
   {
-    const std::scoped_lock alone(fork_lock());
+    const auto alone = ForkLock::instance().alone();
     child_ = ::fork();
     problem = errno;
   }

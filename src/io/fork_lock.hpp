@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <mutex>
 #include <shared_mutex>
 
 namespace risley::io {
@@ -9,9 +10,24 @@ namespace risley::io {
 /// Who forks holds it alone; threads within OpenSSL share it. A child has only the thread that
 /// forked, and would wait forever for locks that another one held: NetCDF's library uses OpenSSL.
 /// For the same reason a child never takes this one.
-inline std::shared_mutex& fork_lock() {
-  static std::shared_mutex lock;
-  return lock;
-}
+class ForkLock {
+ public:
+  static ForkLock& instance() {
+    static ForkLock lock;
+    return lock;
+  }
+  std::shared_lock<std::shared_mutex> share() {
+    const std::scoped_lock in_turn(turn_);
+    return std::shared_lock(held_);
+  }
+  std::unique_lock<std::shared_mutex> alone() {
+    const std::scoped_lock in_turn(turn_);
+    return std::unique_lock(held_);
+  }
+
+ private:
+  std::mutex turn_;  ///< those who share it could keep out for long who wants it alone
+  std::shared_mutex held_;
+};
 
 }  // namespace risley::io

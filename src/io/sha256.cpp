@@ -3,8 +3,6 @@
 #include "risley/io/sha256.hpp"
 
 #include <memory>
-#include <mutex>
-#include <shared_mutex>
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
@@ -31,17 +29,17 @@ std::string hexadecimal(const unsigned char* digest, unsigned int length) {
 }  // namespace
 
 std::string sha256_of_file(const std::string& path, const Progress& progress) {
-  std::shared_lock in_library(fork_lock());
+  auto in_library = ForkLock::instance().share();
   const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(),
                                                                    EVP_MD_CTX_free);
   require_done(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
   in_library.unlock();
   read_bytes(path, [&](std::span<const char> bytes) {
     progress.check();
-    const std::shared_lock again(fork_lock());
+    const auto again = ForkLock::instance().share();
     require_done(EVP_DigestUpdate(context.get(), bytes.data(), bytes.size()) == 1);
   });
-  in_library.lock();
+  in_library = ForkLock::instance().share();
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_DigestFinal_ex(context.get(), digest, &length) == 1);
@@ -49,7 +47,7 @@ std::string sha256_of_file(const std::string& path, const Progress& progress) {
 }
 
 std::string sha256(std::string_view text) {
-  const std::shared_lock in_library(fork_lock());
+  const auto in_library = ForkLock::instance().share();
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);
@@ -57,7 +55,7 @@ std::string sha256(std::string_view text) {
 }
 
 std::string sha256_base64(std::string_view text) {
-  const std::shared_lock in_library(fork_lock());
+  const auto in_library = ForkLock::instance().share();
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);
