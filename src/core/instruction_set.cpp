@@ -75,8 +75,8 @@ InstructionSet best_instruction_set() {
   if (available_instruction_sets().empty()) {
     throw Error(
         fmt::format("instruction sets of this binary = {}, of which this processor runs none: "
-                    "build risley on this "
-                    "machine, or for all processors with cmake -DRISLEY_INSTRUCTION_SETS=all",
+                    "build risley on this machine, or for all processors with "
+                    "cmake -DRISLEY_INSTRUCTION_SETS=all",
                     names(held_instruction_sets())));
   }
   return available_instruction_sets().back();
