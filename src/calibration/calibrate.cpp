@@ -19,6 +19,7 @@
 #include "calibration/held.hpp"
 #include "calibration/labelled_shots.hpp"
 #include "calibration/shot_blocks.hpp"
+#include "calibration/shot_columns.hpp"
 #include "calibration/verdict.hpp"
 #include "calibration/wall_flatness.hpp"
 #include "calibration/wall_matching.hpp"
@@ -74,19 +75,15 @@ void require_recording(const RangedRecording& recording) {
 RangedShots shifted(const RangedShots& shots, const std::vector<double>& shift) {
   RangedShots result;
   result.resize(shots.prisms(), shots.size());
-  result.beam = shots.beam;
   for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
     const auto copy = [&](const auto& from, auto& to) {
+      if (from.empty()) return;  // beams that are not told
       std::copy(from.data() + begin, from.data() + end, to.data() + begin);
     };
-    for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
-      const std::vector<double>& from = shots.rotation_angle[k];
-      for (std::size_t i = begin; i < end; ++i) result.rotation_angle[k][i] = from[i] + shift[k];
+    for_each_column(copy, shots, result);
+    for (std::size_t k = 0; k < shift.size(); ++k) {
+      for (std::size_t i = begin; i < end; ++i) result.rotation_angle[k][i] += shift[k];
     }
-    for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
-      copy(shots.angle_covariance[k], result.angle_covariance[k]);
-    }
-    copy(shots.range, result.range);
   });
   return result;
 }

@@ -37,8 +37,7 @@ std::vector<std::vector<double>> sample_angles(const CalibrationPlan& plan, std:
     for (std::size_t i = 0; i < kSampleShots; ++i) {
       const double time =
           plan.duration * (static_cast<double>(i) + 0.5) / static_cast<double>(kSampleShots);
-      column[i] =
-          std::remainder(rotation_angle_at(start, plan.sensor.angular_velocity[k], time), kTwoPi);
+      column[i] = wrap_to_pi(rotation_angle_at(start, plan.sensor.angular_velocity[k], time));
     }
     angles.push_back(std::move(column));
   }

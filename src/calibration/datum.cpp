@@ -51,7 +51,7 @@ DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
     normal += Matrix3d::Identity() - beam * beam.transpose();
     right += beam.cross(error);
     const auto a = angles_from_direction(computed[i]), b = angles_from_direction(truth[i]);
-    const double azimuth = std::remainder(a.azimuth - b.azimuth, kTwoPi);
+    const double azimuth = wrap_to_pi(a.azimuth - b.azimuth);
     const double zenith = a.zenith - b.zenith;
     errors.azimuth_bias += azimuth;
     errors.zenith_bias += zenith;
@@ -239,7 +239,7 @@ PointingError BeamBundle::pointing_error(const PrismTrain& believed,
     const Beam& beam = beams_[i];
     if (!std::isfinite(reported[i].x)) continue;
     const auto from = angles_from_direction(reported[i]), to = angles_from_direction(calibrated[i]);
-    total += std::remainder(from.azimuth - to.azimuth, kTwoPi) * beam.of_angles.row(0) +
+    total += wrap_to_pi(from.azimuth - to.azimuth) * beam.of_angles.row(0) +
              (from.zenith - to.zenith) * beam.of_angles.row(1);
     const Eigen::Vector3d left = eigen(reported[i]) - beam.direction - turn.cross(beam.direction);
     const Eigen::RowVectorXd slope = left.transpose() * rest(beam);

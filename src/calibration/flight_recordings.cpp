@@ -85,8 +85,8 @@ FlightRecordings flight_recordings(const std::vector<RangedRecording>& recording
         continue;
       }
       for (std::size_t k = 0; k < prisms; ++k) {
-        shots.rotation_angle[k].push_back(std::remainder(
-            recording.shots.rotation_angle[k][row] + belief.angle_shift[r][k], kTwoPi));
+        shots.rotation_angle[k].push_back(
+            wrap_to_pi(recording.shots.rotation_angle[k][row] + belief.angle_shift[r][k]));
         // The diagonal of an upper triangle, row by row.
         const std::size_t diagonal = k * prisms - k * (k + 1) / 2 + k;
         squares += static_cast<double>(recording.shots.angle_covariance[diagonal][row]);

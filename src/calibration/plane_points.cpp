@@ -16,6 +16,7 @@
 #include "risley/parallel/parallel.hpp"
 
 #include "calibration/shot_blocks.hpp"
+#include "calibration/shot_columns.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -49,8 +50,7 @@ SoundShots sound_shots(const estimation::Estimate& estimate, estimation::ShotRan
   };
   const auto same = [](auto value) { return value; };
   for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
-    take(states.rotation_angle[k], shots.rotation_angle[k],
-         [](double angle) { return std::remainder(angle, kTwoPi); });
+    take(states.rotation_angle[k], shots.rotation_angle[k], wrap_to_pi);
   }
   for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
     take(states.rotation_angle_covariance[k], shots.angle_covariance[k],
@@ -86,14 +86,7 @@ void take_shots(const estimation::Estimate& estimate, RangedRecording& recording
     const auto put = [at = first[number]](const auto& from, auto& to) {
       std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(at));
     };
-    for (std::size_t k = 0; k < shots.rotation_angle.size(); ++k) {
-      put(block.shots.rotation_angle[k], shots.rotation_angle[k]);
-    }
-    for (std::size_t k = 0; k < shots.angle_covariance.size(); ++k) {
-      put(block.shots.angle_covariance[k], shots.angle_covariance[k]);
-    }
-    put(block.shots.range, shots.range);
-    put(block.shots.beam, shots.beam);
+    for_each_column(put, block.shots, shots);
     put(block.time_ns, recording.time_ns);
   });
 }
@@ -127,16 +120,10 @@ RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& ro
   result.resize(shots.prisms(), rows.size());
   for_each_block(rows.size(), [&](std::size_t begin, std::size_t end) {
     const auto take = [&](const auto& from, auto& to) {
+      if (from.empty()) return;  // beams that are not told
       for (std::size_t i = begin; i < end; ++i) to[i] = from[rows[i]];
     };
-    for (std::size_t k = 0; k < result.rotation_angle.size(); ++k) {
-      take(shots.rotation_angle[k], result.rotation_angle[k]);
-    }
-    for (std::size_t k = 0; k < result.angle_covariance.size(); ++k) {
-      take(shots.angle_covariance[k], result.angle_covariance[k]);
-    }
-    take(shots.range, result.range);
-    if (!shots.beam.empty()) take(shots.beam, result.beam);
+    for_each_column(take, shots, result);
   });
   return result;
 }

@@ -55,7 +55,7 @@ void fire(const PlannedFlight& planned, std::uint64_t first, std::uint64_t last,
     if (emitters > 1) fired.shots.beam.push_back(static_cast<std::uint8_t>(i % emitters));
     for (std::size_t k = 0; k < start.size(); ++k) {
       fired.shots.rotation_angle[k].push_back(
-          std::remainder(rotation_angle_at(start[k], sensor.angular_velocity[k], time), kTwoPi));
+          wrap_to_pi(rotation_angle_at(start[k], sensor.angular_velocity[k], time)));
     }
   }
 }

@@ -36,7 +36,7 @@ struct KnotMotion {
 
   KnotMotion(const RotorTrajectory& trajectory, std::size_t knot, std::size_t rotor) {
     const auto state = trajectory.state_of(knot).subspan(kStatesPerRotor * rotor);
-    angle = std::remainder(state[0], kTwoPi);
+    angle = wrap_to_pi(state[0]);
     speed = state[1];
     acceleration = state[2];
   }

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/angle.hpp"
 #include "risley/optics/parameters.hpp"
 
 namespace risley::identification {
@@ -112,7 +113,7 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
     const double speed = model.rotors.mean_angular_velocity(k);
     sensor.angular_velocity.push_back(speed);
     const double angle = model.rotors.angle(k, model.lag.front());
-    sequence.rotation_angle.push_back(std::remainder(angle - speed * rotor_time, kTwoPi));
+    sequence.rotation_angle.push_back(wrap_to_pi(angle - speed * rotor_time));
   }
   sensor.sequence.reset();
   if (repeatable) sensor.sequence = sequence;

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "python/call.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <exception>

@@ -4,10 +4,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
-#include "risley/core/progress.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/evaluation.hpp"
 #include "risley/recordings/truth.hpp"

@@ -31,7 +31,7 @@ def sensors():
         def run():
             truths[place] = risley.emulate(address, stop=stop, **options)
 
-        threads.append(threading.Thread(target=run))
+        threads.append(threading.Thread(target=run, daemon=True))  # never outlives the test
         threads[-1].start()
 
     def end():
@@ -145,12 +145,15 @@ risley.record(sys.argv[1], interface=sys.argv[2], serials=["PYTHON000000061"],
               progress=lambda *_: None)
 """, str(path), HOST], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     unfinished = tmp_path / "live.lvx.unfinished"
-    for _ in range(200):
-        if unfinished.exists() and unfinished.stat().st_size > 100_000:
-            break
-        threading.Event().wait(0.05)
-    child.send_signal(signal.SIGINT)
-    _, errors = child.communicate(timeout=30)
+    try:
+        for _ in range(200):
+            if unfinished.exists() and unfinished.stat().st_size > 100_000:
+                break
+            threading.Event().wait(0.05)
+        child.send_signal(signal.SIGINT)
+        _, errors = child.communicate(timeout=30)
+    finally:
+        child.kill()
     assert errors.rstrip().endswith("KeyboardInterrupt")
     assert not unfinished.exists() and len(risley.read(path)) > 0
 

@@ -93,7 +93,7 @@ class LineSearch {
   template <int Lines>
   double unexplained(std::span<const std::ptrdiff_t> bins) const;
   template <int Lines>
-  RotorLines fit(std::span<const double> speeds) const;
+  class Sums;
   template <int Lines>
   RotorLines refined(const Candidate& candidate) const;
   Bins bins_about(double speed, double share) const;
