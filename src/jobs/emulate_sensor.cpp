@@ -135,6 +135,7 @@ class Emulator {
   std::int64_t rest_until(std::int64_t now) const;
   void set_clock(std::int64_t now);
   std::int64_t stamp(std::int64_t time_ns) const { return time_ns + epoch_ns_; }
+  std::int64_t next_time_ns(std::int64_t now) const;
 
   const EmulateOptions& options_;
   const EmulateNote& note_;
@@ -201,11 +202,20 @@ void Emulator::set_clock(std::int64_t now) {
   if (clock.jump && !has_jumped_ && since_start >= *clock.jump) {
     has_jumped_ = true;
     // No clock shows less than nothing.
-    epoch_ns_ = std::max(epoch_ns_ + static_cast<std::int64_t>(1e9 * clock.jump_by),
-                         stream_ ? -stream_->first_ns : std::int64_t{0});
+    const std::int64_t jump_ns =
+        std::max(static_cast<std::int64_t>(1e9 * clock.jump_by), -stamp(next_time_ns(now)));
+    epoch_ns_ += jump_ns;
     ++truth_.clock_jumps;
-    note_(fmt::format("its clock jumps by {} s", clock.jump_by));
+    note_(fmt::format("its clock jumps by {:.9g} s", 1e-9 * static_cast<double>(jump_ns)));
   }
+}
+
+/// Of what is sent next, since power-on.
+std::int64_t Emulator::next_time_ns(std::int64_t now) const {
+  if (!stream_) return clock_ns(now);
+  const std::int64_t packet = stream_->first_ns + scan_.time_of(stream_->number, stream_->data_type);
+  if (!session_->imu()) return packet;
+  return std::min(packet, static_cast<std::int64_t>(stream_->imu_number) * kImuStep);
 }
 
 void Emulator::end_session() {

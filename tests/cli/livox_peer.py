@@ -283,7 +283,7 @@ class Host:
         return packets
 
     def receive(self, seconds):
-        """Packets of a time, and all that is there at its end."""
+        """Packets of a time, and those that follow without a pause, for a little while."""
         packets, end = [], time.monotonic() + seconds
         heartbeat = 0
         while True:
@@ -298,5 +298,5 @@ class Host:
                 if time.monotonic() >= end:
                     return packets
             else:
-                if time.monotonic() > end + 2:
+                if time.monotonic() > end + 0.2:
                     return packets

@@ -98,7 +98,7 @@ def same_run(one, other):
     return len(one) == len(other) or abs(len(one) - len(other)) < 200 + len(one) // 50
 
 
-class FaultsTest(unittest.TestCase):
+class Faults(unittest.TestCase):
     """Each case in a folder of its own, copied from one with inputs and old outputs."""
 
     @classmethod
@@ -193,6 +193,10 @@ class FaultsTest(unittest.TestCase):
         if done.returncode != 0:
             self.assertIn(b"error", done.stderr, where)
 
+
+class FilesTest(Faults):
+    """What computes from files."""
+
     def test_a_file_is_the_old_or_the_new_one(self):
         expected = {name: self.whole_run(arguments, output) for name, arguments, output in FILES}
 
@@ -267,6 +271,32 @@ class FaultsTest(unittest.TestCase):
                     if not check(self.inputs, case, kind, number):
                         break
 
+    def test_a_killed_run_leaves_the_old_or_the_new_file(self):
+        reference = self.copy_of_inputs()
+        arguments = ["convert", "walls.nc", "-o", "out.lvx"]
+        begin = time.monotonic()
+        done, _ = run(reference, arguments)
+        self.assertEqual(done.returncode, 0)
+        length = time.monotonic() - begin
+        moments = random.Random(1)
+        for _ in range(200 if EVERY else 12):
+            folder = self.copy_of_inputs()
+            (folder / "out.lvx").write_bytes(b"old")
+            with subprocess.Popen([COMMAND, *arguments], cwd=folder, stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.DEVNULL) as process:
+                time.sleep(1.2 * length * moments.random())
+                process.kill()
+            if (folder / "out.lvx").read_bytes() != b"old":
+                self.assertTrue(filecmp.cmp(folder / "out.lvx", reference / "out.lvx", False))
+            done, _ = run(folder, arguments)  # and the next one clears up
+            self.assertEqual(done.returncode, 0)
+            self.assertEqual(set(state(folder)), set(state(reference)))
+            shutil.rmtree(folder)
+
+
+class RecordingTest(Faults):
+    """What needs the ports of sensors."""
+
     def test_a_recording_is_the_new_one_or_unfinished(self):
         serial, unfinished = "FAULTS000000011", "out.lvx.unfinished"
         arguments = ["record", "--interface", "127.0.0.1", "--serial", serial, "--find-s", "5",
@@ -304,28 +334,6 @@ class FaultsTest(unittest.TestCase):
                 self.each([("record",)], check, at_a_time=1)  # all need the same port
             finally:
                 sensor.terminate()
-
-    def test_a_killed_run_leaves_the_old_or_the_new_file(self):
-        reference = self.copy_of_inputs()
-        arguments = ["convert", "walls.nc", "-o", "out.lvx"]
-        begin = time.monotonic()
-        done, _ = run(reference, arguments)
-        self.assertEqual(done.returncode, 0)
-        length = time.monotonic() - begin
-        moments = random.Random(1)
-        for _ in range(200 if EVERY else 12):
-            folder = self.copy_of_inputs()
-            (folder / "out.lvx").write_bytes(b"old")
-            with subprocess.Popen([COMMAND, *arguments], cwd=folder, stdout=subprocess.DEVNULL,
-                                  stderr=subprocess.DEVNULL) as process:
-                time.sleep(1.2 * length * moments.random())
-                process.kill()
-            if (folder / "out.lvx").read_bytes() != b"old":
-                self.assertTrue(filecmp.cmp(folder / "out.lvx", reference / "out.lvx", False))
-            done, _ = run(folder, arguments)  # and the next one clears up
-            self.assertEqual(done.returncode, 0)
-            self.assertEqual(set(state(folder)), set(state(reference)))
-            shutil.rmtree(folder)
 
 
 if __name__ == "__main__":
