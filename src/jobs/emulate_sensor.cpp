@@ -213,7 +213,8 @@ void Emulator::set_clock(std::int64_t now) {
 /// Of what is sent next, since power-on.
 std::int64_t Emulator::next_time_ns(std::int64_t now) const {
   if (!stream_) return clock_ns(now);
-  const std::int64_t packet = stream_->first_ns + scan_.time_of(stream_->number, stream_->data_type);
+  const std::int64_t packet =
+      stream_->first_ns + scan_.time_of(stream_->number, stream_->data_type);
   if (!session_->imu()) return packet;
   return std::min(packet, static_cast<std::int64_t>(stream_->imu_number) * kImuStep);
 }
