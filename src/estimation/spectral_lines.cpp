@@ -232,8 +232,9 @@ class LineSearch::Sums {
     for (std::size_t other = 0; other < Lines; ++other) {
       if (other == line) continue;
       const std::size_t a = std::max(line, other), b = std::min(line, other);
-      Complex& overlap = overlaps_[a][b] = 0;
+      Complex overlap;
       for (std::size_t i = 0; i < shots_; ++i) overlap += std::conj(turns_[a][i]) * turns_[b][i];
+      overlaps_[a][b] = overlap;
     }
   }
 
