@@ -3,7 +3,6 @@
 #include "risley/cloud/pointing.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
@@ -298,9 +297,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   }
   for (std::size_t k = 0; k < points.rotation_angle.size(); ++k) {
     for (std::size_t i = 0; i < shots.size(); ++i) {
-      const double angle = shots.rotation_angle[k][i];
-      const double wrapped = angle - kTwoPi * std::floor(angle / kTwoPi);
-      points.rotation_angle[k][i] = wrapped >= kTwoPi ? 0.0 : wrapped;  // NaN stays
+      points.rotation_angle[k][i] = wrap_to_two_pi(shots.rotation_angle[k][i]);  // NaN stays
     }
   }
 }
