@@ -54,7 +54,7 @@ def look_at(sources, number, folder, commands):
     place = folder / f'piece_{number}'
     place.mkdir()
     directory, command = commands[sources[0]]
-    command = re.sub(r' -Winvalid-pch -include \S+', '', command)  # for gcc alone
+    command = re.sub(r' -Winvalid-pch -include \S+| --param \S+', '', command)  # for gcc alone
     (place / 'compile_commands.json').write_text(json.dumps(
         [{'directory': directory, 'command': f'{command} -c {piece}', 'file': str(piece)}]))
     done = subprocess.run(

@@ -91,6 +91,15 @@ function install() {
 
   const keyNotes = () => notes;
 
+  // What came of the mouse lately, for complaints.
+  let mouse = [];
+  for (const type of ['pointerenter', 'pointerdown', 'pointermove', 'pointerup', 'pointercancel', 'scroll']) {
+    document.addEventListener(type, ({ clientX, clientY, shiftKey }) => {
+      mouse = [...mouse.slice(-19), [type, clientX, clientY, shiftKey ? 'Shift' : ''].join(' ').trim()];
+    }, true);
+  }
+  const mouseNotes = () => mouse.join(', ');
+
   // Whether a colour is a tone laid over the panel, at least so thickly.
   function isTone(pixel, panel, tone, thinnest) {
     const way = tone.map((v, i) => v - panel[i]);
@@ -248,7 +257,7 @@ function install() {
   }
 
   window.looking = { area, extents, drawn, seen, remember, differences, pointToHover, tooltip,
-    followKeys, keyNotes };
+    followKeys, keyNotes, mouseNotes };
 }
 
 export const look = (tab) => tab.evaluate(install);
