@@ -154,7 +154,6 @@ export async function checkMouse(tab, { most = Infinity, patience = longestReact
   await look(tab);
   const complaints = [];
   for (const figure of oneOfEachSort(await flatOnes(tab)).slice(0, most)) {
-    const came = () => tab.evaluate(() => window.looking.mouseNotes());
     const say = (text) => complaints.push(`${figure.title}: ${text}`);
     const box = await boxOf(tab, figure);
     const whole = await extents(tab, figure);
@@ -184,7 +183,8 @@ export async function checkMouse(tab, { most = Infinity, patience = longestReact
         0.05 * width(zoomed[0]) && near(width(found), width(zoomed[0]), width(whole[0]));
     const moved = await reach(isMoved);
     if (!isMoved(moved)) {
-      say(`Shift and dragging moves ${JSON.stringify(zoomed)} to ${JSON.stringify(moved)}, after ${await came()}`);
+      const came = await tab.evaluate(() => window.looking.mouseNotes());
+      say(`Shift and dragging moves ${JSON.stringify(zoomed)} to ${JSON.stringify(moved)}, after ${came}`);
     }
 
     const isWhole = (found) => sameExtents(found, whole);
