@@ -69,6 +69,14 @@ function(risley_optimise_little target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 
+# For targets that compute much. Clang counts what the sanitizers add to a function and then inlines hardly anything of
+# Eigen; with a higher limit, such code runs three times as fast under them and takes 1.7 times as long to compile.
+function(risley_inline_sanitized target)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang" AND CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+    target_compile_options(${target} PRIVATE "SHELL:-mllvm -inline-threshold=2500")
+  endif()
+endfunction()
+
 # One layer: a library risley_<name> (alias risley::<name>) of include/risley/<name> and
 # src/<name>, linked to the layers it may include and to no other.
 function(risley_add_layer name)
