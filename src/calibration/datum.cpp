@@ -239,8 +239,8 @@ PointingError BeamBundle::pointing_error(const PrismTrain& believed,
     const Beam& beam = beams_[i];
     if (!std::isfinite(reported[i].x)) continue;
     const auto from = angles_from_direction(reported[i]), to = angles_from_direction(calibrated[i]);
-    total += wrap_to_pi(from.azimuth - to.azimuth) * beam.of_angles.row(0) +
-             (from.zenith - to.zenith) * beam.of_angles.row(1);
+    const Eigen::RowVector2d apart(wrap_to_pi(from.azimuth - to.azimuth), from.zenith - to.zenith);
+    total += apart * beam.of_angles;
     const Eigen::Vector3d left = eigen(reported[i]) - beam.direction - turn.cross(beam.direction);
     const Eigen::RowVectorXd slope = left.transpose() * rest(beam);
     shape += slope;
