@@ -140,8 +140,8 @@ TEST(SensorRecognition, EmittersThatTheFileNamesTellTheRoll) {
       SCOPED_TRACE(sensors[i].name + " " + std::to_string(roll));
       scene.roll = deg(roll);
       // Of 30 scans each, the worst was off by 0.13 degree, the Horizon's by 1.06: its two rotors
-      // of equal speeds leave more within a tenth of a second. Gross errors move the roll by
-      // degrees, but do not hide the sensor.
+      // of equal speeds leave more within a tenth of a second. Gross errors move the roll: the
+      // Avia's by 3 degrees rms, less in this scan; others may tell none. They hide no sensor.
       for (const double gross : {0.0, 0.02}) {
         scene.gross = gross;
         const SensorRecognition found =
@@ -149,8 +149,8 @@ TEST(SensorRecognition, EmittersThatTheFileNamesTellTheRoll) {
         const SensorMatch& best = found.matches.front();
         EXPECT_EQ(best.candidate, i);
         EXPECT_TRUE(found.decided);
-        if (gross == 0) {
-          EXPECT_LT(std::abs(wrap_to_pi(best.roll - scene.roll)), deg(1.3));
+        if (gross == 0 || i == 2) {
+          EXPECT_LT(std::abs(wrap_to_pi(best.roll - scene.roll)), deg(gross == 0 ? 1.3 : 3.0));
         }
         for (const SensorMatch& match : found.matches) {  // sixth beams have only those with six
           if (sensors[match.candidate].train.emitters() == 1) {
