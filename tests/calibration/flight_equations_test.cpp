@@ -23,6 +23,7 @@
 #include "risley/core/plane.hpp"
 
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 #include "refusal.hpp"
 
 namespace risley::calibration::flight_equations_test {
@@ -270,7 +271,11 @@ TEST_P(EveryTrain, DerivativesAreThoseOfThePredictedRange) {
 
 INSTANTIATE_TEST_SUITE_P(Trains, EveryTrain,
                          ::testing::Values(std::pair{"PA-AP", 1}, std::pair{"PA-AP", 3},
-                                           std::pair{"AP-PA-AP", 1}));
+                                           std::pair{"AP-PA-AP", 1}),
+                         [](const auto& train) {
+                           return parameter_name(train.param.first) +
+                                  std::to_string(train.param.second);
+                         });
 
 TEST(FlightEquations, AreTheSumsOfTheRows) {
   Flight flight("PA-AP");

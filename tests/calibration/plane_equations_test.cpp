@@ -22,6 +22,7 @@
 #include "risley/optics/observation_model.hpp"
 
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::calibration::plane_equations_test {
 
@@ -242,11 +243,7 @@ TEST_P(PlaneEquationsOfATrain, EqualTheScalarModel) {
 INSTANTIATE_TEST_SUITE_P(FaceOrders, PlaneEquationsOfATrain,
                          ::testing::Values("PA", "AP", "PA-AP", "AP-PA", "PA-AP-PA", "AP-AP-PA",
                                            "PA-AP-PA-AP"),
-                         [](const auto& order) {
-                           std::string name = order.param;
-                           std::erase(name, '-');
-                           return name;
-                         });
+                         kByItself);
 
 /// The shots of one emitter, as its own.
 RangedShots shots_of_emitter(const RangedShots& shots, int beam) {
@@ -320,11 +317,7 @@ TEST_P(PlaneEquationsOfEmitters, AreTheSumOfThoseOfEach) {
 
 INSTANTIATE_TEST_SUITE_P(FaceOrders, PlaneEquationsOfEmitters,
                          ::testing::Values("AP", "PA-AP", "AP-PA", "AP-PA-AP", "PA-AP-AP-PA"),
-                         [](const auto& order) {
-                           std::string name = order.param;
-                           std::erase(name, '-');
-                           return name;
-                         });
+                         kByItself);
 
 TEST(PlaneEquations, AnyNumberOfShotsWillDo) {
   const PlaneView view = wall_view("PA-AP", {1, 2, 6, 7, 8, 11, 12}, 3);

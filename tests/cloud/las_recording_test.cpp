@@ -16,6 +16,7 @@
 #include "risley/recordings/reader.hpp"
 
 #include "cloud/cloud_samples.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::cloud::las_recording_test {
 
@@ -112,11 +113,7 @@ TEST_P(LasRecordingTest, ACutFileGivesThePointsBeforeAndThenThePlace) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, LasRecordingTest, ::testing::ValuesIn(formats_of_this_build()),
-                         [](const auto& test) {
-                           std::string name = test.param;
-                           std::erase_if(name, [](char c) { return c == '-' || c == '.'; });
-                           return name;
-                         });
+                         kByItself);
 
 TEST(LazRecordingTest, IsTested) {
   const std::vector<std::string> formats = formats_of_this_build();

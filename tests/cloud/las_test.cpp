@@ -20,6 +20,7 @@
 #include "cloud/file_size_limit.hpp"
 #include "cloud/formats/las_layout.hpp"
 #include "cloud/las_checker.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::cloud::las_test {
 
@@ -274,13 +275,15 @@ TEST_P(LasVariants, PiecesMakeNoDifference) {
   EXPECT_TRUE(bytes() == whole);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, LasVariants,
-                         ::testing::Values(Variant{"las-1.4", true, true, 2, 0},
-                                           Variant{"las-1.4", false, true, 3, 0},
-                                           Variant{"las-1.4", true, false, 2, 4},
-                                           Variant{"las-1.4", false, false, 2, 0},
-                                           Variant{"las-1.2", true, true, 3, 2},
-                                           Variant{"las-1.2", false, false, 2, 0}));
+INSTANTIATE_TEST_SUITE_P(
+    All, LasVariants,
+    ::testing::Values(Variant{"las-1.4", true, true, 2, 0}, Variant{"las-1.4", false, true, 3, 0},
+                      Variant{"las-1.4", true, false, 2, 4}, Variant{"las-1.4", false, false, 2, 0},
+                      Variant{"las-1.2", true, true, 3, 2}, Variant{"las-1.2", false, false, 2, 0}),
+    [](const auto& variant) {
+      return parameter_name(variant.param.format) + (variant.param.covariance ? "Covariance" : "") +
+             (variant.param.angles ? "Angles" : "") + (variant.param.factors > 0 ? "Factors" : "");
+    });
 
 TEST_F(LasTest, ManyBlocksOfTheBuffer) {
   const Points points = random_points(header_, 40'000);  // several MB

@@ -25,6 +25,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::cloud::pointing_test {
 
@@ -393,10 +394,9 @@ std::vector<PointCase> point_cases() {
 
 INSTANTIATE_TEST_SUITE_P(Trains, PointsOfEveryTrain, ::testing::ValuesIn(point_cases()),
                          [](const auto& one) {
-                           std::string name = one.param.order;
-                           std::erase(name, '-');
-                           name += one.param.reported ? "Reported" : "Smoothed";
-                           return name + (one.param.origin ? "WithOrigin" : "FromZero");
+                           return parameter_name(one.param.order) +
+                                  (one.param.reported ? "Reported" : "Smoothed") +
+                                  (one.param.origin ? "WithOrigin" : "FromZero");
                          });
 
 // A point is the same whether its emitter has the train for itself or shares it.

@@ -11,6 +11,7 @@
 
 #include "cloud/cloud_samples.hpp"
 #include "cloud/file_size_limit.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::cloud::writers_test {
 
@@ -44,9 +45,7 @@ std::vector<std::string> formats_of_this_test() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, CloudWriters, ::testing::ValuesIn(formats_of_this_test()),
-                         [](const auto& one) {
-                           return one.param == "ros1-bag" ? "ros1_bag" : one.param;
-                         });
+                         kByItself);
 
 TEST_P(CloudWriters, GiveTheFileItsNameAtTheEnd) {
   const auto writer = create_cloud(path_, many_.header, options_);

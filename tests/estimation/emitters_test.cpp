@@ -16,6 +16,7 @@
 #include "risley/optics/observation_model.hpp"
 
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::estimation::emitters_test {
 
@@ -213,9 +214,7 @@ INSTANTIATE_TEST_SUITE_P(Trains, NormalEquationsOfEmitters,
                                            Emitters{"AP-PA-AP", 6}, Emitters{"PA-PA-AP", 8},
                                            Emitters{"PA-AP-AP-PA", 8}),
                          [](const auto& one) {
-                           std::string name = one.param.order + std::to_string(one.param.count);
-                           std::erase(name, '-');
-                           return name;
+                           return parameter_name(one.param.order + std::to_string(one.param.count));
                          });
 
 TEST(NormalEquations, RefuseABeamThatTheTrainDoesNotHave) {

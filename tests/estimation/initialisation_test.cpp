@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
@@ -61,7 +62,8 @@ TEST_P(StartOfRandomSensors, AlwaysFindsCombinationSpeedsAndAngles) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Rates, StartOfRandomSensors, ::testing::Values(1000.0, 100000.0));
+INSTANTIATE_TEST_SUITE_P(Rates, StartOfRandomSensors, ::testing::Values(1000.0, 100000.0),
+                         [](const auto& rate) { return fmt::format("{:.0f}Hz", rate.param); });
 
 /// Which shots of a recording found something to return from.
 struct Coverage {

@@ -19,6 +19,7 @@
 
 #include "estimation/knot_model.hpp"
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::estimation::normal_equations_test {
 
@@ -267,11 +268,7 @@ TEST_P(NormalEquationsOfATrain, EqualTheScalarModel) {
 INSTANTIATE_TEST_SUITE_P(FaceOrders, NormalEquationsOfATrain,
                          ::testing::Values("PA", "AP", "PA-AP", "AP-PA", "PA-AP-PA", "AP-AP-PA",
                                            "PA-AP-PA-AP"),
-                         [](const auto& order) {
-                           std::string name = order.param;
-                           std::erase(name, '-');
-                           return name;
-                         });
+                         kByItself);
 
 TEST(NormalEquations, ABeamThatDoesNotGetThroughIsAnOutlierAndCountsNothing) {
   for (const auto& [face_order, wedge_deg] :

@@ -22,6 +22,7 @@
 #include "risley/sensors/preset.hpp"
 
 #include "estimation/evident_places.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::estimation::packet_places_test {
 
@@ -144,9 +145,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Cropped{"mid-70", 10.0, 8.0, false, true, true},
                       Cropped{"tele-15", 9.0, 7.0, true, true, true}),
     [](const auto& scan) {
-      std::string name = scan.param.sensor;
-      std::erase(name, '-');
-      return fmt::format("{}{:.0f}{}{}", name, scan.param.width,
+      return fmt::format("{}{:.0f}{}{}", parameter_name(scan.param.sensor), scan.param.width,
                          scan.param.backwards ? "Backwards" : "", scan.param.bent ? "Bent" : "");
     });
 

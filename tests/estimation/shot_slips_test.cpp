@@ -18,6 +18,8 @@
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "parameter_name.hpp"
+
 namespace risley::estimation::shot_slips_test {
 
 struct Loss {
@@ -104,11 +106,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(Scan{"mid-40", {{5000, 1}, {5200, 40}, {11000, 96}}},
                       Scan{"horizon", {{4100, 6}, {20000, 6}, {20096 + 6, 6}, {30000, 7}}, 4},
                       Scan{"tele-15", {{9000, 66}, {25000, 3}}, 2}, Scan{"avia", {{15000, 1}}}),
-    [](const auto& scan) {
-      std::string name = scan.param.sensor;
-      std::erase(name, '-');
-      return name;
-    });
+    [](const auto& scan) { return parameter_name(scan.param.sensor); });
 
 class NoLostShots : public ::testing::TestWithParam<const char*> {};
 
@@ -120,7 +118,7 @@ TEST_P(NoLostShots, AreInventedUnderTheSky) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensors, NoLostShots,
-                         ::testing::Values("mid-40", "horizon", "tele-15", "avia"));
+                         ::testing::Values("mid-40", "horizon", "tele-15", "avia"), kByItself);
 
 TEST(ShotSlips, AreNotLookedForInAThinnedRecording) {
   CountedShots shots = record({"mid-40", {}});

@@ -15,6 +15,7 @@
 #include "risley/optics/observation_adjoint.hpp"
 
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 #include "refusal.hpp"
 
 namespace risley::emitters_test {
@@ -285,9 +286,7 @@ std::vector<Emitters> every_kind() {
 
 INSTANTIATE_TEST_SUITE_P(Trains, EveryEmitter, ::testing::ValuesIn(every_kind()),
                          [](const auto& one) {
-                           std::string name = one.param.order + std::to_string(one.param.count);
-                           std::erase(name, '-');
-                           return name;
+                           return parameter_name(one.param.order + std::to_string(one.param.count));
                          });
 
 TEST(Beams, WrongColumnsAreRefused) {

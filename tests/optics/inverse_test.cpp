@@ -11,6 +11,7 @@
 #include "risley/optics/observation_model.hpp"
 
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::inverse_test {
 
@@ -67,11 +68,7 @@ TEST_P(InverseOfEveryTrain, FindsTheGivenPairAndItsPartner) {
 
 INSTANTIATE_TEST_SUITE_P(FaceOrders, InverseOfEveryTrain,
                          ::testing::Values("PA-PA", "PA-AP", "AP-AP", "AP-PA", "PA-AP-PA"),
-                         [](const auto& order) {
-                           std::string name = order.param;
-                           std::erase(name, '-');
-                           return name;
-                         });
+                         kByItself);
 
 TEST(Inverse, PairsMergeAtTheEdgeOfTheFieldOfView) {
   const PrismTrain train(parse_face_order("PA-AP"));

@@ -11,6 +11,7 @@
 #include "risley/optics/batch.hpp"
 
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::observation_adjoint_test {
 
@@ -263,10 +264,6 @@ TEST_P(AdjointOfEveryTrain, TurnsOfTheWholeBeamAreThoseOfTheDirection) {
 }
 
 INSTANTIATE_TEST_SUITE_P(FaceOrders, AdjointOfEveryTrain,
-                         ::testing::ValuesIn(testing::all_face_orders()), [](const auto& order) {
-                           std::string name = order.param;
-                           std::erase(name, '-');
-                           return name;
-                         });
+                         ::testing::ValuesIn(testing::all_face_orders()), kByItself);
 
 }  // namespace risley::observation_adjoint_test

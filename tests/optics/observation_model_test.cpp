@@ -12,6 +12,7 @@
 #include "risley/optics/batch.hpp"
 
 #include "optics/trains.hpp"
+#include "parameter_name.hpp"
 
 namespace risley::observation_model_test {
 
@@ -120,11 +121,7 @@ TEST_P(LawsOfEveryTrain, IdealModelEqualsThePaperEquationsWrittenOutWithQuaterni
 }
 
 INSTANTIATE_TEST_SUITE_P(FaceOrders, LawsOfEveryTrain,
-                         ::testing::ValuesIn(testing::all_face_orders()), [](const auto& order) {
-                           std::string name = order.param;
-                           std::erase(name, '-');
-                           return name;
-                         });
+                         ::testing::ValuesIn(testing::all_face_orders()), kByItself);
 
 TEST(ObservationModel, EqualWedgesWithLikeFacesFacingAndParallelFormAPlate) {
   // PA-AP with the second prism turned by half a turn: the slanted faces are parallel.

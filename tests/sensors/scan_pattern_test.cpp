@@ -19,6 +19,7 @@
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "parameter_name.hpp"
 #include "refusal.hpp"
 
 namespace risley::sensors::scan_pattern_test {
@@ -110,8 +111,8 @@ INSTANTIATE_TEST_SUITE_P(
     Presets, MakersSequence,
     ::testing::Values(Sequence{"mid-40-sequence", "livox-mid-40-sequence.csv", 1, 1.6e-5},
                       Sequence{"avia-sequence", "livox-avia-sequence-every-40th.csv", 40, 0},
-                      Sequence{"horizon-sequence", "livox-horizon-sequence-every-40th.csv", 40,
-                               0}));
+                      Sequence{"horizon-sequence", "livox-horizon-sequence-every-40th.csv", 40, 0}),
+    [](const auto& sequence) { return parameter_name(sequence.param.preset); });
 
 // Real units as the manufacturer's files have them: an Avia the same, a Horizon as its mirror
 // image.

@@ -14,6 +14,8 @@
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/scanner.hpp"
 
+#include "parameter_name.hpp"
+
 namespace risley::estimation {
 namespace {
 
@@ -124,10 +126,7 @@ INSTANTIATE_TEST_SUITE_P(Sensors, RunningEstimateOf,
                                            Bend{"tele-15", "prism_tilt_b_vertical_deg"},
                                            Bend{"tele-15", "prism_tilt_b_horizontal_deg"}),
                          [](const auto& test) {
-                           std::string name =
-                               std::string(test.param.preset) + "_" + test.param.parameter;
-                           std::replace(name.begin(), name.end(), '-', '_');
-                           return name;
+                           return parameter_name(test.param.preset) + "_" + test.param.parameter;
                          });
 
 TEST(RunningEstimate, ParametersAndSpeedsAreWithinTheirSigmas) {

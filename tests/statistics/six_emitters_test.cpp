@@ -18,6 +18,7 @@
 #include "risley/jobs/estimate_recording.hpp"
 #include "risley/simulation/truth_file.hpp"
 
+#include "parameter_name.hpp"
 #include "source_tree.hpp"
 #include "statistics/simulated_walls.hpp"
 
@@ -143,6 +144,7 @@ TEST_P(SixEmitters, FromAFileToACloudEveryParameterIsAsGoodAsItsSigma) {
 
 INSTANTIATE_TEST_SUITE_P(Presets, SixEmitters,
                          ::testing::Values(Type{"horizon", 25, 6}, Type{"avia", 19, 3},
-                                           Type{"tele-15", 19, 3}));
+                                           Type{"tele-15", 19, 3}),
+                         [](const auto& type) { return parameter_name(type.param.preset); });
 
 }  // namespace risley::six_emitters_test
