@@ -7,9 +7,9 @@
 //   rename  in every form, link included
 //   create  a file that is opened for writing
 //   close   of a file with bytes that were not synced, whose loss only close would tell; it is
-//   closed
-//           all the same, as Linux does
-//   memory  malloc and its like
+//           closed all the same, as Linux does
+//   memory  malloc and its like, except in a build with sanitizers, which have a malloc of their
+//   own
 #include <atomic>
 #include <cerrno>
 #include <cstdarg>
@@ -194,6 +194,7 @@ int close(int file) {
   return result;
 }
 
+#ifndef RISLEY_SANITIZED
 void* malloc(std::size_t count) {
   if (fails(memory_call)) return errno = ENOMEM, nullptr;
   return __libc_malloc(count);
@@ -215,5 +216,6 @@ int posix_memalign(void** bytes, std::size_t alignment, std::size_t count) {
   *bytes = __libc_memalign(alignment, count);
   return *bytes == nullptr ? ENOMEM : 0;
 }
+#endif
 
 }  // extern "C"
