@@ -95,8 +95,12 @@ class OpticsWatch::Work {
 
   void finish(double longest) {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::duration<double>(longest),
-                      [this] { return waiting_.empty() && !busy_; });
+    if (changed_.wait_for(lock, std::chrono::duration<double>(longest),
+                          [this] { return waiting_.empty() && !busy_; })) {
+      return;
+    }
+    for (const Waiting& one : waiting_) ++health_[one.sensor].dropped_packets;
+    waiting_.clear();
   }
 
   std::vector<OpticsHealth> health() const {
@@ -111,32 +115,26 @@ class OpticsWatch::Work {
   };
 
   void run() {
-    // Recording needs the other cores.
-    parallel::Threads alone(1);
-    for (;;) {
-      std::deque<Waiting> taken;
-      {
-        std::unique_lock lock(mutex_);
-        busy_ = false;
-        changed_.notify_all();
-        changed_.wait(lock, [this] { return ending_ || !waiting_.empty(); });
-        if (ending_) return;
-        // Few at a time, so that what waits keeps to its bound.
-        constexpr std::size_t kAtOnce = 200;
-        while (!waiting_.empty() && taken.size() < kAtOnce) {
-          taken.push_back(std::move(waiting_.front()));
-          waiting_.pop_front();
-        }
-        busy_ = true;
-      }
-      try {
-        alone.run([&] {
-          for (const Waiting& one : taken) take(one);
-        });
-      } catch (const Cancelled&) {
-        return;
-      }
+    parallel::Threads alone(1);  // recording needs the other cores
+    try {
+      alone.run([this] {
+        while (const std::optional<Waiting> one = next()) take(*one);
+      });
+    } catch (const Cancelled&) {
     }
+  }
+
+  /// The packet that has waited longest, as soon as there is one; none at the end.
+  std::optional<Waiting> next() {
+    std::unique_lock lock(mutex_);
+    busy_ = false;
+    if (waiting_.empty()) changed_.notify_all();
+    changed_.wait(lock, [this] { return ending_ || !waiting_.empty(); });
+    if (ending_) return std::nullopt;
+    busy_ = true;
+    Waiting first = std::move(waiting_.front());
+    waiting_.pop_front();
+    return first;
   }
 
   void take(const Waiting& one) {

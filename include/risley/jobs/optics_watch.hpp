@@ -51,7 +51,8 @@ class OpticsWatch {
   void set_grid(std::size_t sensor, const recordings::livox::ShotGrid& grid);
   /// Takes a packet. @param sensor  its place in the list
   void add(std::size_t sensor, std::span<const std::uint8_t> packet);
-  /// Waits until all that was added has been looked at, or the time is over.
+  /// Waits until all that was added has been looked at, or the time is over: what waits then is
+  /// dropped and counted.
   /// @param longest  s
   void finish(double longest);
   /// What is known now [sensors].
