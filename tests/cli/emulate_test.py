@@ -204,7 +204,7 @@ class EmulateTest(ProcessTest):
                        ("--loss", 0.02, "--duplication", 0.02, "--disorder", 0.1, "--delay-ms", 30)):
             with self.subTest(faults):
                 process = self.emulate(*faults, "--sensor", "avia", "--seed", 7)
-                recorded = self.record("faults.lvx", "--duration-s", 1.5, "--find-s", 1.2)[0]
+                recorded = self.record("faults.lvx", "--serial", CODE, "--find-s", 20, "--duration-s", 1.5)[0]
                 truth = self.truth(process)
                 self.check_counts(truth, recorded)
                 self.assertEqual(truth["lost"] > 0, "--loss" in faults)

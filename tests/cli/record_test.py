@@ -132,7 +132,8 @@ class RecordTest(ProcessTest):
             with self.subTest(data_type):
                 sensor = self.sensor(device_type=sensor_type)
                 name = f"type{data_type}.lvx"
-                result = self.record(name, "--duration-s", 0.3, *options, "--find-s", 1.2)["sensors"][0]
+                result = self.record(name, "--serial", sensor.code, "--find-s", 20, "--duration-s", 0.3,
+                                     *options)["sensors"][0]
                 self.assertEqual({data[9] for _, data in self.packets(name)[1]}, {data_type})
                 self.assertEqual(self.times(name), sensor.times)
                 self.assertEqual(result["lost"], 0)
