@@ -8,8 +8,7 @@
 //   create  a file that is opened for writing
 //   close   of a file with bytes that were not synced, whose loss only close would tell; it is
 //           closed all the same, as Linux does
-//   memory  malloc and its like, except in a build with sanitizers, which have a malloc of their
-//   own
+//   memory  malloc and its like; not in a build with sanitizers, which bring their own
 #include <atomic>
 #include <cerrno>
 #include <cstdarg>
