@@ -12,6 +12,7 @@
 
 #include "risley/optics/beam_origin.hpp"
 #include "risley/optics/prism_train.hpp"
+#include "risley/sensors/range_errors.hpp"
 
 namespace risley::sensors {
 
@@ -89,6 +90,7 @@ struct Sensor {
   double range_noise_incidence = 0;    ///< part that grows with tan(angle of incidence), m
   double range_noise_weak_return = 0;  ///< part at intensity 1; falls with the root of it, m
   double range_offset = 0;             ///< what the sensor adds to a true range, m
+  RangeErrors range_errors;            ///< what it adds beside that
   double angle_resolution = 0;         ///< rounding step of reported angles, rad
   double range_resolution = 0;         ///< rounding step of reported ranges, m
   double range_minimum = 0;            ///< no return below, m
