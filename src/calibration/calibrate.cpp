@@ -18,6 +18,8 @@
 #include "calibration/entry_checks.hpp"
 #include "calibration/held.hpp"
 #include "calibration/labelled_shots.hpp"
+#include "calibration/range_terms.hpp"
+#include "calibration/same_walls.hpp"
 #include "calibration/shot_blocks.hpp"
 #include "calibration/shot_columns.hpp"
 #include "calibration/verdict.hpp"
@@ -73,11 +75,10 @@ void require_recording(const RangedRecording& recording) {
 
 /// The shots with other rotation angles. @param shift  [prisms], rad
 RangedShots shifted(const RangedShots& shots, const std::vector<double>& shift) {
-  RangedShots result;
-  result.resize(shots.prisms(), shots.size());
+  RangedShots result = columns_like(shots, shots.size());
   for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
     const auto copy = [&](const auto& from, auto& to) {
-      if (from.empty()) return;  // beams that are not told
+      if (from.empty()) return;  // emitters that are not known
       std::copy(from.data() + begin, from.data() + end, to.data() + begin);
     };
     for_each_column(copy, shots, result);
@@ -158,6 +159,18 @@ class Work {
     }
     p.prior = p.train;
     p.range_offset_sigma = options_.range_offset_sigma;
+    if (!paper()) {
+      const bool intensities =
+          std::all_of(recordings_.begin(), recordings_.end(),
+                      [](const RangedRecording& one) { return !one.shots.intensity.empty(); });
+      p.range_terms = range_terms_of(options_.sensor, intensities);
+      p.divergence = {options_.sensor.beam_divergence_horizontal,
+                      options_.sensor.beam_divergence_vertical};
+      if (options_.beam_origin) {
+        p.geometry = one_size_each(p.geometry, p.train.prisms());
+        p.sizes = size_priors(options_.sensor);
+      }
+    }
     p.considered = belief_.free;
     p.considered_covariance = belief_.covariance;
     for (const RangedRecording& recording : recordings_) {
@@ -195,10 +208,15 @@ class Work {
     std::vector<std::string> names;
     for (const RangedRecording& recording : recordings_) names.push_back(recording.name);
     // The paper's method knows no datum.
-    WallMatching matching = paper() ? match_walls(found, names, std::nullopt, {})
-                                    : match_walls(found, names, options_.planes, options_.stations);
+    const FoundPoses poses = found_poses(found, names);
+    WallMatching matching =
+        paper() ? match_walls(found, names, std::nullopt, {})
+                : match_walls(found, names, options_.planes,
+                              poses.stations.empty() ? options_.stations : poses.stations);
     problem_.walls = std::move(matching.walls);
     problem_.stations = std::move(matching.stations);
+    result_.same_walls = !poses.stations.empty();
+    if (result_.same_walls) problem_.stations[poses.reference].sigma = 0;
     problem_.stations_known = matching.stations_known;
     result_.warnings.insert(result_.warnings.end(), matching.warnings.begin(),
                             matching.warnings.end());
@@ -219,8 +237,33 @@ class Work {
       for (int& label : labels[r]) {
         if (label >= 0) label += static_cast<int>(first_view[r]);
       }
-      hand_out(coarse_[r], labels[r], r, problem_);
+      give_shots(coarse_[r], labels[r], r);
     }
+  }
+
+  /// Gives the views of one recording the shots that are labelled theirs.
+  void give_shots(const RangedShots& shots, const std::vector<int>& labels, std::size_t recording) {
+    hand_out(shots, labels, recording, problem_);
+    for (std::size_t v = 0; v < problem_.views.size(); ++v) {
+      WallView& view = problem_.views[v];
+      if (view.recording != recording) continue;
+      auto own = std::make_shared<RangedShots>(*view.shots);
+      fill_range_terms(problem_, v, *own);
+      view.shots = std::move(own);
+      view.cell_begin.clear();
+    }
+  }
+
+  /// The poses of recordings of which nobody stated any, where they saw the same walls.
+  FoundPoses found_poses(const std::vector<FoundPlane>& found,
+                         const std::vector<std::string>& names) const {
+    const bool stated = options_.planes || !options_.stations.empty();
+    if (options_.same_walls == SameWalls::no || paper() || stated || names.size() < 2) return {};
+    FoundPoses poses = poses_before_same_walls(found, names);
+    if (poses.stations.empty() && options_.same_walls == SameWalls::yes) {
+      throw EstimationError("the recordings did not see the same walls: " + poses.why_not);
+    }
+    return poses;
   }
 
   PlanarSolution solve(const PlanarProblem& problem) {
@@ -229,7 +272,8 @@ class Work {
     return paper() ? adjust_as_paper(problem) : adjust(problem);
   }
 
-  /// Views that lost their shots when labels changed are no views any more.
+  /// Views that lost their shots when labels changed are no views any more, and walls that nobody
+  /// sees are no unknowns.
   void drop_empty_views(PlanarProblem& problem) const {
     std::erase_if(problem.views,
                   [](const WallView& view) { return view.shots->size() < kLeastViewShots; });
@@ -237,6 +281,16 @@ class Work {
       throw EstimationError(
           "no plane is left after every shot was assigned to the plane it fits best");
     }
+    std::vector<std::size_t> row(problem.walls.size(), 0);
+    for (const WallView& view : problem.views) row[view.wall] = 1;
+    std::vector<Wall> seen;
+    for (std::size_t w = 0; w < row.size(); ++w) {
+      const bool any = row[w] != 0;
+      row[w] = seen.size();
+      if (any) seen.push_back(problem.walls[w]);
+    }
+    problem.walls = std::move(seen);
+    for (WallView& view : problem.views) view.wall = row[view.wall];
   }
 
   void adjust_coarsely() {
@@ -248,8 +302,7 @@ class Work {
       update_range_variances(solution);
       problem_ = std::move(solution.problem);
       for (std::size_t r = 0; r < recordings_.size(); ++r) {
-        hand_out(coarse_[r], label_shots(problem_, r, coarse_[r], all_[r].pointing).view, r,
-                 problem_);
+        give_shots(coarse_[r], label_shots(problem_, r, coarse_[r], all_[r].pointing).view, r);
       }
       drop_empty_views(problem_);
     }
@@ -263,7 +316,7 @@ class Work {
 
   void hand_out_all() {
     for (std::size_t r = 0; r < all_.size(); ++r) {
-      hand_out(all_[r].shots, all_[r].labels.view, r, problem_);
+      give_shots(all_[r].shots, all_[r].labels.view, r);
     }
   }
 
@@ -288,14 +341,20 @@ class Work {
       settled = std::max(before, left_out) - std::min(before, left_out) <= left_out / kSettledPart;
       hand_out_all();
     }
-    const Evenness evenness = evenness_of(problem_, all_);
-    result_.unevenness = evenness.unevenness;
-    result_.variance_factor = evenness.variance_factor;
+    if (paper()) return solution;
+    problem_.shape = building_walls();
+    for (int round = 0; round < 2; ++round) {
+      lay_grids(problem_);
+      solution = solve(problem_);
+      update_range_variances(solution);
+      problem_ = solution.problem;
+    }
     return solution;
   }
 
   void fill_result(const PlanarSolution& solution);
   void fill_held(const PlanarSolution& solution);
+  void fill_numbers(const PlanarSolution& solution);
   void fill_datum(const PlanarSolution& solution);
 
   const std::vector<RangedRecording>& recordings_;
@@ -318,20 +377,19 @@ void Work::fill_result(const PlanarSolution& solution) {
   result_.angle_shift = belief_.angle_shift;
   result_.free = p.free;
   result_.parameters = solution.parameters;
-  result_.covariance = solution.covariance * result_.variance_factor;
-  result_.range_offset = p.range_offset;
-  result_.range_offset_sigma = solution.range_offset_sigma * std::sqrt(result_.variance_factor);
+  result_.covariance = solution.covariance;
   result_.prior_tests = solution.prior_tests;
-  result_.unobservable = estimation::weak_directions(
-      solution.information / result_.variance_factor + prior_information(p), p.free,
-      kWidestDirection);
+  result_.unobservable = estimation::weak_directions(solution.information + prior_information(p),
+                                                     p.free, kWidestDirection);
   double stated = 0, redundancy = 0;
   for (std::size_t v = 0; v < p.views.size(); ++v) {
     stated += solution.chi2[v] * solved_variance_[v];
     redundancy += solution.redundancy[v];
   }
   result_.sigma0 = std::sqrt(stated / redundancy / kVarianceWithinGate) / range_noise_;
+  result_.shape = solution.shape.mean;
   fill_held(solution);
+  fill_numbers(solution);
   WallThickness walls = wall_thickness(p, belief_.sensor.train, all_);
   result_.planes = std::move(walls.planes);
   result_.profiles = std::move(walls.profiles);
@@ -357,7 +415,24 @@ void Work::fill_held(const PlanarSolution& solution) {
   SolutionResponse response = held_response(solution.problem, held_.quantities);
   result_.held = held_.names;
   result_.held_changes = std::move(response.parameters);
-  result_.range_offset_held_changes = std::move(response.range_offset);
+  result_.number_held_changes = std::move(response.numbers);
+}
+
+void Work::fill_numbers(const PlanarSolution& solution) {
+  const PlanarProblem& p = solution.problem;
+  const auto add = [&](const std::string& name, double prior, double prior_sigma) {
+    const Eigen::Index row = solution.number(name);
+    if (row < 0) return;
+    CalibratedNumber number{name, solution.number_values[row], prior, prior_sigma};
+    number.sigma = number.total_sigma = solution.number_sigma(name);
+    if (result_.number_held_changes.cols() > 0) {
+      number.total_sigma = std::hypot(number.sigma, result_.number_held_changes.row(row).norm());
+    }
+    result_.numbers.push_back(std::move(number));
+  };
+  for (const SizePrior& size : p.sizes) add(size.size.name, size.value, size.sigma);
+  for (const RangeTerm& term : p.range_terms) add(term.name, term.prior, term.sigma);
+  add("range_offset_m", 0.0, p.range_offset_sigma);
 }
 
 void Work::fill_datum(const PlanarSolution& solution) {
@@ -378,8 +453,8 @@ void Work::fill_datum(const PlanarSolution& solution) {
   const BeamBundle bundle(p.train, p.free, beams, emitter, held);
   result_.datum = bundle.formal_datum(result_.covariance);
   result_.datum_given_held = bundle.formal_datum(result_.covariance, HeldErrors::left_out);
-  result_.datum_without_common = bundle.formal_datum(
-      solution.noise_covariance * result_.variance_factor, HeldErrors::left_out);
+  result_.datum_without_common =
+      bundle.formal_datum(solution.noise_covariance, HeldErrors::left_out);
   result_.pointing_error = bundle.pointing_error(belief_.sensor.train, result_.covariance);
   result_.better_probability = better_probability(result_.pointing_error);
 }
@@ -393,9 +468,10 @@ double Calibration::total_sigma(std::size_t parameter) const {
   return std::sqrt(variance);
 }
 
-double Calibration::range_offset_total_sigma() const {
-  if (!(range_offset_sigma > 0)) return 0;
-  return std::hypot(range_offset_sigma, range_offset_held_changes.norm());
+const CalibratedNumber* Calibration::number(std::string_view name) const {
+  const auto found = std::find_if(numbers.begin(), numbers.end(),
+                                  [name](const auto& number) { return number.name == name; });
+  return found == numbers.end() ? nullptr : &*found;
 }
 
 Calibration calibrate(const std::vector<RangedRecording>& recordings,

@@ -14,16 +14,42 @@ using Eigen::Index;
 
 namespace {
 
-/// Its row behind those of the parameters.
-void add_range_offset(const PlanarSolution& solution, const Calibration& result,
-                      sensors::Sensor& sensor) {
-  const Index n = result.covariance.rows();
-  sensor.set_knowledge({"range_offset_m", result.range_offset_sigma,
-                        "calibrated on plane walls by risley calibrate",
-                        result.range_offset_total_sigma()});
-  sensor.covariance.col(n).head(n) = solution.range_offset_covariance * result.variance_factor;
-  sensor.covariance.row(n).head(n) = sensor.covariance.col(n).head(n).transpose();
-  sensor.covariance(n, n) = result.range_offset_sigma * result.range_offset_sigma;
+constexpr const char* kSource = "calibrated on plane walls by risley calibrate";
+
+/// Sizes of the prisms and range errors as they were adjusted, and what is known of them.
+void set_numbers(const PlanarProblem& problem, const Calibration& result, sensors::Sensor& sensor) {
+  const bool sizes = std::any_of(problem.sizes.begin(), problem.sizes.end(),
+                                 [](const SizePrior& size) { return size.sigma > 0; });
+  if (sizes) {
+    sensor.set_prism_geometry(problem.geometry);
+    for (const SizePrior& size : problem.sizes) {
+      if (size.sigma == 0) sensor.set_knowledge({size.size.name, 0, "held by risley calibrate"});
+    }
+  }
+  std::erase_if(sensor.knowledge,
+                [](const sensors::Knowledge& entry) { return entry.name == "range_offset_m"; });
+  sensor.range_offset = problem.range_offset;
+  sensor.range_errors = {};
+  for (const RangeTerm& term : problem.range_terms) {
+    switch (term.kind) {
+      case RangeTermKind::near:
+        sensor.range_errors.near = term.value;
+        break;
+      case RangeTermKind::incidence:
+        sensor.range_errors.incidence = term.value;
+        break;
+      case RangeTermKind::per_decade:
+        sensor.range_errors.per_decade = term.value;
+        break;
+      case RangeTermKind::emitter:
+        sensor.range_errors.emitter.push_back(term.value);
+        break;
+    }
+  }
+  for (const CalibratedNumber& number : result.numbers) {
+    sensor.set_knowledge({number.name, number.sigma, kSource, number.total_sigma});
+    sensor.covariance_names.push_back(number.name);
+  }
 }
 
 /// Places in belief.free of the materials that the recordings determined and the solution
@@ -64,16 +90,13 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   for (std::size_t j = 0; j < result.free.size(); ++j) {
     const auto at = static_cast<Index>(j);
     sensor.covariance_names.push_back(result.free[j].name);
-    sensor.set_knowledge({result.free[j].name, std::sqrt(result.covariance(at, at)),
-                          "calibrated on plane walls by risley calibrate", result.total_sigma(j)});
+    sensor.set_knowledge({result.free[j].name, std::sqrt(result.covariance(at, at)), kSource,
+                          result.total_sigma(j)});
   }
   sensor.reference = sensors::CalibrationReference::planes;
-  sensor.range_offset = solution.problem.range_offset;
-  std::erase_if(sensor.knowledge,
-                [](const sensors::Knowledge& entry) { return entry.name == "range_offset_m"; });
-  const bool offset = result.range_offset_sigma > 0;
-  const Index n = result.covariance.rows(), first = n + (offset ? 1 : 0);
-  if (offset) sensor.covariance_names.emplace_back("range_offset_m");
+  set_numbers(solution.problem, result, sensor);
+  const Index n = result.covariance.rows(), numbers = solution.number_covariance.rows();
+  const Index first = n + numbers;
   // With what was not adjusted as quantities of their own, beams are as sure as they are: an error
   // of one and what it does to the others cancel in them.
   std::vector<Index> moved_rows, material_rows;
@@ -88,15 +111,14 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   const auto all = static_cast<Index>(sensor.covariance_names.size());
   sensor.covariance = Eigen::MatrixXd::Zero(all, all);
   sensor.covariance.topLeftCorner(n, n) = result.covariance;
-  if (offset) add_range_offset(solution, result, sensor);
+  sensor.covariance.block(n, n, numbers, numbers) = solution.number_covariance;
+  sensor.covariance.block(n, 0, numbers, n) = solution.number_cross_covariance;
+  sensor.covariance.block(0, n, n, numbers) = solution.number_cross_covariance.transpose();
   if (!materials.empty()) {
     const Eigen::MatrixXd of_materials = belief.covariance(Eigen::all, materials);
     Eigen::MatrixXd with_others(first, of_materials.cols());
     with_others.topRows(n) = algebra::product(solution.considered.parameters, of_materials);
-    if (offset) {
-      with_others.row(n) =
-          algebra::transposed_times(of_materials, solution.considered.range_offset).transpose();
-    }
+    with_others.bottomRows(numbers) = algebra::product(solution.considered.numbers, of_materials);
     std::vector<Index> others(static_cast<std::size_t>(first));
     std::iota(others.begin(), others.end(), Index{0});
     sensor.covariance(others, material_rows) = with_others;
@@ -106,7 +128,7 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   Eigen::MatrixXd movement = Eigen::MatrixXd::Zero(all, result.held_changes.cols());
   if (movement.cols() == 0) return sensor;
   movement.topRows(n) = result.held_changes;
-  if (offset) movement.row(n) = result.range_offset_held_changes.transpose();
+  movement.middleRows(n, numbers) = result.number_held_changes;
   for (std::size_t i = 0; i < held.moved.size(); ++i) {
     movement.row(moved_rows[i]) = held.moved[i].by_held;
   }

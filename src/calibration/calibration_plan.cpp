@@ -242,7 +242,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
   progress.check();
   result.free = problem.free;
   result.covariance = solution.covariance;
-  result.range_offset_sigma = solution.range_offset_sigma;
+  result.range_offset_sigma = solution.number_sigma("range_offset_m");
   result.unobservable = estimation::weak_directions(
       solution.information + prior_information(problem), problem.free, kWidestDirection);
   result.datum =

@@ -8,6 +8,7 @@
 #include "risley/calibration/rays.hpp"
 #include "risley/core/direction.hpp"
 
+#include "calibration/range_terms.hpp"
 #include "calibration/shot_blocks.hpp"
 
 namespace risley::calibration {
@@ -29,7 +30,9 @@ ViewDistances view_distances(const PlanarProblem& problem, std::size_t view,
       const Vector3<double> direction = rays.direction(i - begin);
       const auto angles = angles_from_direction(direction);
       const double cosine = dot(plane.plane.normal, direction);
-      const double range = shots.range[i] - plane.range_offset;
+      const double range =
+          shots.range[i] -
+          range_error(problem, term_shot(shots, i, rays.origin(i - begin), direction, plane.plane));
       const double across =
           recording.pointing * range * std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
       d.azimuth[i] = angles.azimuth;

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -31,6 +33,10 @@ constexpr double kMostConvergedDamping = 1e-3;
 /// sigma: so near the minimum what the derivatives leave out (the beam's origin) decides what the
 /// cost does, and not whether the step is right.
 constexpr double kSmallPromise = 1e-2;
+/// Steps with the walls' shape, and the squared length, in sigmas of all unknowns together, of one
+/// that is small enough to be the last.
+constexpr int kMostShapeSteps = 6;
+constexpr double kSmallShapeStep = 1e-2;
 
 /// Rotation by a vector: its direction is the axis, its length the angle.
 Eigen::Matrix3d rotation(const Eigen::Vector3d& by) {
@@ -59,7 +65,10 @@ class Unknowns {
         rotation_(p.stations.size(), -1),
         distance_(p.views.size(), -1) {
     Index next = free_;
+    for (const SizePrior& size : p.sizes) size_.push_back(size.sigma > 0 ? next++ : -1);
+    for (const RangeTerm& term : p.range_terms) term_.push_back(term.sigma > 0 ? next++ : -1);
     if (p.range_offset_sigma > 0) offset_ = next++;
+    numbers_ = next - free_;
     for (std::size_t w = 0; w < p.walls.size(); ++w) {
       if (p.walls[w].normal_sigma == 0.0) continue;
       normal_[w] = next;
@@ -71,19 +80,23 @@ class Unknowns {
       next += 3;
     }
     for (Index& distance : distance_) distance = next++;
-    size_ = next;
+    all_ = next;
   }
   Index free() const { return free_; }
-  Index size() const { return size_; }
+  Index size() const { return all_; }
+  /// Sizes and range errors, which follow the free parameters.
+  Index numbers() const { return numbers_; }
   /// Negative where the quantity is held.
+  Index prism_size(std::size_t number) const { return size_[number]; }
+  Index range_term(std::size_t number) const { return term_[number]; }
   Index range_offset() const { return offset_; }
   Index normal(std::size_t wall) const { return normal_[wall]; }
   Index rotation(std::size_t station) const { return rotation_[station]; }
   Index distance(std::size_t view) const { return distance_[view]; }
 
  private:
-  Index free_ = 0, offset_ = -1, size_ = 0;
-  std::vector<Index> normal_, rotation_, distance_;
+  Index free_ = 0, numbers_ = 0, offset_ = -1, all_ = 0;
+  std::vector<Index> size_, term_, normal_, rotation_, distance_;
 };
 
 /// The columns of plane_equations() and the parameters behind them.
@@ -136,15 +149,23 @@ struct Chain {
 };
 
 Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknowns& at,
-               const Places& places, std::size_t view) {
+               const Places& places, const PlaneView& plane, std::size_t view) {
   const WallView& seen = p.views[view];
-  const PlaneColumns columns{static_cast<int>(places.all.size()), p.train.prisms()};
+  const PlaneColumns columns(plane);
   Chain chain{Eigen::MatrixXd::Zero(columns.size(), at.size()),
               Eigen::MatrixXd::Zero(columns.size(), considered_size(p) + held.count())};
   for (Index j = 0; j < at.free(); ++j) {
     for (const int place : p.free[static_cast<std::size_t>(j)].places) {
       chain.unknowns(places.column(place), j) = 1.0;
     }
+  }
+  for (std::size_t i = 0; i < p.sizes.size(); ++i) {
+    const Index size = at.prism_size(i);
+    if (size >= 0) chain.unknowns(columns.prism_size(static_cast<int>(i)), size) = 1.0;
+  }
+  for (std::size_t i = 0; i < p.range_terms.size(); ++i) {
+    const Index term = at.range_term(i);
+    if (term >= 0) chain.unknowns(columns.range_term(static_cast<int>(i)), term) = 1.0;
   }
   if (at.range_offset() >= 0) chain.unknowns(columns.range_offset(), at.range_offset()) = 1.0;
   // The tangents in the sensor's frame are those of the scene turned, see plane_view().
@@ -199,7 +220,64 @@ struct System {
   std::vector<Eigen::MatrixXd> view_hessian;  ///< [views] of [unknowns, unknowns]
   std::vector<double> view_cost;              ///< [views]
   std::vector<std::size_t> view_shots;        ///< [views], that met their plane
+  std::vector<WallSums>
+      walls;  ///< [walls], where they are wanted: of unknowns, considered, residual
+  std::vector<double> view_scatter;  ///< [views], chi2 of what cells scatter within themselves
 };
+
+/// Whether walls are summed cell by cell.
+enum class WallCells { left_out, summed };
+
+/// Adds the cells of one view to those of its wall.
+void add_cells(const PlanarProblem& p, std::size_t view, const PlaneColumns& columns,
+               const PlaneEquations& equations, const Chain& chain, System& system) {
+  const WallView& seen = p.views[view];
+  WallSums& sums = system.walls[seen.wall];
+  const WallGrid& grid = sums.grid;
+  const auto [u1, u2] = tangents_of(p.walls[seen.wall].normal);
+  const Eigen::Vector3d& position = p.stations[seen.recording].position;
+  const double stand_u = eigen(u1).dot(position), stand_v = eigen(u2).dot(position);
+  const Index n = chain.unknowns.cols(), considered = chain.considered.cols();
+  Eigen::MatrixXd to_system(columns.size(), n + considered);
+  to_system << chain.unknowns, chain.considered;
+  const auto cells = static_cast<Index>(grid.cells.size());
+  // A shot's row by the wall's height, and that times its place against the middle of its cell:
+  // u - middle = -side n1 / d + (stand - middle).
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows = equations.cells;
+  double within = equations.cost;
+  for (Index cell = 0; cell < cells; ++cell) {
+    const double off_u = stand_u - grid.middle_u(static_cast<std::size_t>(cell));
+    const double off_v = stand_v - grid.middle_v(static_cast<std::size_t>(cell));
+    auto d = rows.row(3 * cell), du = rows.row(3 * cell + 1), dv = rows.row(3 * cell + 2);
+    const double all = d[columns.distance()];
+    if (!(all > 0)) continue;
+    within -= d[columns.size()] * d[columns.size()] / all;
+    du = -du + seen.side * off_u * d;
+    dv = -dv + seen.side * off_v * d;
+    d *= seen.side;
+    Eigen::Matrix3d weight;
+    for (int a = 0; a < 3; ++a) {
+      const auto row = rows.row(3 * cell + a);
+      const double by_height = row[columns.distance()];
+      weight.row(a) << seen.side * by_height,
+          -row[columns.normal(0)] + seen.side * off_u * by_height,
+          -row[columns.normal(1)] + seen.side * off_v * by_height;
+    }
+    sums.weight[static_cast<std::size_t>(cell)] += weight;
+  }
+  system.view_scatter[view] = within;
+  sums.columns.leftCols(n + considered) += rows.leftCols(columns.size()) * to_system;
+  sums.columns.rightCols(1) += rows.rightCols(1);
+}
+
+/// Moves a geometry whose sizes are all given by a change of one of them.
+void add_size(PrismGeometry& geometry, const PrismSize& size, double change) {
+  const auto add = [change](std::vector<double>& values, const std::vector<double>& rate) {
+    for (std::size_t i = 0; i < rate.size(); ++i) values[i] += change * rate[i];
+  };
+  add(geometry.thickness, size.rate.thickness);
+  add(geometry.spacing, size.rate.spacing);
+}
 
 /// Adjusted less stated normal, in the tangents of the adjusted one, rad.
 Eigen::Vector2d misfit_of(const Wall& wall) {
@@ -227,30 +305,52 @@ void add_priors(const PlanarProblem& p, const Unknowns& at, System& system) {
     tie(static_cast<Index>(j), p.prior_sigma[j], p.train[place] - p.prior[place]);
   }
   if (at.range_offset() >= 0) tie(at.range_offset(), p.range_offset_sigma, p.range_offset);
+  for (std::size_t i = 0; i < p.sizes.size(); ++i) {
+    if (at.prism_size(i) < 0) continue;
+    tie(at.prism_size(i), p.sizes[i].sigma,
+        size_value(p.geometry, p.sizes[i].size) - p.sizes[i].value);
+  }
+  for (std::size_t i = 0; i < p.range_terms.size(); ++i) {
+    if (at.range_term(i) < 0) continue;
+    tie(at.range_term(i), p.range_terms[i].sigma, p.range_terms[i].value - p.range_terms[i].prior);
+  }
   for (std::size_t w = 0; w < p.walls.size(); ++w) {
     if (!(p.walls[w].normal_sigma > 0)) continue;
     const Eigen::Vector2d off = misfit_of(p.walls[w]);
     for (Index i = 0; i < 2; ++i) tie(at.normal(w) + i, p.walls[w].normal_sigma, off[i]);
   }
   for (std::size_t s = 0; s < p.stations.size(); ++s) {
-    if (at.rotation(s) < 0) continue;
+    if (at.rotation(s) < 0 || std::isinf(p.stations[s].sigma)) continue;
     const Eigen::Vector3d off = misfit_of(p.stations[s]);
     for (Index i = 0; i < 3; ++i) tie(at.rotation(s) + i, p.stations[s].sigma, off[i]);
   }
 }
 
 System build_system(const PlanarProblem& p, const HeldQuantities& held, const Unknowns& at,
-                    const Places& places, InstructionSet set) {
+                    const Places& places, InstructionSet set,
+                    WallCells cells = WallCells::left_out) {
   System system;
   const Index n = at.size(), considered = considered_size(p) + held.count();
   system.hessian = Eigen::MatrixXd::Zero(n, n);
   system.gradient = Eigen::VectorXd::Zero(n);
   system.considered = Eigen::MatrixXd::Zero(n, considered);
+  if (cells == WallCells::summed) {
+    system.view_scatter.resize(p.views.size());
+    for (const Wall& wall : p.walls) {
+      WallSums& sums = system.walls.emplace_back();
+      sums.grid = wall.grid;
+      sums.weight.assign(wall.grid.cells.size(), Eigen::Matrix3d::Zero());
+      sums.columns.setZero(3 * static_cast<Index>(wall.grid.cells.size()), n + considered + 1);
+    }
+  }
   for (std::size_t view = 0; view < p.views.size(); ++view) {
     PlaneView plane = plane_view(p, view);
     plane.places = places.all;
+    const bool by_cells = cells == WallCells::summed && !p.views[view].cell_begin.empty();
+    if (by_cells) plane.cell_begin = p.views[view].cell_begin;
     const PlaneEquations equations = plane_equations(*p.views[view].shots, plane, {}, set);
-    const Chain chain = chain_of(p, held, at, places, view);
+    const Chain chain = chain_of(p, held, at, places, plane, view);
+    if (by_cells) add_cells(p, view, PlaneColumns(plane), equations, chain, system);
     system.view_hessian.push_back(algebra::pulled_back(chain.unknowns, equations.hessian));
     system.view_cost.push_back(equations.cost);
     system.view_shots.push_back(equations.shots);
@@ -271,6 +371,12 @@ void move(PlanarProblem& p, const Unknowns& at, const Eigen::VectorXd& step) {
     for (const int place : p.free[static_cast<std::size_t>(j)].places) {
       p.train.set_place(place, p.train[place] + step[j]);
     }
+  }
+  for (std::size_t i = 0; i < p.sizes.size(); ++i) {
+    if (at.prism_size(i) >= 0) add_size(p.geometry, p.sizes[i].size, step[at.prism_size(i)]);
+  }
+  for (std::size_t i = 0; i < p.range_terms.size(); ++i) {
+    if (at.range_term(i) >= 0) p.range_terms[i].value += step[at.range_term(i)];
   }
   if (at.range_offset() >= 0) p.range_offset += step[at.range_offset()];
   for (std::size_t w = 0; w < p.walls.size(); ++w) {
@@ -299,23 +405,20 @@ Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
 
 /// @param shift  of all unknowns [unknowns, quantities]
 SolutionResponse response_of(const Eigen::MatrixXd& shift, const Unknowns& at) {
-  SolutionResponse response{shift.topRows(at.free()), Eigen::VectorXd::Zero(shift.cols())};
-  if (at.range_offset() >= 0 && shift.cols() > 0) {
-    response.range_offset = shift.row(at.range_offset()).transpose();
-  }
-  return response;
+  return {shift.topRows(at.free()), shift.middleRows(at.free(), at.numbers())};
 }
 
 PriorTest test_of(std::string name, bool station, const Eigen::VectorXd& misfit, double sigma,
-                  const Eigen::MatrixXd& posterior) {
+                  const Eigen::MatrixXd& posterior, const Eigen::MatrixXd& considered) {
   PriorTest test;
   test.name = std::move(name);
   test.station = station;
   test.misfit = misfit.norm();
-  // Covariance of prior less adjusted: what the data added. Directions in which the data say
-  // nothing have no misfit and are no degrees of freedom.
+  // Covariance of prior less adjusted: what the data added, and what considered quantities make of
+  // it. Directions in which the data say nothing have no misfit and are no degrees of freedom.
   const Eigen::MatrixXd covariance =
-      sigma * sigma * Eigen::MatrixXd::Identity(misfit.size(), misfit.size()) - posterior;
+      sigma * sigma * Eigen::MatrixXd::Identity(misfit.size(), misfit.size()) - posterior +
+      considered;
   const algebra::PrincipalAxes axes = algebra::principal_axes(covariance);
   for (Index i = 0; i < misfit.size(); ++i) {
     if (axes.values[i] < 1e-3 * sigma * sigma) continue;
@@ -363,6 +466,14 @@ void check(const PlanarProblem& p) {
   for (const auto& own : p.mean_angle_covariance) {
     expect("mean_angle_covariance", own, p.train.prisms(), p.train.prisms());
   }
+  for (const SizePrior& size : p.sizes) {
+    require_finite(size.size.name, size.value, "m");
+    require_not_below("sigma of " + size.size.name, size.sigma, 0, "m");
+  }
+  for (const RangeTerm& term : p.range_terms) {
+    require_finite(term.name, term.value);
+    require_not_below("sigma of " + term.name, term.sigma, 0);
+  }
   for (const WallView& view : p.views) {
     if (!view.shots || view.shots->size() == 0) {
       throw InvalidArgument("a view of a wall has no shots");
@@ -372,6 +483,85 @@ void check(const PlanarProblem& p) {
     require_above("range variance", view.range_variance, 0, "m^2");
     require_finite("distance", view.distance, "m");
   }
+}
+
+/// Whether any wall has a shape to be found.
+bool has_shape(const PlanarProblem& p) {
+  return !p.shape.parameters.empty() &&
+         std::any_of(p.views.begin(), p.views.end(),
+                     [](const WallView& view) { return !view.cell_begin.empty(); });
+}
+
+/// Cells that hold a shot of the view.
+std::size_t used_cells(const WallView& view) {
+  std::size_t used = 0;
+  for (std::size_t cell = 0; cell + 1 < view.cell_begin.size(); ++cell) {
+    used += view.cell_begin[cell + 1] > view.cell_begin[cell] ? 1 : 0;
+  }
+  return used;
+}
+
+/// J' W J of unknowns, considered quantities and the residual.
+ShapeProblem shape_problem(const System& system) {
+  const Index n = system.hessian.rows(), considered = system.considered.cols();
+  ShapeProblem problem;
+  problem.unknowns = n;
+  problem.system = Eigen::MatrixXd::Zero(n + considered + 1, n + considered + 1);
+  problem.system.topLeftCorner(n, n) = system.hessian;
+  problem.system.block(0, n, n, considered) = system.considered;
+  problem.system.block(n, 0, considered, n) = system.considered.transpose();
+  problem.system.col(n + considered).head(n) = system.gradient;
+  problem.system.row(n + considered).head(n) = system.gradient.transpose();
+  problem.system(n + considered, n + considered) = system.cost;
+  for (const WallSums& wall : system.walls) {
+    if (!wall.grid.empty()) problem.walls.push_back(wall);
+  }
+  return problem;
+}
+
+/// Gauss-Newton with the walls' shape integrated out, from where flat walls have led.
+/// @param[in,out] system  that of the last step when it returns
+/// @return whether the steps became small
+bool take_shape_steps(PlanarProblem& problem, const Unknowns& at, const Places& places,
+                      const AdjustmentOptions& options, System& system, PlanarSolution& solution,
+                      const Progress& progress) {
+  const HeldQuantities none;
+  for (int round = 0; round < kMostShapeSteps; ++round) {
+    progress.check();
+    system = build_system(problem, none, at, places, options.set, WallCells::summed);
+    solution.shape = solve_with_shape(shape_problem(system), problem.shape);
+    if (!solution.shape.positive) return false;
+    const Eigen::VectorXd& step = solution.shape.step;
+    if (options.most_iterations == 0) return true;
+    move(problem, at, step);
+    ++solution.iterations;
+    problem.shape = likely_part(problem.shape, solution.shape);
+    const double promised = step.dot(solution.shape.normal.selfadjointView<Eigen::Lower>() * step);
+    if (promised < kSmallShapeStep) return true;
+  }
+  return false;
+}
+
+/// What was adjusted beside the parameters.
+void fill_numbers(const PlanarProblem& p, const Unknowns& at, const Eigen::MatrixXd& covariance,
+                  PlanarSolution& solution) {
+  std::vector<double> values;
+  const auto add = [&](Index unknown, const std::string& name, double value) {
+    if (unknown < 0) return;
+    solution.numbers.push_back(name);
+    values.push_back(value);
+  };
+  for (std::size_t i = 0; i < p.sizes.size(); ++i) {
+    add(at.prism_size(i), p.sizes[i].size.name, size_value(p.geometry, p.sizes[i].size));
+  }
+  for (std::size_t i = 0; i < p.range_terms.size(); ++i) {
+    add(at.range_term(i), p.range_terms[i].name, p.range_terms[i].value);
+  }
+  add(at.range_offset(), "range_offset_m", p.range_offset);
+  solution.number_values =
+      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Index>(values.size()));
+  solution.number_covariance = covariance.block(at.free(), at.free(), at.numbers(), at.numbers());
+  solution.number_cross_covariance = covariance.block(at.free(), 0, at.numbers(), at.free());
 }
 
 }  // namespace
@@ -415,6 +605,17 @@ bool is_held_material(int place, const PlanarProblem& problem) {
          !estimation::takes_place(problem.free, place);
 }
 
+double size_value(const PrismGeometry& geometry, const PrismSize& size) {
+  double value = 0;
+  for (std::size_t i = 0; i < size.rate.thickness.size(); ++i) {
+    value += size.rate.thickness[i] * geometry.thickness[i];
+  }
+  for (std::size_t i = 0; i < size.rate.spacing.size(); ++i) {
+    value += size.rate.spacing[i] * geometry.spacing[i];
+  }
+  return value;
+}
+
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view) {
   const WallView& seen = problem.views[view];
   const Wall& wall = problem.walls[seen.wall];
@@ -424,6 +625,8 @@ PlaneView plane_view(const PlanarProblem& problem, std::size_t view) {
   PlaneView plane;
   plane.train = problem.train;
   plane.geometry = problem.geometry;
+  for (const SizePrior& size : problem.sizes) plane.sizes.push_back(size.size);
+  for (const RangeTerm& term : problem.range_terms) plane.range_terms.push_back(term.value);
   plane.range_offset = problem.range_offset;
   plane.range_variance = seen.range_variance;
   plane.plane = {plain(turn * eigen(wall.normal)), seen.distance};
@@ -479,74 +682,99 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
                                         problem.walls[problem.views[view].wall].name));
     }
   }
+  const Index free = at.free(), n = at.size();
+  const bool shaped = has_shape(problem);
+  Eigen::MatrixXd covariance, shift, normal;
+  bool positive = false;
+  if (shaped) {
+    solution.converged = solution.converged &&
+                         take_shape_steps(problem, at, places, options, system, solution, progress);
+    positive = solution.shape.positive;
+    covariance = solution.shape.covariance;
+    shift = solution.shape.response;
+    normal = positive ? solution.shape.normal : system.hessian;
+  } else {
+    const algebra::SymmetricSolver solver(system.hessian, kLeastDamping);
+    positive = solver.positive();
+    normal = system.hessian;
+    if (positive) {
+      covariance = solver.inverse();
+      shift = -algebra::product(covariance, system.considered);
+    }
+  }
+  if (!positive) {
+    solution.converged = false;
+    covariance = Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::infinity());
+    shift = Eigen::MatrixXd::Zero(n, considered_size(problem));
+  }
   solution.cost = system.cost;
   solution.shots = system.shots;
   solution.lost = system.lost;
-
-  const Index free = at.free(), n = at.size();
-  Eigen::MatrixXd hessian = system.hessian;
-  hessian.topLeftCorner(free, free) -= prior_information(problem);
-  solution.information = eliminated(hessian, free);
-  const algebra::SymmetricSolver solver(system.hessian, kLeastDamping);
-  Eigen::MatrixXd covariance =
-      Eigen::MatrixXd::Constant(n, n, std::numeric_limits<double>::infinity());
-  if (solver.positive()) {
-    covariance = solver.inverse();
-    for (std::size_t view = 0; view < problem.views.size(); ++view) {
-      const double share = covariance.cwiseProduct(system.view_hessian[view]).sum();
-      solution.redundancy.push_back(static_cast<double>(system.view_shots[view]) - share);
+  solution.chi2 = shaped && positive ? system.view_scatter : system.view_cost;
+  for (std::size_t view = 0; view < problem.views.size(); ++view) {
+    const auto shots = static_cast<double>(system.view_shots[view]);
+    double taken = shots;
+    if (positive && shaped) {
+      taken = static_cast<double>(used_cells(problem.views[view]));
+    } else if (positive) {
+      taken = covariance.cwiseProduct(system.view_hessian[view]).sum();
     }
-  } else {
-    solution.converged = false;
-    solution.redundancy.assign(problem.views.size(), 0.0);
+    solution.redundancy.push_back(shots - taken);
   }
-  solution.chi2 = system.view_cost;
-  if (solver.positive()) {
-    for (std::size_t w = 0; w < problem.walls.size(); ++w) {
-      const Wall& wall = problem.walls[w];
-      if (!(wall.normal_sigma > 0)) continue;
-      solution.prior_tests.push_back(test_of(wall.name, false, misfit_of(wall), wall.normal_sigma,
-                                             covariance.block(at.normal(w), at.normal(w), 2, 2)));
-    }
-    for (std::size_t s = 0; s < problem.stations.size(); ++s) {
-      const StationPose& station = problem.stations[s];
-      if (at.rotation(s) < 0) continue;
-      solution.prior_tests.push_back(
-          test_of(station.name, true, misfit_of(station), station.sigma,
-                  covariance.block(at.rotation(s), at.rotation(s), 3, 3)));
-    }
-  }
+  normal.topLeftCorner(free, free) -= prior_information(problem);
+  solution.information = eliminated(normal, free);
   solution.noise_covariance = covariance.topLeftCorner(free, free);
+  // Errors of the considered quantities shift the solution by -N^-1 J^T W K.
   const auto believed = static_cast<Index>(problem.considered.size());
-  solution.considered = {Eigen::MatrixXd::Zero(free, believed), Eigen::VectorXd::Zero(believed)};
-  if (considered_size(problem) > 0 && solver.positive()) {
-    // Errors of the considered quantities shift the solution by -N^-1 J^T W K.
-    const Eigen::MatrixXd shift = -algebra::product(covariance, system.considered);
-    solution.considered = response_of(shift.leftCols(believed), at);
-    covariance += algebra::propagated(shift, considered_covariance(problem));
+  solution.considered = response_of(shift.leftCols(believed), at);
+  Eigen::MatrixXd of_considered = Eigen::MatrixXd::Zero(n, n);
+  if (considered_size(problem) > 0 && positive) {
+    of_considered = algebra::propagated(shift, considered_covariance(problem));
   }
+  const auto test = [&](const std::string& name, bool station, const Eigen::VectorXd& misfit,
+                        double sigma, Index first) {
+    const Index size = misfit.size();
+    solution.prior_tests.push_back(test_of(name, station, misfit, sigma,
+                                           covariance.block(first, first, size, size),
+                                           of_considered.block(first, first, size, size)));
+  };
+  for (std::size_t w = 0; w < problem.walls.size() && positive; ++w) {
+    const Wall& wall = problem.walls[w];
+    if (wall.normal_sigma > 0) {
+      test(wall.name, false, misfit_of(wall), wall.normal_sigma, at.normal(w));
+    }
+  }
+  for (std::size_t s = 0; s < problem.stations.size() && positive; ++s) {
+    const StationPose& station = problem.stations[s];
+    if (at.rotation(s) >= 0 && std::isfinite(station.sigma)) {
+      test(station.name, true, misfit_of(station), station.sigma, at.rotation(s));
+    }
+  }
+  covariance += of_considered;
   solution.covariance = covariance.topLeftCorner(free, free);
+  fill_numbers(problem, at, covariance, solution);
   const auto sigma = [&](Index i) { return i < 0 ? 0.0 : std::sqrt(covariance(i, i)); };
-  solution.range_offset_sigma = sigma(at.range_offset());
-  solution.range_offset_covariance = Eigen::VectorXd::Zero(free);
-  if (at.range_offset() >= 0) {
-    solution.range_offset_covariance = covariance.col(at.range_offset()).head(free);
-  }
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
     solution.distance_sigma.push_back(sigma(at.distance(v)));
   }
   for (std::size_t w = 0; w < problem.walls.size(); ++w) {
-    const Index normal = at.normal(w);
-    solution.normal_sigma.push_back(normal < 0 ? 0.0
-                                               : std::hypot(sigma(normal), sigma(normal + 1)));
+    const Index unknown = at.normal(w);
+    solution.normal_sigma.push_back(unknown < 0 ? 0.0
+                                                : std::hypot(sigma(unknown), sigma(unknown + 1)));
   }
-  solution.parameters.resize(free);
-  for (Index j = 0; j < free; ++j) {
-    solution.parameters[j] =
-        problem.train[problem.free[static_cast<std::size_t>(j)].places.front()];
-  }
+  solution.parameters = estimation::free_values(problem.train, problem.free);
   solution.problem = std::move(problem);
   return solution;
+}
+
+Index PlanarSolution::number(std::string_view name) const {
+  const auto found = std::find(numbers.begin(), numbers.end(), name);
+  return found == numbers.end() ? -1 : found - numbers.begin();
+}
+
+double PlanarSolution::number_sigma(std::string_view name) const {
+  const Index row = number(name);
+  return row < 0 ? 0.0 : std::sqrt(number_covariance(row, row));
 }
 
 SolutionResponse held_response(const PlanarProblem& solved, const HeldQuantities& held,
@@ -565,12 +793,17 @@ SolutionResponse held_response(const PlanarProblem& solved, const HeldQuantities
   }
   const Unknowns at(solved);
   const Places places(solved, held);
-  const System system = build_system(solved, held, at, places, set);
+  const bool shaped = has_shape(solved);
+  const System system =
+      build_system(solved, held, at, places, set, shaped ? WallCells::summed : WallCells::left_out);
+  if (shaped) {
+    const ShapeSolution solution = solve_with_shape(shape_problem(system), solved.shape);
+    if (!solution.positive) throw EstimationError("the walls do not determine all parameters");
+    return response_of(solution.response.rightCols(held.count()), at);
+  }
   const algebra::SymmetricSolver solver(system.hessian);
   if (!solver.positive()) throw EstimationError("the walls do not determine all parameters");
-  const Eigen::MatrixXd shift =
-      -solver.solve_columns(system.considered.rightCols(held.count()).eval());
-  return response_of(shift, at);
+  return response_of(-solver.solve_columns(system.considered.rightCols(held.count()).eval()), at);
 }
 
 }  // namespace risley::calibration

@@ -19,6 +19,11 @@ namespace {
 constexpr std::size_t kChunkShots = 8192;
 
 void check(const RangedShots& shots, const PlaneView& view, const ResidualColumns& columns) {
+  const std::span<const std::uint32_t> cell_begin = view.cell_begin;
+  if (!cell_begin.empty() && (cell_begin.front() != 0 || cell_begin.back() != shots.size() ||
+                              !std::is_sorted(cell_begin.begin(), cell_begin.end()))) {
+    throw InvalidArgument("cell_begin does not divide the shots");
+  }
   require_shots(shots, view.train);
   require_length_or_none("residual", columns.residual.size(), shots.size());
   require_length_or_none("variance", columns.variance.size(), shots.size());
@@ -32,9 +37,44 @@ void check(const RangedShots& shots, const PlaneView& view, const ResidualColumn
       throw InvalidArgument(fmt::format("place = {}, allowed 0 to {}", place, all_places - 1));
     }
   }
+  require_length("range_terms", shots.range_terms.size(), view.range_terms.size());
+  if (view.range_terms.size() > kMostRangeTerms || view.sizes.size() > kMostSizes) {
+    throw InvalidArgument(fmt::format("{} range terms and {} sizes, allowed {} and {}",
+                                      view.range_terms.size(), view.sizes.size(), kMostRangeTerms,
+                                      kMostSizes));
+  }
+  for (const auto& column : shots.range_terms) {
+    require_length("a range term", column.size(), shots.size());
+  }
+  for (const double term : view.range_terms) require_finite("range term", term);
   require_finite("range offset", view.range_offset, "m");
   require_above("range variance", view.range_variance, 0, "m^2");
   require_finite("distance", view.plane.distance, "m");
+}
+
+/// Shots that one task sums up.
+struct Chunk {
+  std::size_t begin = 0, end = 0, first_cell = 0;
+};
+
+/// Of about as many shots, divided where a cell ends if there are any.
+std::vector<Chunk> chunks_of(std::size_t shots, std::span<const std::uint32_t> cell_begin) {
+  std::vector<Chunk> chunks;
+  if (cell_begin.empty()) {
+    for (std::size_t begin = 0; begin < shots; begin += kChunkShots) {
+      chunks.push_back({begin, std::min(begin + kChunkShots, shots), 0});
+    }
+    return chunks;
+  }
+  Chunk next;
+  for (std::size_t cell = 0; cell + 1 < cell_begin.size(); ++cell) {
+    next.end = cell_begin[cell + 1];
+    if (next.end - next.begin < kChunkShots && next.end != shots) continue;
+    chunks.push_back(next);
+    if (next.end == shots) break;
+    next = {next.end, next.end, cell + 1};
+  }
+  return chunks;
 }
 
 void copy(const Vector3<double>& from, double* to) {
@@ -48,7 +88,8 @@ void copy(const Vector3<double>& from, double* to) {
 PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
                                const ResidualColumns& columns, InstructionSet set) {
   check(shots, view, columns);
-  const PlaneColumns layout{static_cast<int>(view.places.size()), view.train.prisms()};
+  const std::span<const std::uint32_t> cell_begin = view.cell_begin;
+  const PlaneColumns layout(view);
   const std::vector<double> face_position = face_positions(view.train.face_order(), view.geometry);
   std::vector<const double*> rotation_angle;
   std::vector<const float*> angle_covariance;
@@ -64,6 +105,18 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
   all.face_position = face_position.data();
   all.places = view.places.data();
   all.place_count = layout.places;
+  std::vector<double> size_rates;
+  for (const PrismSize& size : view.sizes) {
+    const auto rate = face_positions(view.train.face_order(), size.rate);
+    size_rates.insert(size_rates.end(), rate.begin(), rate.end());
+  }
+  std::vector<const float*> range_terms;
+  for (const auto& column : shots.range_terms) range_terms.push_back(column.data());
+  all.size_rates = size_rates.data();
+  all.size_count = layout.sizes;
+  all.term_values = view.range_terms.data();
+  all.term_count = layout.terms;
+  all.range_terms = range_terms.data();
   all.range_offset = view.range_offset;
   all.range_variance = view.range_variance;
   copy(view.plane.normal, all.normal);
@@ -79,18 +132,25 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
   const auto& kernel = RISLEY_KERNEL_COPIES(accumulate_plane).at(set);
   const int size = layout.size();
   const auto triangle = static_cast<std::size_t>((size + 1) * (size + 2) / 2);
-  const std::size_t chunks = (shots.size() + kChunkShots - 1) / kChunkShots;
+  const std::vector<Chunk> all_chunks = chunks_of(shots.size(), cell_begin);
+  const std::size_t chunks = all_chunks.size();
   std::vector<double> products(chunks * triangle);
   std::vector<std::size_t> lost(chunks);
+  PlaneEquations equations;
+  if (!cell_begin.empty()) {
+    equations.cells.setZero(3 * (static_cast<Eigen::Index>(cell_begin.size()) - 1), size + 1);
+    all.cell_begin = cell_begin.data();
+    all.cell_products = equations.cells.data();
+  }
   parallel::for_each(chunks, [&](std::size_t chunk) {
     PlaneArguments mine = all;
-    mine.begin = chunk * kChunkShots;
-    mine.end = std::min(mine.begin + kChunkShots, shots.size());
+    mine.begin = all_chunks[chunk].begin;
+    mine.end = all_chunks[chunk].end;
+    mine.first_cell = all_chunks[chunk].first_cell;
     mine.products = products.data() + chunk * triangle;
     lost[chunk] = kernel(mine);
   });
 
-  PlaneEquations equations;
   equations.hessian = Eigen::MatrixXd::Zero(size, size);
   equations.gradient = Eigen::VectorXd::Zero(size);
   const double* entry = products.data();

@@ -41,9 +41,14 @@ class Products {
   /// Adds the products of the first groups.
   void add(std::size_t groups) { sums_.add(rows_, stride_, groups); }
   void store(double* out) const { sums_.store(out); }
+  /// Column of a shot of the rows.
+  double entry(std::size_t shot, std::size_t column) const {
+    return reinterpret_cast<const double*>(rows_ + shot / kLanes * stride_ + column)[shot % kLanes];
+  }
 
  private:
-  static constexpr std::size_t kMost = EmitterLanes<Batch, N>::kPlaces + N + 5;
+  static constexpr std::size_t kMost =
+      EmitterLanes<Batch, N>::kPlaces + N + kMostSizes + kMostRangeTerms + 5;
   using Sums = ColumnProducts<Batch, kMost>;
 
   Sums sums_;
@@ -58,6 +63,7 @@ struct Constants {
   PreparedTrain<Batch, N> train;
   PreparedDerivatives<Batch, N> derivatives;
   std::array<Batch, 2 * N> face_position;
+  std::array<std::array<Batch, 2 * N>, kMostSizes> size_rates;
   Vector3<Batch> normal, tangent_1, tangent_2;
   Batch distance, range_offset, range_variance;
 
@@ -77,6 +83,9 @@ struct Constants {
       return false;
     });
     for (std::size_t i = 0; i < 2 * N; ++i) face_position[i] = Batch(a.face_position[i]);
+    for (int j = 0; j < a.size_count; ++j) {
+      for (std::size_t i = 0; i < 2 * N; ++i) size_rates[j][i] = Batch(a.size_rates[2 * N * j + i]);
+    }
   }
 
   /// The emitters of shots [shot, shot + kLanes).
@@ -112,6 +121,11 @@ class Block {
       }
       for (std::size_t i = shots; i < kBlock; ++i) covariance_[pair][i] = 0;
     }
+    for (int term = 0; term < a.term_count; ++term) {
+      const float* column = a.range_terms[term] + from;
+      for (std::size_t i = 0; i < shots; ++i) terms_[term][i] = static_cast<double>(column[i]);
+      for (std::size_t i = shots; i < kBlock; ++i) terms_[term][i] = 0;
+    }
   }
 
   std::size_t groups() const { return (shots_ + kLanes - 1) / kLanes; }
@@ -122,6 +136,9 @@ class Block {
   Batch range(std::size_t group) const { return Batch::load_unaligned(range_ + group * kLanes); }
   Batch covariance(std::size_t pair, std::size_t group) const {
     return Batch::load_aligned(covariance_[pair] + group * kLanes);
+  }
+  Batch range_term(int term, std::size_t group) const {
+    return Batch::load_aligned(terms_[term] + group * kLanes);
   }
 
  private:
@@ -135,6 +152,7 @@ class Block {
   const double* rotation_angle_[N];
   const double* range_;
   alignas(64) double covariance_[kPairs][kBlock];
+  alignas(64) double terms_[kMostRangeTerms][kBlock];
   alignas(64) double angles_[N][kBlock];
   alignas(64) double ranges_[kBlock];
 };
@@ -191,18 +209,19 @@ class Walks {
 
  private:
   struct Meeting {
-    Vector3<Batch> origin;
+    BeamPath<Batch, N> path;
     Batch approach, over_approach, range;
+    const Vector3<Batch>& origin() const { return path.origin(); }
   };
 
   /// Where the beams of a group meet the plane, and how that depends on their directions.
   void meet_plane(const Constants<N>& c, std::size_t g) {
     const Vector3<Batch>& direction = trace_[g].direction();
     Meeting& m = meeting_[g];
-    m.origin = beam_origin(trace_[g], c.face_position);
+    m.path = beam_path(trace_[g], c.face_position);
     m.approach = dot(c.normal, direction);
     m.over_approach = Batch(1.0) / m.approach;
-    m.range = (c.distance - dot(c.normal, m.origin)) * m.over_approach;
+    m.range = (c.distance - dot(c.normal, m.origin())) * m.over_approach;
     pass_[g] = begin_reverse<N>(
         direction, std::array<Vector3<Batch>, 1>{-m.range * m.over_approach * c.normal});
   }
@@ -214,6 +233,9 @@ class Walks {
     const Batch zero(0.0), one(1.0);
     const Meeting& m = meeting_[group];
     Batch residual = block.range(group) - c.range_offset - m.range;
+    for (int term = 0; term < a.term_count; ++term) {
+      residual = xsimd::fnma(Batch(a.term_values[term]), block.range_term(term, group), residual);
+    }
     const Gradient<Batch, N>& gradient = pass_[group].gradients[0];
     Batch variance = c.range_variance;
     std::size_t pair = 0;
@@ -232,9 +254,23 @@ class Walks {
     Batch* column = row;
     for (int i = 0; i < a.place_count; ++i) *column++ = scale * by_place[a.places[i]];
     for (std::size_t k = 0; k < N; ++k) *column++ = scale * gradient.rotation_angles[k];
-    *column++ = scale;
     const Batch slope = scale * m.over_approach;
-    const Vector3<Batch> point = m.origin + m.range * trace_[group].direction();
+    if (a.size_count > 0) {
+      const auto of_path =
+          beam_path_adjoint(trace_[group], m.path, c.face_position, -slope * c.normal);
+      for (int j = 0; j < a.size_count; ++j) {
+        Batch sum = of_path.face_position[0] * c.size_rates[j][0];
+        for (std::size_t i = 1; i < 2 * N; ++i) {
+          sum = xsimd::fma(of_path.face_position[i], c.size_rates[j][i], sum);
+        }
+        *column++ = sum;
+      }
+    }
+    for (int term = 0; term < a.term_count; ++term) {
+      *column++ = scale * block.range_term(term, group);
+    }
+    *column++ = scale;
+    const Vector3<Batch> point = m.origin() + m.range * trace_[group].direction();
     *column++ = -slope * dot(c.tangent_1, point);
     *column++ = -slope * dot(c.tangent_2, point);
     *column++ = slope;
@@ -262,10 +298,34 @@ class Walks {
   ReversePass<Batch, N, 1> pass_[kGroups];
 };
 
+/// Adds the products of a block's shots to those of their cells.
+/// @param first  shot of the call's columns
+/// @param cell   of the shot before, moved on
+template <int N>
+void add_to_cells(const PlaneArguments& a, const Products<N>& products, std::size_t columns,
+                  std::size_t first, std::size_t shots, std::size_t& cell) {
+  for (std::size_t i = 0; i < shots; ++i) {
+    while (first + i >= a.cell_begin[cell + 1]) ++cell;
+    double* out = a.cell_products + cell * 3 * columns;
+    // Distance, normal 1 and 2: the last columns before the residual.
+    const double d = products.entry(i, columns - 2), n1 = products.entry(i, columns - 4),
+                 n2 = products.entry(i, columns - 3);
+    for (std::size_t j = 0; j < columns; ++j) {
+      const double value = products.entry(i, j);
+      out[j] += d * value;
+      out[columns + j] += n1 * value;
+      out[2 * columns + j] += n2 * value;
+    }
+  }
+}
+
 template <int N>
 std::size_t accumulate_shots(const PlaneArguments& a) {
   Constants<N> constants(a);
-  Products<N> products(static_cast<std::size_t>(a.place_count) + N + 5);
+  const auto columns =
+      static_cast<std::size_t>(a.place_count + a.size_count + a.term_count) + N + 5;
+  Products<N> products(columns);
+  std::size_t cell = a.first_cell;
   Block<N> block;
   BlockResiduals residuals;
   Walks<N> walks;
@@ -275,6 +335,7 @@ std::size_t accumulate_shots(const PlaneArguments& a) {
     lost += walks.fill_rows(a, constants, block, shot, products, residuals);
     lost -= block.groups() * kLanes - block.shots();
     products.add(block.groups());
+    if (a.cell_begin) add_to_cells<N>(a, products, columns, shot, block.shots(), cell);
     for (std::size_t i = 0; a.residual && i < block.shots(); ++i) {
       a.residual[shot + i] = residuals.residual[i];
     }

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "risley/core/instruction_set.hpp"
+#include "risley/optics/parameters.hpp"
 #include "risley/optics/prism.hpp"
 
 namespace risley::calibration {
@@ -13,6 +14,11 @@ namespace risley::calibration {
 /// A beam that meets the plane at a flatter angle, as the cosine of the angle of incidence, counts
 /// as parallel to it.
 inline constexpr double kLeastApproach = 1e-3;
+
+/// Terms of the range errors at most: near, incidence, intensity and one per emitter.
+inline constexpr int kMostRangeTerms = 3 + kMaxEmitters;
+/// Sizes of prisms that one call differentiates by at most: every thickness and spacing.
+inline constexpr int kMostSizes = 2 * kMaxPrisms;
 
 /// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Columns are
 /// those of all shots; the call works on shots [begin, end).
@@ -23,6 +29,10 @@ struct PlaneArguments {
   const double* face_position = nullptr;  ///< [2 prisms]
   const int* places = nullptr;            ///< of the flat vector, at most all of them
   int place_count = 0;
+  const double* size_rates = nullptr;  ///< d face position / d size [size_count][2 prisms]
+  int size_count = 0;
+  const double* term_values = nullptr;  ///< [term_count], what the columns of terms count
+  int term_count = 0;
   double range_offset = 0;
   double range_variance = 0;
   double normal[3] = {0, 0, 0};
@@ -32,12 +42,20 @@ struct PlaneArguments {
   const double* const* rotation_angle = nullptr;   ///< [prisms][shots]
   const float* const* angle_covariance = nullptr;  ///< [prisms (prisms+1)/2][shots]
   const double* range = nullptr;                   ///< [shots]
+  const float* const* range_terms = nullptr;       ///< [term_count][shots]
   const std::uint8_t* beam = nullptr;  ///< [shots], each below emitters, or nullptr: all the first
   std::size_t begin = 0, end = 0;
 
   /// Weighted products of the columns of PlaneColumns and, behind them, the residual: upper
   /// triangle row by row [(columns + 1) (columns + 2) / 2].
   double* products = nullptr;
+  /// First shot of every cell, and behind the last one its end [cells + 1], or nullptr; shots that
+  /// belong together follow each other. The call begins and ends with a cell.
+  const std::uint32_t* cell_begin = nullptr;
+  std::size_t first_cell = 0;  ///< that holds shot `begin`
+  /// Weighted products of distance, normal 1 and normal 2 with all columns and the residual
+  /// [cells][3][columns + 1], of all cells.
+  double* cell_products = nullptr;
   double* residual = nullptr;  ///< [shots], or nullptr
   double* variance = nullptr;  ///< [shots], or nullptr
 };

@@ -58,6 +58,10 @@ SoundShots sound_shots(const estimation::Estimate& estimate, estimation::ShotRan
   }
   take(rows.range, shots.range, same);
   take(rows.beam, shots.beam, same);
+  if (!rows.intensity.empty()) {
+    shots.intensity.resize(taken.size());
+    take(rows.intensity, shots.intensity, same);
+  }
   take(states.time_ns, sound.time_ns, same);
   return sound;
 }
@@ -79,6 +83,7 @@ void take_shots(const estimation::Estimate& estimate, RangedRecording& recording
   }
   RangedShots& shots = recording.shots;
   shots.resize(estimate.sensor.prisms(), count);
+  if (!blocks.empty() && !blocks.front().shots.intensity.empty()) shots.intensity.resize(count);
   recording.time_ns.resize(count);
   for_each_block(size, [&](std::size_t begin, std::size_t) {
     const std::size_t number = begin / kBlockShots;
@@ -113,14 +118,21 @@ void RangedShots::resize(int prisms, std::size_t shots) {
   });
 }
 
+RangedShots columns_like(const RangedShots& shots, std::size_t size) {
+  RangedShots result;
+  result.resize(shots.prisms(), size);
+  if (!shots.intensity.empty()) result.intensity.resize(size);
+  result.range_terms.assign(shots.range_terms.size(), std::vector<float>(size));
+  return result;
+}
+
 RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {
   if (!rows.empty())
     require_place("row", *std::max_element(rows.begin(), rows.end()), shots.size());
-  RangedShots result;
-  result.resize(shots.prisms(), rows.size());
+  RangedShots result = columns_like(shots, rows.size());
   for_each_block(rows.size(), [&](std::size_t begin, std::size_t end) {
     const auto take = [&](const auto& from, auto& to) {
-      if (from.empty()) return;  // beams that are not told
+      if (from.empty()) return;  // emitters that are not known
       for (std::size_t i = begin; i < end; ++i) to[i] = from[rows[i]];
     };
     for_each_column(take, shots, result);

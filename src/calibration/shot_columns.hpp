@@ -18,8 +18,12 @@ void for_each_column(const Function& function, const RangedShots& first, Others&
   for (std::size_t k = 0; k < first.angle_covariance.size(); ++k) {
     function(first.angle_covariance[k], others.angle_covariance[k]...);
   }
+  for (std::size_t k = 0; k < first.range_terms.size(); ++k) {
+    function(first.range_terms[k], others.range_terms[k]...);
+  }
   function(first.range, others.range...);
   function(first.beam, others.beam...);
+  function(first.intensity, others.intensity...);
 }
 
 }  // namespace risley::calibration

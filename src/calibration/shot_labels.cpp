@@ -11,6 +11,7 @@
 #include "risley/calibration/rays.hpp"
 #include "risley/parallel/parallel.hpp"
 
+#include "calibration/range_terms.hpp"
 #include "calibration/shot_blocks.hpp"
 
 namespace risley::calibration {
@@ -62,7 +63,9 @@ Labels label_shots(const PlanarProblem& problem, std::size_t recording, const Ra
             pointing * range * std::sqrt(std::max(0.0, 1.0 - cosine * cosine)) / cosine;
         predicted[p] = range;
         sigma[p] = std::sqrt(plane.range_variance + across * across);
-        const double off = std::abs(shots.range[i] - plane.range_offset - range) / sigma[p];
+        const double error = range_error(
+            problem, term_shot(shots, i, rays.origin(i - begin), direction, plane.plane));
+        const double off = std::abs(shots.range[i] - error - range) / sigma[p];
         if (range > 0 && off < best) {
           best = off;
           nearest = p;

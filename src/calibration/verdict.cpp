@@ -230,13 +230,6 @@ std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution&
         c.planes[step.plane].name, degrees_from_radians(step.azimuth),
         degrees_from_radians(step.zenith), step.points));
   }
-  if (c.variance_factor > 1.0) {
-    warnings.push_back(fmt::format(
-        "the walls are uneven: means over a square degree scatter {:.2g} times as much as "
-        "the noise allows; variances are enlarged accordingly, and the boresight may "
-        "be off by more",
-        c.unevenness));
-  }
   if (solution.lost > 0) {
     warnings.push_back(
         fmt::format("{} shots do not meet the plane they were assigned to", solution.lost));

@@ -12,9 +12,6 @@
 namespace risley::calibration {
 namespace {
 
-/// Sigmas of a mean chi2, sqrt(2 / cells), beyond which it is more than chance.
-constexpr double kBeyondChance = 4.0;
-
 /// The surface of every view, by the shots that some labels give it; rows of steps are those of the
 /// view's recording.
 template <class LabelsOf>
@@ -56,21 +53,6 @@ std::vector<SurfaceStep> leave_out_steps(const PlanarProblem& problem,
     }
   }
   return steps;
-}
-
-Evenness evenness_of(const PlanarProblem& problem, const std::vector<LabelledShots>& recordings) {
-  double squares = 0, cells = 0;
-  for (const SurfaceReport& report : inspect_views(
-           problem, recordings, [](const Labels& labels) -> const auto& { return labels.view; })) {
-    squares += report.unevenness * static_cast<double>(report.cells);
-    cells += static_cast<double>(report.cells);
-  }
-  Evenness result;
-  if (cells == 0) return result;
-  result.unevenness = squares / cells;
-  const double significant = 1.0 + kBeyondChance * std::sqrt(2.0 / cells);
-  if (result.unevenness > significant) result.variance_factor = result.unevenness;
-  return result;
 }
 
 }  // namespace risley::calibration

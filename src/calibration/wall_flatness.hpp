@@ -17,12 +17,4 @@ namespace risley::calibration {
 std::vector<SurfaceStep> leave_out_steps(const PlanarProblem& problem,
                                          std::vector<LabelledShots>& recordings);
 
-/// How far means over the walls scatter beyond noise.
-struct Evenness {
-  double unevenness = 1;       ///< as Calibration::unevenness
-  double variance_factor = 1;  ///< the same where it is more than chance, otherwise 1
-};
-
-Evenness evenness_of(const PlanarProblem& problem, const std::vector<LabelledShots>& recordings);
-
 }  // namespace risley::calibration

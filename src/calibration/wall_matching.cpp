@@ -63,6 +63,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
     StationPose station;
     station.name = pose.name;
     station.sigma = pose.sigma;
+    station.position << pose.position.x, pose.position.y, pose.position.z;
     const Vector3<double> axes[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     for (int i = 0; i < 3; ++i) {
       const Vector3<double> turned = pose.scene_from_sensor(axes[i]);

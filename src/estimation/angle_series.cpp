@@ -35,7 +35,10 @@ void append_rows(const recordings::Observations& o, ShotRange rows, bool ranges,
   copy(o.beam, series.beam);
   variances(o.azimuth_resolution, series.azimuth_rounding_variance);
   variances(o.zenith_resolution, series.zenith_rounding_variance);
-  if (ranges) copy(o.range, series.range);
+  if (ranges) {
+    copy(o.range, series.range);
+    copy(o.intensity, series.intensity);
+  }
 }
 
 }  // namespace
@@ -56,6 +59,10 @@ void AngleSeries::append(const AngleSeries& other, std::size_t row) {
   append(other.time_ns[row], other.azimuth[row], other.zenith[row], other.beam[row],
          other.azimuth_rounding_variance[row], other.zenith_rounding_variance[row]);
   if (!other.range.empty()) range.push_back(other.range[row]);
+  if (!other.intensity.empty()) {
+    intensity.resize(size() - 1, 0);
+    intensity.push_back(other.intensity[row]);
+  }
 }
 
 AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t end) {

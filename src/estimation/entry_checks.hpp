@@ -26,6 +26,7 @@ inline void require_columns(const AngleSeries& series) {
   require_length("azimuth_rounding_variance", series.azimuth_rounding_variance.size(), size);
   require_length("zenith_rounding_variance", series.zenith_rounding_variance.size(), size);
   require_length_or_none("range", series.range.size(), size);
+  require_length_or_none("intensity", series.intensity.size(), size);
 }
 
 /// A start with an angle and a speed for every prism of a train.

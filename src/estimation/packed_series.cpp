@@ -227,6 +227,7 @@ void PackedSeries::rows(ShotRange range, AngleSeries& out) const {
   out.azimuth_rounding_variance.resize(range.size());
   out.zenith_rounding_variance.resize(range.size());
   out.range.resize(has_ranges_ ? range.size() : 0);
+  out.intensity.resize(has_ranges_ ? range.size() : 0);
   visit(range, [&](const Block* block, std::size_t first, std::size_t rows, std::size_t at) {
     const auto copy = [&](const auto& from, auto& to) {
       std::copy_n(from.data() + first, rows, to.data() + at);
@@ -236,13 +237,19 @@ void PackedSeries::rows(ShotRange range, AngleSeries& out) const {
       block->zenith.put(first, rows, zenith_grid_, out.zenith.data() + at);
       block->azimuth_variance.put(first, rows, out.azimuth_rounding_variance.data() + at);
       block->zenith_variance.put(first, rows, out.zenith_rounding_variance.data() + at);
-      if (has_ranges_) copy(block->range, out.range);
+      if (has_ranges_) {
+        copy(block->range, out.range);
+        block->intensity.put(first, rows, out.intensity.data() + at);
+      }
     } else {
       copy(tail_.azimuth, out.azimuth);
       copy(tail_.zenith, out.zenith);
       copy(tail_.azimuth_rounding_variance, out.azimuth_rounding_variance);
       copy(tail_.zenith_rounding_variance, out.zenith_rounding_variance);
-      if (has_ranges_) copy(tail_.range, out.range);
+      if (has_ranges_) {
+        copy(tail_.range, out.range);
+        copy(tail_.intensity, out.intensity);
+      }
     }
   });
 }
@@ -262,7 +269,13 @@ void PackedSeries::append(const AngleSeries& series) {
     tail_.beam.resize(tail_.size(), 0);
     append_part(series.azimuth_rounding_variance, begin, end, tail_.azimuth_rounding_variance);
     append_part(series.zenith_rounding_variance, begin, end, tail_.zenith_rounding_variance);
-    if (has_ranges_) append_part(series.range, begin, end, tail_.range);
+    if (has_ranges_) {
+      append_part(series.range, begin, end, tail_.range);
+      if (!series.intensity.empty()) {
+        append_part(series.intensity, begin, end, tail_.intensity);
+      }
+      tail_.intensity.resize(tail_.size(), 0);
+    }
     if (tail_.size() == kBlockRows) pack_tail();
   }
 }
@@ -295,7 +308,10 @@ void PackedSeries::append(const PackedSeries& other, std::span<const std::size_t
       gather(each(from.beam), tail_.beam);
       gather(each(from.azimuth_variance), tail_.azimuth_rounding_variance);
       gather(each(from.zenith_variance), tail_.zenith_rounding_variance);
-      if (has_ranges_) gather(each(from.range), tail_.range);
+      if (has_ranges_) {
+        gather(each(from.range), tail_.range);
+        gather(each(from.intensity), tail_.intensity);
+      }
     } else {
       for (const std::size_t row : rows.first(count)) tail_.append(other.tail_, row % kBlockRows);
     }
@@ -338,12 +354,15 @@ void PackedSeries::pack_tail() {
                                             mostly(tail_.beam),
                                             mostly(tail_.azimuth_rounding_variance),
                                             mostly(tail_.zenith_rounding_variance),
-                                            tail_.range});
+                                            tail_.range,
+                                            {}});
+  if (has_ranges_) block.intensity = mostly(tail_.intensity);
   block.azimuth = Angles(tail_.azimuth, block.azimuth_variance, azimuth_grid_);
   block.zenith = Angles(tail_.zenith, block.zenith_variance, zenith_grid_);
   for (auto* column : {&tail_.azimuth, &tail_.zenith, &tail_.range}) column->clear();
   tail_.time_ns.clear();
   tail_.beam.clear();
+  tail_.intensity.clear();
   tail_.azimuth_rounding_variance.clear();
   tail_.zenith_rounding_variance.clear();
 }

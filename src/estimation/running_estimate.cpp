@@ -162,6 +162,7 @@ bool RunningEstimate::Work::add(const recordings::Observations& rows, const Prog
     series_.append(time_ns, rows.azimuth[i], rows.zenith[i], rows.beam[i],
                    variance(rows.azimuth_resolution[i]), variance(rows.zenith_resolution[i]));
     series_.range.push_back(rows.range[i]);
+    series_.intensity.push_back(rows.intensity[i]);
   }
   return any;
 }

@@ -352,7 +352,7 @@ void expect_ceres(const PrismGeometry& geometry, double cost_tolerance, double s
         << j;
   }
   EXPECT_LT(
-      in_sigmas(solution.problem.range_offset, referee.range_offset(), solution.range_offset_sigma),
+      in_sigmas(solution.problem.range_offset, referee.range_offset(), solution.number_sigma("range_offset_m")),
       sigma_tolerance);
   for (std::size_t v = 0; v < solution.problem.views.size(); ++v) {
     EXPECT_LT(in_sigmas(solution.problem.views[v].distance, referee.distance(v),
@@ -376,7 +376,7 @@ void expect_ceres(const PrismGeometry& geometry, double cost_tolerance, double s
       EXPECT_NEAR(solution.covariance(i, j), referee.covariance(i, j), covariance_tolerance * size);
     }
   }
-  EXPECT_NEAR(solution.range_offset_sigma / referee.offset_sigma, 1.0, covariance_tolerance);
+  EXPECT_NEAR(solution.number_sigma("range_offset_m") / referee.offset_sigma, 1.0, covariance_tolerance);
   for (std::size_t v = 0; v < solution.problem.views.size(); ++v) {
     EXPECT_NEAR(solution.distance_sigma[v] / referee.distance_sigma[v], 1.0, covariance_tolerance);
   }

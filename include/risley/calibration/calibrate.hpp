@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,13 @@ inline constexpr double kPoorDatum = 8.7266462599716477e-4;
 /// prior sigmas of the parameters (1 degree, 0.01 in an index).
 inline constexpr double kWidestDirection = 0.5;
 
+/// Whether recordings from unknown poses saw the same walls, whose shape they then share.
+enum class SameWalls {
+  if_found,  ///< where their planes fit in one way only
+  yes,       ///< or there is no calibration
+  no,
+};
+
 /// How a calibration on planes is made, and what it may assume.
 struct CalibrationOptions {
   CalibrationMethod method = CalibrationMethod::adjustment;
@@ -50,7 +58,16 @@ struct CalibrationOptions {
   /// The station of each recording [recordings]; empty: unknown poses, or the origin of the scene
   /// where planes are given.
   std::vector<scenes::Station> stations;
-  std::uint64_t seed = 0;  ///< of the search for planes
+  SameWalls same_walls = SameWalls::if_found;  ///< without planes and stations
+  std::uint64_t seed = 0;                      ///< of the search for planes
+};
+
+/// A size of the prisms or a range error that a calibration adjusted, by its name in presets.
+struct CalibratedNumber {
+  std::string name;
+  double value = 0, prior = 0, prior_sigma = 0;  ///< SI
+  double sigma = 0;        ///< if everything that was held were exactly as held, SI
+  double total_sigma = 0;  ///< what was held included, SI
 };
 
 /// One wall in one recording.
@@ -66,6 +83,9 @@ struct CalibratedPlane {
   double rms = 0;          ///< of point-to-plane distances after the calibration, m
   double rms_before = 0;   ///< the same with the believed parameters, of the believed plane, m
   double range_sigma = 0;  ///< of one range, found by variance components, m
+  /// Root mean square of what the wall deviates from its plane by where shots met it, m, and the
+  /// length over which it does so; 0 where walls are taken as flat.
+  double shape_sigma = 0, shape_length = 0;
 };
 
 /// A compact region that stands off its plane by a constant step.
@@ -97,22 +117,25 @@ struct Calibration {
   PrismTrain believed;     ///< what the sensor computed directions with
   std::vector<estimation::FreeParameter> free;
   Eigen::VectorXd parameters;  ///< [free], SI
-  /// [free, free], common errors of the rotation angles and unevenness of the walls included, if
+  /// [free, free], common errors of the rotation angles and the shape of the walls included, if
   /// everything that was held were exactly as held.
   Eigen::MatrixXd covariance;
-  double range_offset = 0, range_offset_sigma = 0;  ///< m; sigma 0 where it was held
-  /// What was held and may be off, and by how much a sigma of each changes parameters and range
-  /// offset [free, held], [held]. An error in one makes up for the other in the beams' directions.
+  /// Sizes of the prisms and range errors: range_offset_m, range_near_m, ...
+  std::vector<CalibratedNumber> numbers;
+  /// What was held and may be off, and by how much a sigma of each changes parameters and numbers
+  /// [free, held], [numbers, held]. An error in one makes up for the other in the beams'
+  /// directions.
   std::vector<std::string> held;
-  Eigen::MatrixXd held_changes;
-  Eigen::VectorXd range_offset_held_changes;
+  Eigen::MatrixXd held_changes, number_held_changes;
 
   /// Sigma of a free parameter, what was held included.
   double total_sigma(std::size_t parameter) const;
-  /// Sigma of the range offset, m, what was held included; 0 where it was held itself.
-  double range_offset_total_sigma() const;
+  /// One of the numbers, or nullptr where it was not adjusted.
+  const CalibratedNumber* number(std::string_view name) const;
   std::vector<CalibratedPlane> planes;
   std::vector<SurfaceStep> steps;
+  /// Whether recordings from poses that nobody stated saw the same walls.
+  bool same_walls = false;
   DatumKind datum_kind = DatumKind::none;
   FormalDatum datum;                 ///< after, everything included
   FormalDatum datum_given_held;      ///< if everything that was held were exactly as held
@@ -123,9 +146,10 @@ struct Calibration {
   double better_probability = 1;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PriorTest> prior_tests;
-  double sigma0 = 0;           ///< standard deviation of unit weight against the stated range noise
-  double unevenness = 1;       ///< chi2 per cell of mean residuals over 1 degree: 1 for flat walls
-  double variance_factor = 1;  ///< by which the covariance was enlarged for uneven walls
+  double sigma0 = 0;  ///< standard deviation of unit weight against the stated range noise
+  /// How far the walls deviate from planes, mean after the data; all 0 where they are taken as
+  /// flat.
+  ShapeParameters shape;
   int iterations = 0;  ///< of the longest adjustment, the one that starts from the believed values
   /// What the recordings together say of the believed parameters moves the rotation angles of each
   /// by this [recordings][prisms], rad.

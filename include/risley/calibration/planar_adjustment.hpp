@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,7 @@
 
 #include "risley/calibration/plane_equations.hpp"
 #include "risley/calibration/plane_points.hpp"
+#include "risley/calibration/wall_shape.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/estimation/free_parameters.hpp"
 
@@ -23,7 +26,10 @@ struct StationPose {
   std::string name;
   Eigen::Matrix3d scene_from_sensor = Eigen::Matrix3d::Identity();  ///< start value
   Eigen::Matrix3d stated = Eigen::Matrix3d::Identity();             ///< what is known of it
-  double sigma = 0;  ///< of each of the three stated rotations, rad; 0: exact
+  /// Of each of the three stated rotations, rad; 0: exact, infinite: nothing is known.
+  double sigma = 0;
+  /// Of the sensor's origin in the scene's frame, m: which places of a wall two recordings share.
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
 };
 
 /// A wall: its normal is common to all recordings that see it, in the scene's frame.
@@ -33,6 +39,7 @@ struct Wall {
   Vector3<double> stated{1, 0, 0};  ///< what is known of it
   /// How well the stated normal is known, rad per axis; negative: not at all. 0 holds it.
   double normal_sigma = -1;
+  WallGrid grid = {};  ///< empty: the wall is flat
 };
 
 /// What one recording saw of one wall. Each has a distance of its own: nobody measures where in the
@@ -44,6 +51,34 @@ struct WallView {
   double range_variance = 0;  ///< of one range, m^2
   std::shared_ptr<const RangedShots> shots;
   double side = 1.0;  ///< -1 where the recording saw the wall from behind, against its normal
+  /// First shot in every cell of the wall's grid and the end of the last [cells + 1]; empty where
+  /// the wall is flat.
+  std::vector<std::uint32_t> cell_begin = {};
+};
+
+/// What is known of one size of the prisms before.
+struct SizePrior {
+  PrismSize size;
+  double value = 0;  ///< m
+  double sigma = 0;  ///< m, 0: exact
+};
+
+/// What a term of the range errors depends on.
+enum class RangeTermKind { near, incidence, per_decade, emitter };
+
+/// A term of the range errors beside the constant one, see sensors::RangeErrors.
+struct RangeTerm {
+  std::string name;  ///< as in presets
+  double value = 0;  ///< start value, SI
+  double prior = 0;  ///< what is known of it, SI
+  double sigma = 0;  ///< how well, SI; 0 holds it
+  RangeTermKind kind = RangeTermKind::near;
+  int emitter = 0;  ///< whose own error it is, from 0
+};
+
+/// Full angles of the beam, rad.
+struct BeamDivergence {
+  double horizontal = 0, vertical = 0;
 };
 
 /// Least squares of all recordings together: ranges against explicit planes.
@@ -54,12 +89,18 @@ struct PlanarProblem {
   PrismTrain prior;                             ///< where the priors of the parameters stand
   /// Prior sigma of every free parameter [free], SI; empty or infinite: none.
   std::vector<double> prior_sigma;
-  double range_offset = 0;            ///< start value, m
-  double range_offset_sigma = 0;      ///< prior about 0, m; 0 holds it at 0
+  double range_offset = 0;             ///< start value, m
+  double range_offset_sigma = 0;       ///< prior about 0, m; 0 holds it at 0
+  std::vector<RangeTerm> range_terms;  ///< [terms of the views' shots]
+  BeamDivergence divergence;           ///< for the term of incidence
+  /// Of the geometry, which holds their start values; empty: the geometry is exact.
+  std::vector<SizePrior> sizes;
   std::vector<StationPose> stations;  ///< [recordings]
   bool stations_known = false;        ///< whether their rotations tie the walls together
   std::vector<Wall> walls;
   std::vector<WallView> views;
+  /// What is assumed of the shape of walls that have a grid.
+  ShapePrior shape;
 
   /// What is known of the rotation angles' common errors: parameters that the rotation angles were
   /// computed with. They are not estimated again, but their errors reach the result.
@@ -83,8 +124,8 @@ struct PriorTest {
 
 /// By how much a solution is off where a quantity that was not adjusted is off by one unit, SI.
 struct SolutionResponse {
-  Eigen::MatrixXd parameters;    ///< [free, quantities]
-  Eigen::VectorXd range_offset;  ///< [quantities]; 0 where it is held, too
+  Eigen::MatrixXd parameters;  ///< [free, quantities]
+  Eigen::MatrixXd numbers;     ///< [numbers, quantities]
 };
 
 /// Solution of a problem. Problem holds the adjusted values.
@@ -97,8 +138,11 @@ struct PlanarSolution {
   Eigen::VectorXd parameters;        ///< [free], SI
   Eigen::MatrixXd covariance;        ///< [free, free], common errors of the angles included
   Eigen::MatrixXd noise_covariance;  ///< [free, free], of the ranges' noise and the priors alone
-  double range_offset_sigma = 0;     ///< m
-  Eigen::VectorXd range_offset_covariance;  ///< with the parameters [free], SI; 0 where it is held
+  /// Sizes of the prisms and range errors that were adjusted, by their names, with their values.
+  std::vector<std::string> numbers;
+  Eigen::VectorXd number_values;            ///< [numbers], SI
+  Eigen::MatrixXd number_covariance;        ///< [numbers, numbers], SI
+  Eigen::MatrixXd number_cross_covariance;  ///< with the parameters [numbers, free], SI
   SolutionResponse considered;              ///< to the considered parameters of the problem
   std::vector<double> distance_sigma;       ///< [views], m
   std::vector<double> normal_sigma;         ///< [walls], of the two angles together, rad
@@ -110,6 +154,13 @@ struct PlanarSolution {
   std::vector<double> redundancy;
   /// Sum of squared residuals over variances of every view [views].
   std::vector<double> chi2;
+  /// What is found of the walls' shape; without weights where all walls are flat.
+  ShapeSolution shape;
+
+  /// Row of a number, or -1 where it was not adjusted.
+  Eigen::Index number(std::string_view name) const;
+  /// Its sigma, SI; 0 where it was not adjusted.
+  double number_sigma(std::string_view name) const;
 };
 
 /// When an adjustment on planes stops.
@@ -120,7 +171,12 @@ struct AdjustmentOptions {
   InstructionSet set = best_instruction_set();
 };
 
-/// Levenberg-Marquardt on normal equations that every view accumulates by itself.
+/// Lays a grid over every wall and sorts the shots of its views by the grid's cells. Where a shot
+/// meets its plane decides, as the problem has it.
+void lay_grids(PlanarProblem& problem);
+
+/// Levenberg-Marquardt on normal equations that every view accumulates by itself, as if the walls
+/// were flat; then, where walls have grids, Gauss-Newton steps with their shape integrated out.
 /// @throws EstimationError when a beam leaves all planes, or nothing is to be estimated
 PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options = {},
                       const Progress& progress = {});
@@ -151,6 +207,9 @@ Eigen::MatrixXd prior_information(const PlanarProblem& problem);
 /// Whether a place of the flat vector is a material that is not adjusted: what the sensor computed
 /// with is what light meets.
 bool is_held_material(int place, const PlanarProblem& problem);
+
+/// Value of a prism's own size in a geometry that has a value for every prism, m.
+double size_value(const PrismGeometry& geometry, const PrismSize& size);
 
 /// The view of a problem as plane_equations() wants it.
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -18,36 +19,56 @@ namespace risley::calibration {
 struct PlaneView {
   PrismTrain train;
   PrismGeometry geometry;
-  std::vector<int> places;    ///< of the flat parameter vector: those to differentiate by
-  double range_offset = 0;    ///< what the sensor adds to a true range, m
-  double range_variance = 0;  ///< of one range, rounding included, m^2
-  Plane plane;                ///< sensor frame
+  std::vector<int> places;       ///< of the flat parameter vector: those to differentiate by
+  std::vector<PrismSize> sizes;  ///< of the prisms: those to differentiate by
+  double range_offset = 0;       ///< what the sensor adds to a true range, m
+  /// Of the errors beside that whose share every shot has, RangedShots::range_terms [terms].
+  std::vector<double> range_terms;
+  double range_variance = 0;             ///< of one range, rounding included, m^2
+  Plane plane;                           ///< sensor frame
   Vector3<double> tangent_1, tangent_2;  ///< unit vectors that make an orthogonal triad with normal
+  /// First shot of every cell and the end of the last [cells + 1], where shots are sorted by cells
+  /// and are to be summed so, too; empty: not.
+  std::span<const std::uint32_t> cell_begin;
 };
 
 /// Columns of the normal equations of one plane.
 ///   0 .. places-1    parameters of the train, in the order of PlaneView::places
 ///   + rotor          rotation angle of that rotor, the same shift at every shot
-///   + prisms         range offset
-///   + prisms + 1, 2  normal towards tangent 1 and 2, rad
-///   + prisms + 3     distance of the plane
+///   + prisms         sizes of the prisms, m, in the order of PlaneView::sizes
+///   + sizes          terms of the range errors, in the order of PlaneView::range_terms
+///   + terms          range offset
+///   + 1, 2           normal towards tangent 1 and 2, rad
+///   + 3              distance of the plane
 struct PlaneColumns {
-  int places = 0, prisms = 0;
-  int rotation_angle(int rotor) const { return places + rotor; }  ///< a shift at all shots
-  int range_offset() const { return places + prisms; }            ///< of the sensor, m
+  int places = 0, prisms = 0, sizes = 0, terms = 0;
+
+  explicit PlaneColumns(const PlaneView& view)
+      : places(static_cast<int>(view.places.size())),
+        prisms(view.train.prisms()),
+        sizes(static_cast<int>(view.sizes.size())),
+        terms(static_cast<int>(view.range_terms.size())) {}
+
+  int rotation_angle(int rotor) const { return places + rotor; }         ///< a shift at all shots
+  int prism_size(int number) const { return places + prisms + number; }  ///< m
+  int range_term(int number) const { return places + prisms + sizes + number; }
+  int range_offset() const { return range_term(terms); }  ///< of the sensor, m
   /// Towards tangent 1, which has the number 0, or tangent 2.
-  int normal(int tangent) const { return places + prisms + 1 + tangent; }
-  int distance() const { return places + prisms + 3; }  ///< of the plane, m
-  int size() const { return places + prisms + 4; }
+  int normal(int tangent) const { return range_offset() + 1 + tangent; }
+  int distance() const { return range_offset() + 3; }  ///< of the plane, m
+  int size() const { return range_offset() + 4; }
 };
 
 /// Sums over the shots of one plane.
 struct PlaneEquations {
   Eigen::MatrixXd hessian;   ///< [columns, columns], J^T W J
   Eigen::VectorXd gradient;  ///< [columns], J^T W residual
-  double cost = 0;           ///< sum of squared residuals over their variances
-  std::size_t shots = 0;     ///< that were used
-  std::size_t lost = 0;      ///< whose beam does not meet the plane in front of the sensor
+  /// Rows distance, normal 1 and normal 2 of J^T W [J, residual], summed over every cell by itself
+  /// [3 cells, columns + 1]; empty without cells.
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> cells;
+  double cost = 0;        ///< sum of squared residuals over their variances
+  std::size_t shots = 0;  ///< that were used
+  std::size_t lost = 0;   ///< whose beam does not meet the plane in front of the sensor
 };
 
 /// Residuals of single shots; empty spans are not written. A lost shot is NaN.

@@ -22,8 +22,11 @@ struct RangedShots {
   /// Covariance of the rotation angles, upper triangle row by row [prisms (prisms+1)/2][shots],
   /// rad^2.
   std::vector<std::vector<float>> angle_covariance;
-  std::vector<double> range;       ///< m, as measured
-  std::vector<std::uint8_t> beam;  ///< emitter that fired, from 0; empty: all the first
+  std::vector<double> range;            ///< m, as measured
+  std::vector<std::uint8_t> beam;       ///< emitter that fired, from 0; empty: all the first
+  std::vector<std::uint8_t> intensity;  ///< as reported; empty: not known
+  /// d range / d range error [terms][shots], see range_term_names(); empty: none is looked at.
+  std::vector<std::vector<float>> range_terms;
 
   std::size_t size() const { return range.size(); }
   /// Number of columns of rotation angles.
@@ -31,6 +34,9 @@ struct RangedShots {
   /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(int prisms, std::size_t shots);
 };
+
+/// As many columns for another number of shots.
+RangedShots columns_like(const RangedShots& shots, std::size_t size);
 
 /// Some shots by their rows. @throws InvalidArgument for a row that is not there
 RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows);

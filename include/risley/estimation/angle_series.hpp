@@ -24,6 +24,9 @@ struct AngleSeries {
   /// Ranges of the shots, m, NaN where there is none; empty unless they were asked for. No
   /// estimator looks at them: they travel along for what comes after.
   std::vector<double> range;
+  /// Intensities as reported, which travel along with the ranges; 0 where they are not known, empty
+  /// where none is.
+  std::vector<std::uint8_t> intensity;
 
   std::size_t size() const { return time_ns.size(); }
   /// Time since the first shot, s.

@@ -123,6 +123,7 @@ class PackedSeries {
     Mostly<std::uint8_t> beam;
     Mostly<float> azimuth_variance, zenith_variance;
     std::vector<double> range;
+    Mostly<std::uint8_t> intensity;  ///< only with ranges
   };
 
   void pack_tail();

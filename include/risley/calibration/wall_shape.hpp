@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace risley::calibration {
+
+/// A square grid over a wall, in the coordinates of tangents_of() its normal in the scene's frame.
+/// Nodes are the corners of the cells; what deviates from the plane is known at them.
+struct WallGrid {
+  double spacing = 0;                ///< of the nodes, m
+  double first_u = 0, first_v = 0;   ///< of node (0, 0), m
+  int cells_u = 0, cells_v = 0;      ///< along both tangents
+  std::vector<std::uint32_t> cells;  ///< those with shots, ascending: v * cells_u + u
+
+  bool empty() const { return cells.empty(); }
+  Eigen::Index nodes() const {
+    return empty() ? 0 : static_cast<Eigen::Index>(cells_u + 1) * (cells_v + 1);
+  }
+  /// Middle of one of the cells with shots, m.
+  double middle_u(std::size_t cell) const {
+    return first_u + spacing * (0.5 + static_cast<double>(cells[cell] % row()));
+  }
+  double middle_v(std::size_t cell) const {
+    return first_v + spacing * (0.5 + static_cast<double>(cells[cell] / row()));
+  }
+  std::uint32_t row() const { return static_cast<std::uint32_t>(cells_u); }  ///< cells of one row
+};
+
+/// How far walls deviate from their planes: a zero-mean Gaussian process over each wall, whose
+/// correlation is that of Matern with nu = 2, and beside it a part of its own for every cell.
+struct ShapeParameters {
+  double sigma = 0;   ///< of the process, m
+  double length = 0;  ///< of its correlation, m: the process is kappa = 2 / length wide
+  double white = 0;   ///< sigma of the cells' own part, m
+};
+
+/// What is assumed of walls before they are seen: parameters that are tried, with their weights.
+struct ShapePrior {
+  std::vector<ShapeParameters> parameters;
+  std::vector<double> weight;  ///< [parameters], sum 1
+  /// Whether data say which parameters are right; a plan has no data.
+  bool from_data = true;
+};
+
+/// Finished walls of buildings. docs/theory/calibration.md, section Walls have shape
+ShapePrior building_walls();
+
+/// Sums over the shots of all views of one wall, by cells. With e = (1, u - middle, v - middle) and
+/// the derivative d of a shot's range by the wall's height:
+struct WallSums {
+  WallGrid grid;
+  /// Sum of w d^2 e e' [cells][3, 3].
+  std::vector<Eigen::Matrix3d> weight;
+  /// Sum of w d e x', for the columns x of a linear system and its residual [3 cells, columns].
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> columns;
+};
+
+/// A linear least squares problem of unknowns, further quantities that are not estimated, and the
+/// shape of walls.
+struct ShapeProblem {
+  /// J' W J of unknowns, quantities and the residual, with the priors of the unknowns
+  /// [unknowns + quantities + 1, ...]. The block of the quantities alone is not looked at.
+  Eigen::MatrixXd system;
+  Eigen::Index unknowns = 0;
+  std::vector<WallSums> walls;
+};
+
+/// What remains when the walls' shape is integrated out, for the parameters that were tried.
+struct ShapeSolution {
+  Eigen::VectorXd step;        ///< [unknowns], mean over the parameters
+  Eigen::MatrixXd covariance;  ///< [unknowns, unknowns], the spread of the means included
+  Eigen::MatrixXd response;    ///< -N^-1 N_q [unknowns, quantities], mean
+  Eigen::MatrixXd normal;      ///< N of the likeliest parameters [unknowns, unknowns]
+  std::vector<double> weight;  ///< of the parameters after the data, sum 1
+  ShapeParameters mean;        ///< of the parameters, so weighted
+  std::size_t likeliest = 0;   ///< row of the parameters
+  /// Deviation at the nodes, of the likeliest parameters, node (u, v) at v (cells_u + 1) + u
+  /// [walls][nodes], m.
+  std::vector<Eigen::VectorXd> height;
+  bool positive = false;  ///< whether the normal equations could be solved
+};
+
+/// Integrates the walls' shape out, parameter by parameter, and weighs the parameters by their
+/// marginal likelihood.                                   Derivation: docs/theory/calibration.md
+/// @throws InvalidArgument for a system or sums of other sizes
+ShapeSolution solve_with_shape(const ShapeProblem& problem, const ShapePrior& prior);
+
+/// Without the parameters that a solution found to weigh less than a thousandth.
+ShapePrior likely_part(const ShapePrior& prior, const ShapeSolution& solution);
+
+}  // namespace risley::calibration
