@@ -76,6 +76,8 @@ constexpr std::array kSpecifications{
     Specification{"limits", "range_minimum_m", "m", &Sensor::range_minimum, 0, 1e5},
     Specification{"limits", "range_maximum_m", "m", &Sensor::range_maximum, 1e-3L, 1e6},
     Specification{"limits", "field_of_view_deg", "deg", &Sensor::field_of_view, 0, 360},
+    Specification{"limits", "pointing_tolerance_deg", "deg", &Sensor::pointing_tolerance, 0, 10,
+                  true},
     Specification{"rates", "shot_rate_hz", "Hz", &Sensor::shot_rate, 1e-3L, 1e9},
     Specification{"beam", "beam_divergence_horizontal_deg", "deg",
                   &Sensor::beam_divergence_horizontal, 0, 90},

@@ -96,8 +96,11 @@ struct Sensor {
   double range_minimum = 0;            ///< no return below, m
   double range_maximum = 0;            ///< no return beyond, m
   double field_of_view = 0;            ///< full cone, rad
-  double shot_rate = 0;                ///< shots per second
-  int device_type = 1;                 ///< Livox device type of recordings
+  /// Root mean square error of a unit's directions that its manufacturer allows, rad; 0: not
+  /// stated.
+  double pointing_tolerance = 0;
+  double shot_rate = 0;  ///< shots per second
+  int device_type = 1;   ///< Livox device type of recordings
   double beam_divergence_horizontal = 0, beam_divergence_vertical = 0;  ///< full angle, rad
   PrismGeometry geometry;  ///< sizes of the prisms                       [B21 App. A]
 
