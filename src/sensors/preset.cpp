@@ -17,6 +17,7 @@
 #include "risley/io/yaml_covariance.hpp"
 #include "risley/io/yaml_map.hpp"
 #include "risley/io/yaml_output.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 #include "sensors/builtin_presets.hpp"
 
@@ -106,7 +107,8 @@ std::vector<std::string_view> section_names() {
 /// Of the values that a covariance can name.
 io::ScaleOfName covariance_scale(const Sensor& sensor) {
   return [shape = sensor.shape()](const std::string& name) {
-    return name == "range_offset_m" ? 1.0L : scale_of(find_parameter(name, shape).unit);
+    if (name == "range_offset_m" || find_prism_size(name, shape.prisms)) return 1.0L;
+    return scale_of(find_parameter(name, shape).unit);
   };
 }
 

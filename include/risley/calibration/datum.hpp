@@ -108,7 +108,7 @@ class BeamBundle {
 /// along d is below -d / 2.
 double better_probability(const PointingError& error);
 
-/// Probability that a root mean square error is larger than is tolerated. Zero where none is.
+/// Probability that a root mean square error is larger than is tolerated.
 /// @param error, sigma, tolerance  rad
 double beyond_probability(double error, double sigma, double tolerance);
 

@@ -80,7 +80,7 @@ struct Sensor {
 
   CalibrationReference reference = CalibrationReference::none;
   /// Joint covariance of named values, SI units; empty for presets that are no calibration. The
-  /// names are those of parameter_list() and range_offset_m.
+  /// names are those of parameter_list(), range_offset_m and sizes of prisms, shared or own.
   std::vector<std::string> covariance_names;
   Eigen::MatrixXd covariance;  ///< [names, names]
 
@@ -123,7 +123,7 @@ struct Sensor {
   /// prisms together becomes known of each when one of them is set alone.
   /// @throws InvalidArgument naming the parameter, value, unit and range
   void set(std::string_view parameter, double value);
-  /// Sets the prisms' sizes and forgets who said otherwise.
+  /// Sets the prisms' sizes, as exact, and forgets what was known of them.
   /// @throws InvalidArgument as face_positions()
   void set_prism_geometry(const PrismGeometry& geometry);
   /// Knowledge of a parameter, or nullptr when nothing is recorded.
