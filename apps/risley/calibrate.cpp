@@ -32,6 +32,7 @@
 namespace risley::app {
 namespace {
 
+using calibration::CalibrationCode;
 using jobs::CalibratedRecordings;
 
 struct CalibrateCommandOptions {
@@ -40,7 +41,7 @@ struct CalibrateCommandOptions {
   jobs::PlatformFiles platform;
   std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, control, stations,
                       beam_origin = "yes", states = "knots", mirror = "auto", plan, scene, page;
-  std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg;
+  std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg, tolerance_deg;
   std::optional<double> range_offset_sigma_m, knot_spacing_s, cell_size_m;
   double duration_s = 10.0, empty_circle_m = cloud::PointDistributionOptions{}.empty_circle;
   bool force = false, no_report = false;
@@ -90,6 +91,10 @@ void take_recordings(const CalibrateCommandOptions& options, const CommonOptions
   job.angle_noise = noise_angle(options.noise_angle_deg);
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
   job.seed = common.seed;
+  if (options.tolerance_deg) {
+    check_not_negative(*options.tolerance_deg, "--tolerance-deg", "deg");
+    job.tolerance = radians_from_degrees(*options.tolerance_deg);
+  }
   job.truths = options.truths;
   job.details = !options.folder.empty() && !options.no_report;
   job.force = options.force;
@@ -128,6 +133,17 @@ void put_flags_into(Outcome& outcome) {
   put_flags(c.warnings);
 }
 
+const char* why_not_written(CalibrationCode code) {
+  switch (code) {
+    case CalibrationCode::as_believed:
+      return "what the sensor believes is as good";
+    case CalibrationCode::not_better:
+      return "it is not better";
+    default:
+      return "it is not to be trusted";
+  }
+}
+
 /// Runs a calibration, on walls or in flight, and says what came of it.
 template <class Calibrate, class Print>
 ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& common,
@@ -141,11 +157,9 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) log_failure(c.reason, common);
-  const bool worse = c.verdict.code == calibration::CalibrationCode::not_better;
-  const bool doubtful = c.verdict.code == calibration::CalibrationCode::undecided;
-  if (c.converged && (worse || doubtful) && !options.force && !options.folder.empty()) {
+  if (c.converged && !outcome.calibration_written && !options.folder.empty()) {
     spdlog::warn("calibration.yaml was not written, because {}: --force writes it",
-                 worse ? "it is not better" : "it is not to be trusted");
+                 why_not_written(c.verdict.code));
   }
   if (common.json) {
     print_json(common, json::of(outcome), outcome.provenance);
@@ -369,6 +383,10 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
                   "Prior: 1 sigma of the range offset about what the sensor states, m; 0 holds it "
                   "there (default: 0.05, for a flight 0.02)");
+  verb.add_option("--tolerance-deg", o.tolerance_deg,
+                  "Root mean square error of directions up to which a unit counts as sound, deg "
+                  "(default: the manufacturer's specification, as in the preset)")
+      ->excludes("--plan");
   verb.add_option("--beam-origin", o.beam_origin,
                   "Let beams start where they leave the last prism; 'no': at the sensor's origin")
       ->check(CLI::IsMember({"yes", "no"}))
@@ -383,7 +401,7 @@ Run declare_calibrate(CLI::App& verb) {
       ->check(CLI::IsMember({"auto", "yes", "no"}))
       ->capture_default_str();
   verb.add_flag("--force", o.force,
-                "Write calibration.yaml even where the verdict is that it is no better")
+                "Write calibration.yaml even where it does not improve on what the sensor believes")
       ->excludes("--plan");
   verb.add_option("--truth", o.truths,
                   "OUT.truth.yaml of each simulated recording, to compare the calibration with "

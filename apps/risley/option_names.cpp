@@ -53,6 +53,7 @@ constexpr OptionName kNames[] = {
     {"states", "--states"},
     {"station", "--station"},
     {"stations", "--stations"},
+    {"tolerance", "--tolerance-deg"},
     {"trajectory", "--trajectory"},
     {"trajectory_errors", "--trajectory-errors"},
     {"trajectory_topic", "--trajectory-topic"},

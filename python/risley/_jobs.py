@@ -97,6 +97,7 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
               angle_noise: Optional[float] = None, angle_noise_deg: Optional[float] = None,
               range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
               prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
+              tolerance: Optional[float] = None, tolerance_deg: Optional[float] = None,
               beam_origin: bool = True, fixed: Fixed = (), free: Iterable[str] = (),
               mirrored: Optional[bool] = None, truth: Union[Path, Sequence[Path]] = (),
               force: bool = False, states: str = "knots", shot_rate: Optional[float] = None,
@@ -144,6 +145,9 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         default there is no such prior.
     range_offset_sigma : float, optional
         Prior standard deviation of the range offset, m; 0 holds it.
+    tolerance, tolerance_deg : float, optional
+        Root mean square error of directions up to which a unit counts as sound, rad or deg; by
+        default the manufacturer's specification, as in the preset.
     beam_origin : bool, default True
         Whether beams start where they leave the last prism.
     fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, threads, progress
@@ -151,7 +155,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     truth : str, path or a sequence of them
         ``OUT.truth.yaml`` of the simulation that made each recording, to compare with.
     force : bool, default False
-        Write calibration.yaml even if the calibration is not better.
+        Write calibration.yaml even if the calibration does not improve on what the sensor
+        believes.
     states : {'knots', 'all', 'none'}
         Rotor states to write into ``output``.
     seed : int, default 0
@@ -174,7 +179,9 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
         "range_noise": range_noise,
         "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
-        "range_offset_sigma": range_offset_sigma, "fixed": _held(fixed), "free": list(free),
+        "range_offset_sigma": range_offset_sigma,
+        "tolerance": angle("tolerance", tolerance, tolerance_deg),
+        "fixed": _held(fixed), "free": list(free),
         "mirrored": mirrored, "truth": _paths(truth), "force": force, "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
     on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),

@@ -128,6 +128,7 @@ class Work {
     require_not_below("range resolution", options_.sensor.range_resolution, 0, "m");
     if (options_.prior_sigma) require_above("prior sigma", *options_.prior_sigma, 0, "rad");
     require_not_below("sigma of the range offset", options_.range_offset_sigma, 0, "m");
+    if (options_.tolerance) require_not_below("tolerance", *options_.tolerance, 0, "rad");
     for (const auto& [name, value] : options_.fixed) {
       if (value) require_finite(name, *value);
     }
@@ -401,6 +402,7 @@ void Work::fill_result(const PlanarSolution& solution) {
   fill_datum(solution);
   result_.reason = reason_of_failure(result_, solution);
   result_.converged = result_.reason.empty();
+  result_.tolerance = options_.tolerance.value_or(options_.sensor.pointing_tolerance);
   result_.verdict = verdict_of(result_);
   for (std::string& warning : warnings_of(result_, solution, recordings_)) {
     result_.warnings.push_back(std::move(warning));

@@ -266,6 +266,11 @@ double better_probability(const PointingError& error) {
   return 0.5 * std::erfc(-total / (2 * sigma) / std::sqrt(2.0));
 }
 
+double beyond_probability(double error, double sigma, double tolerance) {
+  if (!(sigma > 0)) return error > tolerance ? 1 : 0;
+  return 0.5 * std::erfc((tolerance - error) / sigma / std::sqrt(2.0));
+}
+
 DatumKind datum_kind(bool planes, bool stations) {
   if (planes) return stations ? DatumKind::both : DatumKind::planes;
   return stations ? DatumKind::stations : DatumKind::none;

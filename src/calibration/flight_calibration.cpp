@@ -459,6 +459,8 @@ void FlightWork::fill_result() {
         last_.promised);
   }
   result_.model = std::move(model_);
+  result_.tolerance = options_.tolerance.value_or(options_.sensor.pointing_tolerance);
+  if (result_.converged) result_.pointing_error = pointing_error_of(result_);
   result_.verdict = verdict_of(result_);
 }
 

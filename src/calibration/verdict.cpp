@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/random.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -19,6 +21,13 @@ namespace {
 /// A calibration is written where it is better with this probability: of 400 random ones on one to
 /// five walls (statistics.RandomUnits) none that was written was worse.
 constexpr double kBetter = 0.99;
+
+/// A sigma interval this wide that holds the tolerance leaves open on which side the error is.
+constexpr double kOpenSigmas = 2;
+/// A total error in flight of fewer sigmas may be the boresight's.
+constexpr double kToldSigmas = 3;
+/// Beams of a grid over all rotation angles that the prisms of a flight are compared with.
+constexpr double kMostBeams = 4096;
 
 bool contradicts(const PriorTest& test) {
   return test.degrees_of_freedom != 0 && !(test.chi2 <= test.critical);
@@ -29,6 +38,42 @@ double significant_chi2(double degrees_of_freedom) {
   constexpr double kNormalQuantile = 3.0902;
   const double share = 2.0 / (9.0 * degrees_of_freedom);
   return degrees_of_freedom * std::pow(1.0 - share + kNormalQuantile * std::sqrt(share), 3);
+}
+
+/// A root mean square error that a verdict judges, rad.
+struct JudgedError {
+  double value = 0, sigma = 0;
+  const char* subject = "that";
+  bool beyond(double tolerance) const { return value > tolerance; }
+};
+
+/// "; that is within the tolerance of 0.1 degree, with a probability of 0.93".
+std::string tolerance_words(const JudgedError& error, double tolerance) {
+  if (!(tolerance > 0)) return "";
+  const bool beyond = error.beyond(tolerance);
+  std::string words = fmt::format("; {} is {} the tolerance of {:.3g} degree", error.subject,
+                                  beyond ? "beyond" : "within", degrees_from_radians(tolerance));
+  if (std::abs(error.value - tolerance) <= kOpenSigmas * error.sigma) {
+    const double probability = beyond_probability(error.value, error.sigma, tolerance);
+    words += fmt::format(", with a probability of {:.2g}", beyond ? probability : 1 - probability);
+  }
+  return words;
+}
+
+/// Which recording would tell what these walls do not.
+constexpr const char* kBetterScan =
+    "scan walls that are tilted steeply against the sensor's axis and fill its field of view, or "
+    "more distant ones, or the same walls twice from one spot with the sensor rolled by 180 "
+    "degrees; or give what is known of walls and poses (option planes, option stations)";
+
+CalibrationVerdict undecided_words(const Calibration& c) {
+  if (std::any_of(c.prior_tests.begin(), c.prior_tests.end(), contradicts)) {
+    return {
+        CalibrationCode::undecided, c.reason,
+        "check the normals and poses that were stated, or leave them out (option planes, option "
+        "stations)"};
+  }
+  return {CalibrationCode::undecided, c.reason, kBetterScan};
 }
 
 }  // namespace
@@ -83,25 +128,32 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
 }
 
 CalibrationVerdict verdict_of(const Calibration& c) {
-  if (!c.converged) {
-    return {CalibrationCode::undecided, c.reason,
-            "scan more walls, tilted ones among them, or give what is known of walls and poses "
-            "(option planes, option stations)"};
-  }
+  if (!c.converged) return undecided_words(c);
   Eigen::VectorXd change = c.parameters;
   for (Eigen::Index i = 0; i < change.size(); ++i) {
     change[i] -= c.believed.get(c.free[static_cast<std::size_t>(i)].name);
   }
   const auto freedom = static_cast<double>(change.size());
+  Eigen::MatrixXd covariance = c.covariance;
+  if (c.held_changes.cols() > 0) covariance += c.held_changes * c.held_changes.transpose();
   const double chi2 =
-      change.size() == 0 ? 0.0 : change.dot(algebra::SymmetricSolver(c.covariance).solve(change));
+      change.size() == 0 ? 0.0 : change.dot(algebra::SymmetricSolver(covariance).solve(change));
   if (!(chi2 > significant_chi2(freedom))) {
-    return {CalibrationCode::as_believed,
-            fmt::format("the walls confirm what the sensor believes of itself to {} degree, {} "
-                        "(chi2 {:.3g} of {:.0f} parameters)",
-                        plain_text(degrees_from_radians(c.datum.total), 2),
-                        offset_text(c.datum.total), chi2, freedom),
-            "nothing"};
+    const std::string confirmed = fmt::format(
+        "the walls confirm what the sensor believes of itself to {} degree, {} (chi2 {:.3g} of "
+        "{:.0f} parameters)",
+        plain_text(degrees_from_radians(c.datum.total), 2), offset_text(c.datum.total), chi2,
+        freedom);
+    if (c.tolerance > 0 && !(c.datum.total <= c.tolerance)) {
+      return {CalibrationCode::undecided,
+              fmt::format("{}, which does not tell whether it is within the tolerance of {:.3g} "
+                          "degree",
+                          confirmed, degrees_from_radians(c.tolerance)),
+              kBetterScan};
+    }
+    return {CalibrationCode::as_believed, confirmed,
+            "keep what the sensor believes: these walls do not tell whether the calibration is "
+            "better"};
   }
   const std::string moved = in_words(c.pointing_error);
   if (c.rms_after >= c.rms_before) {
@@ -116,10 +168,16 @@ CalibrationVerdict verdict_of(const Calibration& c) {
                         "better than what the sensor believes with a probability of only {:.2g}",
                         moved, plain_text(degrees_from_radians(c.datum.total), 2),
                         offset_text(c.datum.total), c.better_probability),
-            "scan more walls, tilted ones among them, or give what is known of walls and poses "
-            "(option planes, option stations)"};
+            kBetterScan};
   }
-  return {CalibrationCode::bent, moved,
+  const JudgedError error{c.pointing_error.errors.total, c.pointing_error.total_sigma};
+  const std::string words = moved + tolerance_words(error, c.tolerance);
+  if (c.tolerance > 0 && !error.beyond(c.tolerance)) {
+    return {CalibrationCode::off_within_tolerance, words,
+            "keep the unit, which is within the tolerance; the calibration makes its clouds better "
+            "all the same"};
+  }
+  return {CalibrationCode::bent, words,
           "use the calibration for this unit's clouds, and repeat it on other walls"};
 }
 
@@ -130,6 +188,36 @@ std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor) {
   return fmt::format("{} is held at {:.6g} +- {:.2g}{}, and the strips say {:.6g} +- {:.2g}{}",
                      held.name, in_unit(held.held), in_unit(held.stated_sigma), unit,
                      in_unit(held.told), in_unit(held.sigma), unit);
+}
+
+PointingError pointing_error_of(const FlightCalibration& c) {
+  const PrismTrain& train = c.model.train;
+  const auto prisms = static_cast<std::size_t>(train.prisms());
+  const auto steps = static_cast<std::size_t>(
+      std::floor(std::pow(kMostBeams, 1.0 / static_cast<double>(prisms)) + 1e-9));
+  std::vector<std::vector<double>> angles(prisms);
+  std::vector<std::uint8_t> emitters;
+  const RandomStream places(0, 0);
+  const auto beams = static_cast<std::size_t>(std::llround(std::pow(steps, prisms)));
+  for (std::size_t i = 0; i < beams; ++i) {
+    std::size_t rest = i;
+    for (std::vector<double>& own : angles) {
+      own.push_back(kTwoPi * static_cast<double>(rest % steps) / static_cast<double>(steps));
+      rest /= steps;
+    }
+    emitters.push_back(static_cast<std::uint8_t>(places.uniform(i) * train.emitters()));
+  }
+  PrismTrain given = train;
+  std::vector<Eigen::Index> rows;
+  for (std::size_t j = 0; j < c.model.free.size(); ++j) {
+    const int row = FlightUnknowns::parameter(static_cast<int>(j));
+    rows.push_back(row);
+    for (const int place : c.model.free[j].places) {
+      given.set_place(place, c.unknowns[static_cast<std::size_t>(row)].start);
+    }
+  }
+  return BeamBundle(train, c.model.free, angles, emitters)
+      .pointing_error(given, c.covariance(rows, rows));
 }
 
 CalibrationVerdict verdict_of(const FlightCalibration& c) {
@@ -186,12 +274,24 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
             fmt::format("the strips confirm what the sensor believes of its prisms (chi2 {:.3g} "
                         "of {:.0f} parameters); {}",
                         prisms.first, prisms.second, strips),
-            "use the mount that was found for clouds of this platform"};
+            "use the mount that was found, with the calibration beside it, for clouds of this "
+            "platform"};
   }
-  return {CalibrationCode::bent,
-          fmt::format("the prisms differ from what the sensor believes (chi2 {:.3g} of {:.0f} "
-                      "parameters); {}",
-                      prisms.first, prisms.second, strips),
+  const PointingError& found = c.pointing_error;
+  const bool total_is_told = found.errors.total >= kToldSigmas * found.total_sigma;
+  const JudgedError error = total_is_told
+                                ? JudgedError{found.errors.total, found.total_sigma}
+                                : JudgedError{found.errors.shape, found.shape_sigma, "the shape"};
+  const std::string words = fmt::format(
+      "the prisms differ from what the sensor believes (chi2 {:.3g} of {:.0f} "
+      "parameters): {}{}; {}",
+      prisms.first, prisms.second, in_words(found), tolerance_words(error, c.tolerance), strips);
+  if (c.tolerance > 0 && !error.beyond(c.tolerance)) {
+    return {CalibrationCode::off_within_tolerance, words,
+            "keep the unit, which is within the tolerance; use both the mount and the calibration "
+            "for clouds of this platform"};
+  }
+  return {CalibrationCode::bent, words,
           "use both the mount and the calibration for clouds of this platform"};
 }
 
@@ -199,6 +299,8 @@ const char* to_string(CalibrationCode code) {
   switch (code) {
     case CalibrationCode::as_believed:
       return "as_believed";
+    case CalibrationCode::off_within_tolerance:
+      return "off_within_tolerance";
     case CalibrationCode::bent:
       return "bent";
     case CalibrationCode::not_better:
@@ -207,6 +309,10 @@ const char* to_string(CalibrationCode code) {
       break;
   }
   return "undecided";
+}
+
+bool improves(CalibrationCode code) {
+  return code == CalibrationCode::bent || code == CalibrationCode::off_within_tolerance;
 }
 
 std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution& solution,

@@ -14,13 +14,18 @@ namespace risley::calibration {
 /// that the walls do not tell, a station or plane that contradicts the data. Empty for a sound one.
 std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution);
 
-/// What a calibration comes to: whether its parameters differ from the believed ones beyond what
-/// chance makes once in a thousand times, and whether the walls got flatter by it and directions
-/// can be expected to be nearer to the truth.
+/// What a calibration comes to: whether its parameters differ from the believed ones by more than
+/// chance and what was held explain once in a thousand times; whether walls became flatter and
+/// directions can be expected to be nearer to the truth; and whether the error is larger than is
+/// tolerated.
 CalibrationVerdict verdict_of(const Calibration& c);
 
 /// The same of a calibration in flight, by the prisms' parameters and the distances between strips.
 CalibrationVerdict verdict_of(const FlightCalibration& c);
+
+/// How far the directions of the prisms as they were given are from those of the prisms found, over
+/// all rotation angles. In flight, the boresight takes part in the rotation that all beams share.
+PointingError pointing_error_of(const FlightCalibration& c);
 
 /// How wrong reported directions are: "reported directions are off by 0.4029 ± 0.0013 degree ...".
 std::string in_words(const PointingError& error);

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "risley/algebra/products.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -51,6 +52,12 @@ void Factors::add(const algebra::NamedCovariance& uncertain, bool moves_beam, bo
         common.range_offset = factor(i, j);
         continue;
       }
+      const auto size = std::find_if(model_.sizes.begin(), model_.sizes.end(),
+                                     [&](const PrismSize& one) { return one.name == name; });
+      if (size != model_.sizes.end()) {
+        common.weights[size_row(size - model_.sizes.begin())] += factor(i, j);
+        continue;
+      }
       const auto own = std::find(of_mount.begin(), of_mount.end(), name);
       if (own != of_mount.end()) {
         common.mount[static_cast<std::size_t>(own - of_mount.begin())] = factor(i, j);
@@ -79,22 +86,21 @@ void Factors::add_angles(const algebra::NamedCovariance& uncertain) {
 }
 
 void Factors::add_geometry(const sensors::Sensor& sensor) {
-  const auto sigma = [&sensor](const std::string& name) {
-    const sensors::Knowledge* known = sensor.find_knowledge(name);
-    return known == nullptr ? 0.0 : known->sigma;
-  };
-  if (model_.options.beam_origin) {
-    Index row = all_places() + prisms();
-    for (const PrismSize& size : model_.sizes) {
-      CommonFactor common = nothing(size.name);
-      common.weights[row++] = sigma(size.name);
-      keep(std::move(common));
-    }
-  }
   const auto& names = sensor.covariance_names;
-  if (std::find(names.begin(), names.end(), kRangeOffset) != names.end()) return;
+  const auto is_joint = [&names](const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  for (std::size_t i = 0; i < model_.sizes.size(); ++i) {
+    const PrismSize& size = model_.sizes[i];
+    if (is_joint(size.name)) continue;
+    CommonFactor common = nothing(size.name);
+    common.weights[size_row(static_cast<Index>(i))] = sensors::prism_size_sigma(sensor, size);
+    keep(std::move(common));
+  }
+  const sensors::Knowledge* offset = sensor.find_knowledge(kRangeOffset);
+  if (offset == nullptr || is_joint(kRangeOffset)) return;
   CommonFactor common = nothing(kRangeOffset);
-  common.range_offset = sigma(kRangeOffset);
+  common.range_offset = std::max(offset->sigma, offset->total_sigma);
   keep(std::move(common));
 }
 

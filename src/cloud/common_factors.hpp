@@ -20,7 +20,7 @@ class Factors {
  public:
   Factors(PointingModel& model, const SensorBelief& belief);
 
-  /// The quantities may be parameters, the range offset and those of a mount.
+  /// The quantities may be parameters, sizes of prisms, the range offset and those of a mount.
   /// @param moves_beam    errors of the parameters move the beam at given rotation angles
   /// @param moves_angles  they also move the rotation angles that were found
   void add(const algebra::NamedCovariance& uncertain, bool moves_beam, bool moves_angles);
@@ -28,7 +28,7 @@ class Factors {
   /// What errors of the believed parameters do to the rotation angles, as one factor per prism.
   void add_angles(const algebra::NamedCovariance& uncertain);
 
-  /// Those of the prisms' sizes and, where the calibration's covariance has none, the range offset.
+  /// Those of the prisms' sizes and of the range offset that the calibration's covariance has not.
   void add_geometry(const sensors::Sensor& sensor);
 
   /// Leaves only the places that some factor has.
@@ -38,6 +38,9 @@ class Factors {
   int prisms() const { return model_.train.prisms(); }
   /// Length of the flat parameter vector.
   int all_places() const { return parameter_count(model_.train.shape()); }
+
+  /// Row of a factor's weights. @param size  row of PointingModel::sizes
+  Eigen::Index size_row(Eigen::Index size) const { return all_places() + prisms() + size; }
 
   CommonFactor nothing(std::string name) const;
   void move_angles(const std::string& name, double value, CommonFactor& common) const;

@@ -8,7 +8,9 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/parameter_agreement.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 #include "cloud/common_factors.hpp"
 #include "cloud/pointing_kernel.hpp"
@@ -19,13 +21,17 @@ namespace {
 using algebra::NamedCovariance;
 using Eigen::Index;
 
-/// Those of a calibration that a point depends on: not its speeds and rotation angles.
-NamedCovariance calibrated(const sensors::Sensor& sensor) {
+/// Those of a calibration that a point depends on: not its speeds and rotation angles, and sizes of
+/// the prisms only where beams start at the last one.
+NamedCovariance calibrated(const sensors::Sensor& sensor, const PointingOptions& options) {
   NamedCovariance result;
   std::vector<Index> rows;
   for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
     const std::string& name = sensor.covariance_names[i];
-    if (name != kRangeOffset && find_parameter(name, sensor.shape()).kind != ParameterKind::train) {
+    if (sensors::find_prism_size(name, sensor.prisms())) {
+      if (!options.beam_origin) continue;
+    } else if (name != kRangeOffset &&
+               find_parameter(name, sensor.shape()).kind != ParameterKind::train) {
       continue;
     }
     result.names.push_back(name);
@@ -42,16 +48,27 @@ NamedCovariance believed(const SensorBelief& belief) {
   return result;
 }
 
-/// What a sensor that was not calibrated says of the parameters that a belief has.
-NamedCovariance assumed(const sensors::Sensor& sensor, const SensorBelief& belief) {
-  NamedCovariance result = believed(belief);
-  result.matrix.setZero();
-  for (std::size_t j = 0; j < belief.free.size(); ++j) {
-    const sensors::Knowledge* known = sensor.find_knowledge(belief.free[j].name);
-    const auto at = static_cast<Index>(j);
-    if (known != nullptr) result.matrix(at, at) = known->sigma * known->sigma;
+/// What a sensor that was not calibrated says of some parameters.
+NamedCovariance assumed(const sensors::Sensor& sensor,
+                        const std::vector<estimation::FreeParameter>& parameters) {
+  NamedCovariance result;
+  const auto count = static_cast<Index>(parameters.size());
+  result.matrix = Eigen::MatrixXd::Zero(count, count);
+  for (Index j = 0; j < count; ++j) {
+    result.names.push_back(parameters[static_cast<std::size_t>(j)].name);
+    const sensors::Knowledge* known = sensor.find_knowledge(result.names.back());
+    if (known != nullptr) result.matrix(j, j) = known->sigma * known->sigma;
   }
   return result;
+}
+
+/// All that a sensor that was not calibrated says of its parameters.
+NamedCovariance assumed(const sensors::Sensor& sensor, const SensorBelief& belief) {
+  std::vector<estimation::FreeParameter> all = belief.free;
+  for (estimation::FreeParameter& held : estimation::uncertain_held(sensor, belief.free)) {
+    all.push_back(std::move(held));
+  }
+  return assumed(sensor, all);
 }
 
 void require_belief(const SensorBelief& belief) {
@@ -83,7 +100,7 @@ sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
     const int place = belief.free[static_cast<std::size_t>(j)].places.front();
     off[j] = belief.sensor.train[place] - calibration.train[place];
   }
-  const Eigen::MatrixXd covariance = belief.covariance + assumed(calibration, belief).matrix;
+  const Eigen::MatrixXd covariance = belief.covariance + assumed(calibration, belief.free).matrix;
   return estimation::disagreement(off, covariance).same_sensor() ? CalibrationReference::directions
                                                                  : CalibrationReference::planes;
 }
@@ -124,12 +141,11 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
   if (options.beam_origin) model.geometry = calibration.geometry;
   model.range_offset = calibration.range_offset;
   model.angle_noise = belief.angle_noise;
-  for (const PrismSize& size : own_prism_sizes(calibration.prisms())) {
-    if (calibration.find_knowledge(size.name) != nullptr) model.sizes.push_back(size);
-  }
+  model.sizes.clear();
+  if (options.beam_origin) model.sizes = sensors::uncertain_prism_sizes(calibration);
   Factors factors(model, belief);
   const bool smoothed = !options.reported_directions;
-  NamedCovariance uncertain = !type    ? calibrated(calibration)
+  NamedCovariance uncertain = !type    ? calibrated(calibration, options)
                               : planes ? assumed(calibration, belief)
                                        : believed(belief);
   if (mount) {

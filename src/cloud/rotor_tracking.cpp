@@ -16,6 +16,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/parameter_agreement.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -53,7 +54,7 @@ void choose_parameters(const sensors::Sensor& calibration, estimation::EstimateO
     if (std::find(names.begin(), names.end(), name) == names.end()) options.fixed.push_back(name);
   }
   for (const std::string& name : names) {
-    if (name == "range_offset_m") continue;
+    if (name == "range_offset_m" || sensors::find_prism_size(name, calibration.prisms())) continue;
     if (find_parameter(name, calibration.shape()).kind != ParameterKind::train) continue;
     if (std::find(defaults.begin(), defaults.end(), name) == defaults.end()) {
       options.additional.push_back(name);

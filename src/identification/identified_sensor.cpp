@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -38,6 +39,10 @@ Round round_of(const Identification& identification) {
   return round;
 }
 
+/// Sizes of the prisms that presets assume where nobody knows them, m.
+constexpr double kThickness = 0.007, kThicknessSigma = 0.005;
+constexpr double kSpacing = 0.030, kSpacingSigma = 0.020;
+
 const char* const kFound = "identified from the directions of a recording";
 
 }  // namespace
@@ -62,7 +67,7 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
   sensor.reference = sensors::CalibrationReference::none;
   sensor.device_type = 0;
   sensor.train = model.train;
-  sensor.geometry = {};
+  sensor.geometry = {{kThickness}, {kSpacing}};
   sensor.shot_rate = 1 / identification.step;
   sensors::ScanSequence sequence;
   std::vector<int> order(static_cast<std::size_t>(emitters));
@@ -125,6 +130,7 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
     widest = std::max(widest, std::acos(std::cos(azimuth) * std::cos(elevation)));
   }
   sensor.field_of_view = 2 * widest;
+  sensor.pointing_tolerance = 0;  // nobody has specified this one
   sensor.angle_noise = best.fit.rms;
 
   const auto sigma_of = [&](const std::string& parameter) -> std::optional<double> {
@@ -155,6 +161,10 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
   }
   sensor.set_knowledge({"angle_noise_deg", 0, fmt::format("residuals, {}", kFound)});
   sensor.set_knowledge({"field_of_view_deg", 0, fmt::format("the widest shot, {}", kFound)});
+  for (const auto& [size, sigma] : {std::pair{"prism_thickness_m", kThicknessSigma},
+                                    std::pair{"prism_spacing_m", kSpacingSigma}}) {
+    sensor.set_knowledge({size, sigma, "assumed, as of a Mid-40: directions do not show it"});
+  }
   sensor.set_knowledge({"shot_rate_hz", 0, fmt::format("times of the shots, {}", kFound)});
   for (const char* assumed :
        {"range_noise_m", "range_resolution_m", "angle_resolution_deg", "range_minimum_m",

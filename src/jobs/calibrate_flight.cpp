@@ -33,6 +33,7 @@ void check_flight_options(const CalibrateFlightOptions& options) {
   if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
   if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
   check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
+  if (options.tolerance) check_not_negative(*options.tolerance, "tolerance", "rad");
   check_positive(options.knot_spacing, "knot_spacing", "s");
   check_positive(options.cell_size, "cell_size", "m");
   if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
@@ -119,6 +120,7 @@ calibration::FlightCalibrationOptions settings_of(const CalibrateFlightOptions& 
   settings.errors = *platform.errors;
   settings.range_noise = options.range_noise;
   settings.range_offset_sigma = options.range_offset_sigma;
+  settings.tolerance = options.tolerance;
   if (options.prior_sigma) settings.angle_sigma = *options.prior_sigma;
   settings.rotation_angle_sigma = flight.rotation_angle_sigma;
   settings.knot_spacing = options.knot_spacing;
@@ -141,6 +143,7 @@ void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& resul
   const CalibrationCode code = found.verdict.code;
   const bool sound = code != CalibrationCode::not_better && code != CalibrationCode::undecided;
   if (found.converged && (sound || options.force)) {
+    result.calibration_written = true;
     sensors::Sensor calibrated = found.sensor;
     calibrated.provenance = result.provenance;
     folder.add_calibration(calibrated);

@@ -26,6 +26,7 @@ calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOption
   if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
   if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
   check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
+  if (options.tolerance) check_not_negative(*options.tolerance, "tolerance", "rad");
   if (options.method == calibration::CalibrationMethod::paper &&
       (options.planes || !options.stations.empty() || options.prior_sigma)) {
     throw InvalidArgument(
@@ -40,6 +41,7 @@ calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOption
   result.range_noise = options.range_noise;
   result.prior_sigma = options.prior_sigma;
   result.range_offset_sigma = options.range_offset_sigma;
+  result.tolerance = options.tolerance;
   result.beam_origin = options.beam_origin;
   result.planes = options.planes;
   result.stations = options.stations;
@@ -52,13 +54,14 @@ std::string states_name(const CalibrateRecordingsOptions& options, std::size_t r
   return options.recordings.size() == 1 ? "states.nc" : fmt::format("states_{}.nc", recording + 1);
 }
 
-/// calibration.yaml; what did not converge is no calibration, nor what is not better.
+/// calibration.yaml, unless the sensor's own belief serves as well or better.
 void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings& result,
                  ResultFolder& folder, InputHashes& hashes, const Progress& progress) {
   result.provenance = hashes.with_inputs(options.files.provenance);
   result.provenance.emplace_back("datum", calibration::to_string(result.calibration.datum_kind));
-  const bool better = result.calibration.verdict.code != calibration::CalibrationCode::not_better;
+  const bool better = calibration::improves(result.calibration.verdict.code);
   if (result.calibration.converged && (better || options.force)) {
+    result.calibration_written = true;
     sensors::Sensor calibrated = result.calibration.sensor;
     calibrated.provenance = result.provenance;
     folder.add_calibration(calibrated);

@@ -291,7 +291,8 @@ class PlanReader {
   CalibrateRecordingsOptions calibrate_of(const YamlMap& map, const SimulationOptions& simulation,
                                           const std::vector<std::string>& stations) {
     map.allow_only({"method", "rate_hz", "sensor", "noise_angle_deg", "noise_range_m",
-                    "beam_origin", "planes", "known_stations", "prior_sigma_deg", "fix", "free"});
+                    "beam_origin", "planes", "known_stations", "prior_sigma_deg", "tolerance_deg",
+                    "fix", "free"});
     CalibrateRecordingsOptions job;
     take_common(map, simulation, job);
     if (choice(map, "method", {"adjustment", "paper"}) == "paper") {
@@ -299,6 +300,7 @@ class PlanReader {
     }
     job.range_noise = number(map, "noise_range_m", kMostDistance, "m");
     job.prior_sigma = number(map, "prior_sigma_deg", kMostAngle_deg, "deg", kRadiansPerDegree);
+    job.tolerance = number(map, "tolerance_deg", kMostAngle_deg, "deg", kRadiansPerDegree);
     job.beam_origin = map.yes("beam_origin", true);
     if (map.find("planes") != nullptr) job.planes = scenes::load_scene(file(map.text("planes")));
     if (map.yes("known_stations")) {

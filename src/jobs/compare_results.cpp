@@ -23,6 +23,7 @@
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -51,7 +52,7 @@ std::vector<std::string> held_names(const Sensor& sensor) {
 bool hold_alike(const Sensor& a, const Sensor& b) {
   const std::vector<std::string> held = held_names(a);
   return held == held_names(b) && std::all_of(held.begin(), held.end(), [&](const auto& name) {
-           return a.get(name) == b.get(name);
+           return value_of(a, name) == value_of(b, name);
          });
 }
 
@@ -74,7 +75,8 @@ bool is_shared(const PrismTrain& train, const ParameterInfo& parameter) {
                      [&](int place) { return train[place] == train[parameter.places.front()]; });
 }
 
-/// Every place of the train once: what all prisms share by its name for all.
+/// Every place of the train once: what all prisms share by its name for all; the range offset, and
+/// sizes of prisms that a calibration found.
 std::vector<ParameterDifference> differences(const Pair& pair) {
   const Sensor &a = pair.a, &b = pair.b;
   std::vector<ParameterDifference> result;
@@ -87,6 +89,11 @@ std::vector<ParameterDifference> differences(const Pair& pair) {
     result.push_back(difference_of(one.name, pair, a.get(one.name), b.get(one.name)));
   }
   result.push_back(difference_of(kRangeOffset, pair, a.range_offset, b.range_offset));
+  for (const PrismSize& size : own_prism_sizes(b.prisms())) {
+    if (pair.known_a.find(size.name) < 0 && pair.known_b.find(size.name) < 0) continue;
+    result.push_back(
+        difference_of(size.name, pair, sensors::prism_size(a, size), sensors::prism_size(b, size)));
+  }
   return result;
 }
 
@@ -145,11 +152,13 @@ ChangeTest test_of_change(const Pair& pair, const NamedCovariance& sum) {
 }  // namespace
 
 double value_of(const Sensor& sensor, const std::string& name) {
-  return name == kRangeOffset ? sensor.range_offset : sensor.get(name);
+  if (name == kRangeOffset) return sensor.range_offset;
+  const std::optional<PrismSize> size = sensors::find_prism_size(name, sensor.prisms());
+  return size ? sensors::prism_size(sensor, *size) : sensor.get(name);
 }
 
 FileUnit file_unit_of(const std::string& name, TrainShape shape) {
-  if (name == kRangeOffset) return {"m", 1};
+  if (name == kRangeOffset || sensors::find_prism_size(name, shape.prisms)) return {"m", 1};
   const ParameterInfo& parameter = find_parameter(name, shape);
   return {parameter.unit, parameter.si_per_unit};
 }

@@ -104,7 +104,14 @@ Json of(const jobs::CalibratedRecordings& found) {
       {"datum", datum_json(c.datum_kind, c.datum)},
       {"datum_given_held", datum_json(c.datum_kind, c.datum_given_held)},
       {"pointing_error", pointing_json(c.pointing_error)},
+      {"tolerance_deg", tolerance_json(c.tolerance)},
+      {"beyond_tolerance_probability",
+       c.tolerance > 0
+           ? number_or_null(calibration::beyond_probability(
+                 c.pointing_error.errors.total, c.pointing_error.total_sigma, c.tolerance))
+           : Json()},
       {"better_probability", number_or_null(c.better_probability)},
+      {"calibration_written", found.calibration_written},
       {"prior_tests", tests},
       {"unobservable", unobservable_json(c.unobservable)},
       {"before", {{"plane_rms_m", c.rms_before}}},

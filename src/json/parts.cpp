@@ -83,6 +83,8 @@ Json pointing_json(const calibration::PointingError& pointing) {
             {"yaw", deg(errors.rotation.z)}}}};
 }
 
+Json tolerance_json(double tolerance) { return tolerance > 0 ? Json(deg(tolerance)) : Json(); }
+
 Json errors_json(const calibration::DirectionErrors& e) {
   return {{"azimuth_rmse_deg", deg(e.azimuth_rmse)},
           {"zenith_rmse_deg", deg(e.zenith_rmse)},

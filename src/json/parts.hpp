@@ -58,6 +58,9 @@ std::vector<std::string> all_warnings(const std::vector<std::string>& of_job,
 
 /// How far directions are off, with sigmas.
 Json pointing_json(const calibration::PointingError& pointing);
+/// An error that is tolerated; null where none is.
+/// @param tolerance  rad; 0: none
+Json tolerance_json(double tolerance);
 /// Errors of directions against a known truth.
 Json errors_json(const calibration::DirectionErrors& errors);
 

@@ -124,6 +124,9 @@ ResultColumns::ResultColumns() {
   }
   real(after_, "better_probability", "1", "that calibrated directions are nearer to the truth",
        "/better_probability");
+  real(after_, "tolerance_deg", "deg", "error of directions that is tolerated", "/tolerance_deg");
+  real(after_, "beyond_tolerance_probability", "1", "that reported directions are off by more",
+       "/beyond_tolerance_probability");
   real(after_, "plane_rms_before_m", "m", "distance of the points from their planes",
        "/before/plane_rms_m");
   real(after_, "plane_rms_after_m", "m", "the same after the calibration", "/after/plane_rms_m");

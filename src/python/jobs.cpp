@@ -180,6 +180,7 @@ void take_recordings(const Options& options, Job& job) {
   options.take("mirrored", job.mirrored);
   options.take("seed", job.seed);
   options.take("truth", job.truths);
+  options.take("tolerance", job.tolerance);
   options.take("force", job.force);
   job.files = result_files(options, "calibrate");
   job.details = true;

@@ -126,6 +126,9 @@ void bind_sensors(py::module_& module) {
       .def_readonly("range_minimum", &Sensor::range_minimum, "No return below, m.")
       .def_readonly("range_maximum", &Sensor::range_maximum, "No return beyond, m.")
       .def_readonly("field_of_view", &Sensor::field_of_view, "Full cone, rad.")
+      .def_readonly("pointing_tolerance", &Sensor::pointing_tolerance,
+                    "Root mean square error of directions that the manufacturer allows, rad; 0: "
+                    "not stated.")
       .def_readonly("shot_rate", &Sensor::shot_rate, "Shots per second.")
       .def_property_readonly(
           "prism_thickness", [](const Sensor& sensor) { return sensor.geometry.thickness; },

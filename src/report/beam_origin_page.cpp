@@ -8,8 +8,10 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::report {
 namespace {
@@ -47,12 +49,18 @@ std::vector<double> difference(const std::vector<double>& greatest,
   return result;
 }
 
-/// Sizes of prisms in beam order.
-std::string millimetres_text(const std::vector<double>& sizes) {
-  if (sizes.empty()) return "0";
+/// Thicknesses or spacings of prisms in beam order, with what is known of them: "7 ± 1".
+std::string millimetres_text(const sensors::Sensor& sensor, bool thickness) {
+  const std::vector<double>& values =
+      thickness ? sensor.geometry.thickness : sensor.geometry.spacing;
   std::string text;
-  for (const double size : sizes) {
-    text += fmt::format("{}{}", text.empty() ? "" : ", ", kMillimetres * size);
+  for (const PrismSize& size :
+       values.size() > 1 ? own_prism_sizes(sensor.prisms()) : shared_prism_sizes()) {
+    if (size.rate.thickness.empty() == thickness) continue;
+    text += fmt::format("{}{}", text.empty() ? "" : ", ",
+                        kMillimetres * sensors::prism_size(sensor, size));
+    const double sigma = sensors::prism_size_sigma(sensor, size);
+    if (sigma > 0) text += fmt::format(" ± {}", plain_text(kMillimetres * sigma, 2));
   }
   return text;
 }
@@ -65,8 +73,8 @@ std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& se
   const std::string head = fmt::format(
       "<p>Prisms {} mm thick with perpendicular faces {} mm apart shift the beam sideways. {} "
       "beams, cells of {} degree.</p>\n",
-      millimetres_text(sensor.geometry.thickness), millimetres_text(sensor.geometry.spacing),
-      map.beams, degrees_from_radians(map.cell));
+      millimetres_text(sensor, true), millimetres_text(sensor, false), map.beams,
+      degrees_from_radians(map.cell));
   Sections sections;
   if (map.size() > 0) {
     sections.add("Horizontal (Y)",

@@ -12,6 +12,7 @@
 #include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::report {
 namespace {
@@ -66,6 +67,12 @@ struct InUnits {
 InUnits in_units(const ParameterDifference& one, TrainShape shape) {
   if (one.name == jobs::kRangeOffset) {
     return {parameter_head("range offset", "r_0", one.name), 1};
+  }
+  if (const auto size = sensors::find_prism_size(one.name, shape.prisms)) {
+    const bool thickness = !size->rate.thickness.empty();
+    return {parameter_head(thickness ? "thickness of a prism" : "spacing of two prisms",
+                           thickness ? "d" : "s", one.name),
+            1};
   }
   const ParameterInfo& info = find_parameter(one.name, shape);
   return {parameter_head(info), 1 / info.si_per_unit};

@@ -28,6 +28,8 @@ constexpr Headline kHeadlines[] = {
     {"consistent", "ok", "The sensor's directions agree with what it believes of its optics."},
     {"unusual", "care", "The model describes this recording, but something about it is unusual."},
     {"as_believed", "ok", "The sensor points where it believes."},
+    {"off_within_tolerance", "ok",
+     "The sensor is off, but within the tolerance; this calibration makes its clouds better."},
     {"bent", "care", "The sensor does not point where it believes: use this calibration."},
     {"not_better", "bad",
      "This calibration is no better than what the sensor believes: do not use it."},

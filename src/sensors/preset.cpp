@@ -17,6 +17,7 @@
 #include "risley/io/yaml_covariance.hpp"
 #include "risley/io/yaml_map.hpp"
 #include "risley/io/yaml_output.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 #include "sensors/builtin_presets.hpp"
 
@@ -76,6 +77,8 @@ constexpr std::array kSpecifications{
     Specification{"limits", "range_minimum_m", "m", &Sensor::range_minimum, 0, 1e5},
     Specification{"limits", "range_maximum_m", "m", &Sensor::range_maximum, 1e-3L, 1e6},
     Specification{"limits", "field_of_view_deg", "deg", &Sensor::field_of_view, 0, 360},
+    Specification{"limits", "pointing_tolerance_deg", "deg", &Sensor::pointing_tolerance, 0, 10,
+                  true},
     Specification{"rates", "shot_rate_hz", "Hz", &Sensor::shot_rate, 1e-3L, 1e9},
     Specification{"beam", "beam_divergence_horizontal_deg", "deg",
                   &Sensor::beam_divergence_horizontal, 0, 90},
@@ -104,7 +107,8 @@ std::vector<std::string_view> section_names() {
 /// Of the values that a covariance can name.
 io::ScaleOfName covariance_scale(const Sensor& sensor) {
   return [shape = sensor.shape()](const std::string& name) {
-    return name == "range_offset_m" ? 1.0L : scale_of(find_parameter(name, shape).unit);
+    if (name == "range_offset_m" || find_prism_size(name, shape.prisms)) return 1.0L;
+    return scale_of(find_parameter(name, shape).unit);
   };
 }
 

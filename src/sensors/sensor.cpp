@@ -9,6 +9,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::sensors {
 namespace {
@@ -97,6 +98,16 @@ void Sensor::set_prism_geometry(const PrismGeometry& sizes) {
   geometry = sizes;
   std::erase_if(knowledge, [](const Knowledge& entry) {
     return entry.name.starts_with("prism_thickness_") || entry.name.starts_with("prism_spacing_");
+  });
+  std::vector<Eigen::Index> kept;
+  for (std::size_t i = 0; i < covariance_names.size(); ++i) {
+    if (!find_prism_size(covariance_names[i], prisms()))
+      kept.push_back(static_cast<Eigen::Index>(i));
+  }
+  if (kept.size() == covariance_names.size()) return;
+  covariance = covariance(kept, kept).eval();
+  std::erase_if(covariance_names, [&](const std::string& name) {
+    return find_prism_size(name, prisms()).has_value();
   });
 }
 

@@ -145,6 +145,26 @@ class CalibrateTest(CommandTest):
         for word in ("converged", "incident_beam_vertical_deg", "range offset", "datum", "after"):
             self.assertIn(word, text)
 
+    def test_tolerance(self):
+        """The unit is off by 0.403 degree, whatever is tolerated; the verdict and its words say what that means."""
+        for options, code, tolerance, words in (
+                ((), "bent", 0.1, "; that is beyond the tolerance of 0.1 degree"),
+                (("--tolerance-deg", "0.5"), "off_within_tolerance", 0.5,
+                 "; that is within the tolerance of 0.5 degree"),
+                (("--tolerance-deg", "0"), "bent", None, " at worst")):
+            folder = f"tolerance-{tolerance}"
+            result = self.expect_json(0, "calibrate", "hall.nc", *options, "-o", folder)
+            self.assertEqual(result["verdict"]["code"], code)
+            self.assertTrue(result["verdict"]["words"].endswith(words), result["verdict"]["words"])
+            self.assertEqual((result["tolerance_deg"] is None), tolerance is None)
+            if tolerance is not None:
+                self.assertAlmostEqual(result["tolerance_deg"], tolerance)
+                self.assertAlmostEqual(result["beyond_tolerance_probability"], code == "bent", delta=1e-3)
+            self.assertIs(result["calibration_written"], True)
+            self.assertTrue((self.folder / folder / "calibration.yaml").exists())
+        self.assertIn("--tolerance-deg", self.expect(
+            2, "calibrate", "hall.nc", "--tolerance-deg", "-1").stderr)
+
     def test_calibration_is_a_sensor(self):
         self.expect(0, "calibrate", "hall.nc", "-o", "sensor", "--states", "none")
         self.assertEqual({path.name for path in (self.folder / "sensor").iterdir()},

@@ -79,6 +79,8 @@ class ChainTest(CommandTest):
         self.assertLess(len(page), 4_000_000)
         calibration = (self.folder / "out" / "calibration.yaml").read_text(encoding="utf-8")
         self.assertIn(digest(self.folder / "unit.lvx"), calibration)
+        # What the preset states of sizes, which directions do not show, goes along.
+        self.assertRegex(calibration, r"prism_thickness_m: \{value: 0.007, unit: \"m\", sigma: 0.001, ")
         # A calibration is a preset: it serves as a sensor.
         again = self.expect_json(0, "estimate", "unit.lvx", "--sensor", "out/calibration.yaml")
         self.assertTrue(again["converged"])

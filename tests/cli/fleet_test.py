@@ -75,6 +75,7 @@ class FleetTest(CommandTest):
             self.assertEqual(float(row["prism_tilt_a_vertical_deg"]), tilt["value"])
             self.assertEqual(float(row["sigma_prism_tilt_a_vertical_deg"]), tilt["sigma"])
             self.assertEqual(float(row["pointing_error_total_deg"]), one["pointing_error"]["total_deg"]["value"])
+            self.assertEqual(float(row["tolerance_deg"]), one["tolerance_deg"])
             self.assertEqual(int(row["planes"]), len(one["planes"]))
             # The same as of this recording alone.
             alone = self.expect_json(0, "calibrate", one["input"])

@@ -117,10 +117,18 @@ class StoryTest(CommandTest):
         first, _ = self.tell(0, "estimate", "perfect.nc", folder="perfect-1")
         self.assertEqual(first["verdict"]["code"], "consistent")
         self.assertIn(PROVISO, self.page_of("perfect-1")[0])
-        found, _ = self.tell(0, "calibrate", "perfect.nc", folder="perfect-2")
+        found, said = self.tell(0, "calibrate", "perfect.nc", folder="perfect-2")
         self.assertEqual(found["verdict"]["code"], "as_believed")
         total = found["pointing_error"]["total_deg"]
         self.assertLess(total["value"], 4 * found["datum"]["sigma_total_deg"])
+        # What the sensor believes is as good: there is no calibration, unless it is forced.
+        self.assertIn("calibration.yaml was not written, because what the sensor believes is as good: --force",
+                      said.stderr)
+        self.assertIs(found["calibration_written"], False)
+        self.check_nothing_written("perfect", "perfect-2")
+        found, said = self.tell(0, "calibrate", "perfect.nc", "--force", folder="perfect-2")
+        self.assertIs(found["calibration_written"], True)
+        self.assertNotIn("not written", said.stderr)
         again, _ = self.tell(0, "estimate", "perfect.nc", "--sensor", "perfect-2", folder="perfect-3")
         self.assertEqual((again["verdict"]["code"], again["verdict"]["to_do"]), ("consistent", "nothing"))
         self.assertIn("and so is its calibration", again["verdict"]["words"])
@@ -167,8 +175,8 @@ class StoryTest(CommandTest):
             self.assertIn(noise, text)
         if found["verdict"]["code"] == "not_better":
             self.check_pointing(found, said, "noisy-2")
-            self.check_nothing_written("noisy", "noisy-2")
-            self.expect(0, "calibrate", "noisy.nc", "--force", "-o", "noisy-2")
+        self.check_nothing_written("noisy", "noisy-2")
+        self.expect(0, "calibrate", "noisy.nc", "--force", "-o", "noisy-2")
         again, _ = self.tell(0, "estimate", "noisy.nc", "--sensor", "noisy-2", folder="noisy-3")
         self.assertEqual(again["verdict"]["code"], "unusual")
         self.assertIn(noise, again["verdict"]["words"])

@@ -896,6 +896,85 @@ TEST(PointingModel, CalibratedAgainstPlanesHasErrorsOfBothTrains) {
   expect_same_covariance(covariance_of_factors(model), stated);
 }
 
+/// Sigma of the point that all factors together give to a size of the model, m.
+double sigma_of_size(const PointingModel& model, const std::string& name) {
+  const auto first =
+      static_cast<Index>(model.places.size()) + static_cast<Index>(model.train.prisms());
+  for (std::size_t i = 0; i < model.sizes.size(); ++i) {
+    if (model.sizes[i].name != name) continue;
+    double variance = 0;
+    for (const CommonFactor& factor : model.factors) {
+      variance += std::pow(factor.weights[first + static_cast<Index>(i)], 2);
+    }
+    return std::sqrt(variance);
+  }
+  return 0;
+}
+
+// What walls found of prisms and their sizes goes together, and the preset's sigmas are replaced.
+TEST(PointingModel, TakesSizesOfPrismsJointlyWithTheOthers) {
+  Case one(CalibrationReference::planes);
+  auto& names = one.calibration.covariance_names;
+  const std::vector<std::string> sizes = {"prism_thickness_a_m", "prism_thickness_b_m",
+                                          "prism_spacing_a_m"};
+  const auto n = static_cast<Index>(names.size());
+  names.insert(names.end(), sizes.begin(), sizes.end());
+  VectorXd sigma = typical_sigmas(names);
+  sigma.tail(3) << 0.4e-3, 0.3e-3, 2e-3;
+  one.calibration.covariance = correlated(sigma, 21);
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  std::vector<std::string> found;
+  for (const PrismSize& size : model.sizes) found.push_back(size.name);
+  EXPECT_EQ(found, sizes);
+  std::vector<std::string> expected = names;
+  for (const char* own : {"rotation_angle_a_deg", "rotation_angle_b_deg"}) expected.push_back(own);
+  EXPECT_EQ(names_of(model), expected);
+  for (Index i = 0; i < 3; ++i) {
+    EXPECT_NEAR(sigma_of_size(model, sizes[static_cast<std::size_t>(i)]), sigma[n + i], 1e-12);
+  }
+  // The same covariance between a tilt and a size.
+  const auto place = find_parameter("prism_tilt_b_vertical_deg", {2}).places.front();
+  const auto tilt = std::find(names.begin(), names.end(), "prism_tilt_b_vertical_deg");
+  const auto row =
+      std::find(model.places.begin(), model.places.end(), place) - model.places.begin();
+  double covariance = 0;
+  for (const CommonFactor& factor : model.factors) {
+    covariance += factor.weights[row] *
+                  factor.weights[static_cast<Index>(model.places.size()) + 2];  // thickness of A
+  }
+  EXPECT_NEAR(covariance, one.calibration.covariance(tilt - names.begin(), n),
+              1e-9 * sigma[0] * sigma[n]);
+
+  // Beams that start at the frame's origin know no sizes; what the others say stays.
+  PointingOptions from_zero;
+  from_zero.beam_origin = false;
+  const PointingModel thin = pointing_model(one.calibration, one.belief, from_zero);
+  EXPECT_TRUE(thin.sizes.empty());
+  EXPECT_EQ(names_of(thin).size(), expected.size() - 3);
+}
+
+TEST(PointingModel, ASizeThatIsStatedCountsWhereTheCovarianceHasNone) {
+  Case one(CalibrationReference::planes);
+  one.calibration.set_knowledge({"prism_thickness_m", 0.001, "measured", 0.004});
+  one.calibration.covariance_names.emplace_back("prism_spacing_a_m");
+  VectorXd sigma = typical_sigmas(one.calibration.covariance_names);
+  sigma.tail(1) << 2e-3;
+  one.calibration.covariance = correlated(sigma, 22);
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  EXPECT_EQ(model.sizes.size(), 2u);
+  EXPECT_EQ(sigma_of_size(model, "prism_thickness_m"), 0.004);  // with what was held
+  EXPECT_NEAR(sigma_of_size(model, "prism_spacing_a_m"), 2e-3, 1e-12);
+}
+
+// Everything that a preset states counts, also of what no recording tells.
+TEST(PointingModel, OfATypeTakenAtItsWordCountsWhatWasHeldToo) {
+  Case one(CalibrationReference::none);
+  one.calibration.set_knowledge({"wedge_angle_deg", 1e-4, "assumed"});
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  ASSERT_EQ(model.reference, CalibrationReference::planes);
+  EXPECT_THAT(names_of(model), ::testing::Contains("wedge_angle_deg"));
+}
+
 // Names that are no parameters of the beam have no factor.
 TEST(PointingModel, LeavesOutSpeedsOfACalibration) {
   Case one(CalibrationReference::directions);

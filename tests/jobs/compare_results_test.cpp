@@ -111,6 +111,25 @@ TEST_F(CompareResults, LeavesOutWhatBothHeldAlike) {
   EXPECT_FALSE(elsewhere.held_alike);
 }
 
+// Sizes of prisms that walls found are compared, too, and say nothing of the directions.
+TEST_F(CompareResults, TellsSizesOfPrismsApart) {
+  sensors::Sensor one = result("A1");
+  one.geometry = {{0.007, 0.007}, {0.03}};
+  one.covariance_names.emplace_back("prism_thickness_b_m");
+  one.covariance.conservativeResizeLike(Eigen::MatrixXd::Zero(3, 3));
+  one.covariance(2, 2) = 1e-8;
+  one.covariance(1, 2) = one.covariance(2, 1) = 1e-10;
+  sensors::Sensor other = one;
+  other.geometry.thickness[1] = 0.008;
+  const ResultComparison c = compare_results(saved("a", one), saved("b", other));
+  EXPECT_NEAR(row(c, "prism_thickness_b_m").difference, 0.001, 1e-12);
+  EXPECT_NEAR(row(c, "prism_thickness_b_m").sigma, std::sqrt(2e-8), 1e-9);
+  EXPECT_EQ(c.change.degrees_of_freedom, 1);
+  EXPECT_EQ(c.change.chi2, 0);
+  EXPECT_EQ(c.beams.errors.total, 0);
+  EXPECT_EQ(file_unit_of("prism_thickness_b_m", {2}).unit, "m");
+}
+
 // Of one parameter that is not held alike: a squared normal value, which is beyond 1.96 sigmas with
 // a probability of 5 %.
 TEST_F(CompareResults, TestsWhetherTheUnitChanged) {

@@ -21,6 +21,8 @@ TEST(BeamOriginPage, ShowsSixMapsWithTheirExtremes) {
     ++maps;
   }
   EXPECT_EQ(maps, 6U);
+  EXPECT_THAT(page, ::testing::HasSubstr("Prisms 7 ± 1 mm thick"));
+  EXPECT_THAT(page, ::testing::HasSubstr("faces 30 ± 3 mm apart"));
   EXPECT_THAT(page, ::testing::HasSubstr("From -4.4 to"));
   EXPECT_THAT(page, ::testing::HasSubstr("to 4.4 mm"));
   EXPECT_THAT(page, ::testing::HasSubstr("risley cloud &lt;x&gt;"));

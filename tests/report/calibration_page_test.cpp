@@ -285,6 +285,10 @@ TEST(CalibrationPage, OfABentUnitSaysByHowMuchAndWhere) {
   }
   page.calibration.verdict.code = calibration::CalibrationCode::not_better;
   EXPECT_THAT(visible(page.html()), HasSubstr("class=\"verdict bad\""));
+  page.calibration.verdict.code = calibration::CalibrationCode::off_within_tolerance;
+  const std::string within = visible(page.html());
+  EXPECT_THAT(within, HasSubstr("off, but within the tolerance"));
+  EXPECT_THAT(within, HasSubstr("<code>off_within_tolerance</code>"));
 }
 
 TEST(CalibrationPage, HasEverySection) {

@@ -74,8 +74,8 @@ void expect_same(const Sensor& a, const Sensor& b) {
   for (const auto member :
        {&Sensor::angle_noise, &Sensor::range_noise, &Sensor::angle_resolution,
         &Sensor::range_resolution, &Sensor::range_minimum, &Sensor::range_maximum,
-        &Sensor::field_of_view, &Sensor::shot_rate, &Sensor::beam_divergence_horizontal,
-        &Sensor::beam_divergence_vertical}) {
+        &Sensor::field_of_view, &Sensor::pointing_tolerance, &Sensor::shot_rate,
+        &Sensor::beam_divergence_horizontal, &Sensor::beam_divergence_vertical}) {
     EXPECT_EQ(a.*member, b.*member);
   }
   EXPECT_EQ(a.device_type, b.device_type);
@@ -119,6 +119,7 @@ TEST(Preset, Mid40HoldsThePapersNominalValues) {
   EXPECT_EQ(sensor.range_maximum, 260.0);
   EXPECT_EQ(sensor.range_noise, 0.02);
   EXPECT_NEAR(degrees_from_radians(sensor.field_of_view), 38.4, 1e-13);
+  EXPECT_NEAR(degrees_from_radians(sensor.pointing_tolerance), 0.1, 1e-15);  // section 1
   EXPECT_NEAR(degrees_from_radians(sensor.beam_divergence_horizontal), 0.03, 1e-15);
   EXPECT_NEAR(degrees_from_radians(sensor.beam_divergence_vertical), 0.28, 1e-15);
   // Sections 2.3 and 3.1, Appendix A

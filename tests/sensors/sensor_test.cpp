@@ -7,9 +7,11 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::sensors::sensor_test {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 TEST(Sensor, SetsAndGetsEveryParameterInSiUnits) {
@@ -153,6 +155,73 @@ TEST(PrismSizes, MayBeThePrismsOwnInAPreset) {
   EXPECT_THROW(parse_preset(with("value: 0.008", "value: -0.008"), "x"), FileError);
   sensor.geometry.thickness.pop_back();
   EXPECT_THROW(preset_text(sensor), InvalidArgument);
+}
+
+TEST(PrismSizes, AreStatedByEveryPreset) {
+  for (const std::string& name : builtin_preset_names()) {
+    SCOPED_TRACE(name);
+    const Sensor sensor = load_sensor(name);
+    EXPECT_EQ(sensor.geometry, (PrismGeometry{{0.007}, {0.030}}));
+    const bool paper = name.starts_with("mid-40");
+    for (const PrismSize& size : shared_prism_sizes()) {
+      const Knowledge* known = sensor.find_knowledge(size.name);
+      ASSERT_NE(known, nullptr);
+      EXPECT_EQ(known->source.starts_with("Brazeal"), paper);
+      EXPECT_THAT(known->source, HasSubstr("assumed"));
+    }
+    EXPECT_EQ(sensor.find_knowledge("prism_thickness_m")->sigma, paper ? 0.001 : 0.005);
+    EXPECT_EQ(sensor.find_knowledge("prism_spacing_m")->sigma, paper ? 0.003 : 0.020);
+  }
+}
+
+TEST(PrismSizes, MayBeInACovariance) {
+  Sensor sensor = load_sensor("mid-40");
+  sensor.covariance_names = {"prism_tilt_b_vertical_deg", "prism_thickness_a_m",
+                             "prism_spacing_a_m"};
+  sensor.covariance.resize(3, 3);
+  sensor.covariance << 1e-8, 1e-8, 1e-8, 1e-8, 1e-6, 1e-7, 1e-8, 1e-7, 9e-6;
+  const std::string text = preset_text(sensor);
+  const Sensor again = parse_preset(text, "again");
+  EXPECT_EQ(again.covariance_names, sensor.covariance_names);
+  EXPECT_EQ(again.covariance, sensor.covariance);
+  std::string wrong = text;
+  wrong.replace(wrong.find("prism_spacing_a_m"), 17, "prism_spacing_b_m");  // of three prisms
+  EXPECT_THROW(parse_preset(wrong, "x"), FileError);
+  // Thin prisms have no sizes.
+  sensor.set_prism_geometry({});
+  EXPECT_THAT(sensor.covariance_names, ElementsAre("prism_tilt_b_vertical_deg"));
+  EXPECT_EQ(sensor.covariance.rows(), 1);
+}
+
+TEST(PrismSizes, AreFoundByName) {
+  Sensor sensor = load_sensor("horizon");
+  sensor.geometry = {{0.007}, {0.03, 0.02}};
+  const auto value = [&](const char* name) {
+    return prism_size(sensor, *find_prism_size(name, 3));
+  };
+  EXPECT_EQ(value("prism_thickness_m"), 0.007);
+  EXPECT_EQ(value("prism_thickness_c_m"), 0.007);
+  EXPECT_EQ(value("prism_spacing_b_m"), 0.02);
+  sensor.geometry = {};
+  EXPECT_EQ(value("prism_spacing_b_m"), 0);
+  EXPECT_FALSE(find_prism_size("prism_spacing_c_m", 3));
+  EXPECT_FALSE(find_prism_size("wedge_angle_deg", 3));
+}
+
+TEST(PrismSizes, AreUncertainByTheCovarianceOrBySigmas) {
+  Sensor sensor = load_sensor("mid-40");
+  const auto names = [&] {
+    std::vector<std::string> list;
+    for (const PrismSize& size : uncertain_prism_sizes(sensor)) list.push_back(size.name);
+    return list;
+  };
+  EXPECT_THAT(names(), ElementsAre("prism_thickness_m", "prism_spacing_m"));
+  sensor.covariance_names = {"prism_thickness_a_m", "prism_thickness_b_m"};
+  sensor.covariance = Eigen::Matrix2d::Identity();
+  EXPECT_THAT(names(),
+              ElementsAre("prism_spacing_m", "prism_thickness_a_m", "prism_thickness_b_m"));
+  sensor.set_prism_geometry({{0.007}, {0.03}});  // whoever sets them knows them
+  EXPECT_THAT(names(), ElementsAre());
 }
 
 TEST(Sensor, OneThatWasNotSetHasNoPrisms) {

@@ -53,6 +53,9 @@ struct CalibrationOptions {
   std::optional<double> range_noise;    ///< 1 sigma, m, default the sensor's
   std::optional<double> prior_sigma;    ///< of every free angle about the believed value, rad
   double range_offset_sigma = 0.05;     ///< prior of the range offset, m; 0 holds it at 0
+  /// Root mean square error of directions up to which a unit counts as sound, rad; default the
+  /// sensor's specification. 0: every significant error is too large.
+  std::optional<double> tolerance;
   bool beam_origin = true;              ///< beams start where they leave the last prism
   std::optional<scenes::Scene> planes;  ///< known normals, as seen from the scene's origin
   /// The station of each recording [recordings]; empty: unknown poses, or the origin of the scene
@@ -141,6 +144,7 @@ struct Calibration {
   FormalDatum datum_given_held;      ///< if everything that was held were exactly as held
   FormalDatum datum_without_common;  ///< without the common errors of the rotation angles
   PointingError pointing_error;      ///< of the directions that the sensor reports
+  double tolerance = 0;              ///< that pointing_error was judged by, rad; 0: none
   /// That calibrated directions are nearer to the truth than reported ones, root mean square over
   /// the beams, if everything that was held is as held. docs/theory/calibration.md
   double better_probability = 1;

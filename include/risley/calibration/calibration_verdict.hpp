@@ -8,14 +8,19 @@ namespace risley::calibration {
 
 /// What a calibration comes to. The codes are stable: scripts read them.
 enum class CalibrationCode {
-  as_believed,  ///< walls or strips bear out what the sensor believes of itself
-  bent,         ///< the beam goes elsewhere, significantly
-  not_better,   ///< parameters moved, and walls are no flatter, strips no closer for it
-  undecided,    ///< the data do not tell, or contradict what is stated of them
+  as_believed,           ///< walls or strips confirm what the sensor believes of itself
+  off_within_tolerance,  ///< the beam goes elsewhere, significantly, but less than is tolerated
+  bent,                  ///< the beam goes elsewhere, significantly and more than is tolerated
+  not_better,            ///< parameters moved, and walls are no flatter, strips no closer for it
+  undecided,             ///< the data do not tell, or contradict what is stated of them
 };
 
 /// "as_believed", ...
 const char* to_string(CalibrationCode code);
+
+/// Whether calibrated directions are nearer to the truth than reported ones beyond reasonable
+/// doubt: off_within_tolerance and bent.
+bool improves(CalibrationCode code);
 
 /// The same for people.
 struct CalibrationVerdict {

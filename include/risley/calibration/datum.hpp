@@ -108,6 +108,10 @@ class BeamBundle {
 /// along d is below -d / 2.
 double better_probability(const PointingError& error);
 
+/// Probability that a root mean square error is larger than is tolerated.
+/// @param error, sigma, tolerance  rad
+double beyond_probability(double error, double sigma, double tolerance);
+
 /// What ties the frame of the calibrated beams to the outside.
 enum class DatumKind {
   none,      ///< walls of unknown orientation: boresight only through the bundle's shape

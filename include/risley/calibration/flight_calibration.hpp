@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include "risley/calibration/calibration_verdict.hpp"
+#include "risley/calibration/datum.hpp"
 #include "risley/calibration/flight_adjustment.hpp"
 #include "risley/calibration/flight_judgement.hpp"
 #include "risley/calibration/flight_shots.hpp"
@@ -42,6 +43,9 @@ struct FlightCalibrationOptions {
   double range_offset_sigma = 0.02;     ///< prior about the sensor's, m; 0 holds it
   /// Prior of the prisms' angles of which the sensor states no sigma, rad (0.3 degree).
   double angle_sigma = 5.2359877559829887e-3;
+  /// Root mean square error of directions up to which a unit counts as sound, rad; default the
+  /// sensor's specification. 0: every significant error is too large.
+  std::optional<double> tolerance;
   double rotation_angle_sigma = 0;  ///< independent noise of every rotation angle, rad
   double knot_spacing = 0.25;       ///< of the corrections of the trajectory, s
   /// Knots are put further apart where there would be more: the time grows with the third power.
@@ -90,9 +94,11 @@ struct FlightCalibration : FlightJudgement {
   std::string reason;  ///< why not; empty when converged
   CalibrationVerdict verdict;
   std::vector<std::string> warnings;
-  trajectories::Mount mount;  ///< adjusted, with sigmas
-  sensors::Sensor sensor;     ///< adjusted, with covariance
-  FlightModel model;          ///< with corrections at the knots and planes, in the tangent frame
+  trajectories::Mount mount;     ///< adjusted, with sigmas
+  sensors::Sensor sensor;        ///< adjusted, with covariance
+  PointingError pointing_error;  ///< of the prisms as they were given against the ones found
+  double tolerance = 0;          ///< that it was judged by, rad; 0: none
+  FlightModel model;             ///< with corrections at the knots and planes, in the tangent frame
   ClockDrift clock_drift;
   std::vector<HeldParameter> held;   ///< indices that recordings told, above all
   std::vector<SeenControl> control;  ///< in the order of the options

@@ -34,6 +34,7 @@ struct CalibrateFlightOptions : RangedInputOptions {  ///< recordings of one fli
   /// As calibration::FlightCalibrationOptions has them.
   std::optional<double> range_noise, prior_sigma;
   double range_offset_sigma = calibration::FlightCalibrationOptions{}.range_offset_sigma;
+  std::optional<double> tolerance;  ///< of directions, rad
   double knot_spacing = calibration::FlightCalibrationOptions{}.knot_spacing;
   double cell_size = calibration::FlightCalibrationOptions{}.cell_size;
   std::uint64_t seed = 0;
@@ -59,6 +60,7 @@ struct CalibratedFlight : RangedInput {
   calibration::FlightCalibration calibration;
   std::optional<FlightTruth> truth;      ///< where it is known
   std::optional<FlightDetails> details;  ///< where they were asked for
+  bool calibration_written = false;      ///< calibration.yaml, and what goes with it
   Provenance provenance;    ///< of the options, with the inputs; empty where nothing was written
   double solving_time = 0;  ///< s
   double total_time = 0;    ///< of the job, s

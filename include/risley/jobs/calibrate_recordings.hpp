@@ -29,13 +29,14 @@ struct CalibrateRecordingsOptions : RangedInputOptions {  ///< recordings of pla
   calibration::CalibrationMethod method = calibration::CalibrationMethod::adjustment;
   std::optional<double> range_noise, prior_sigma;
   double range_offset_sigma = calibration::CalibrationOptions{}.range_offset_sigma;
+  std::optional<double> tolerance;  ///< of directions, rad
   bool beam_origin = true;
   std::optional<scenes::Scene> planes;
   std::vector<scenes::Station> stations;  ///< one per recording, or none
   std::uint64_t seed = 0;
   std::vector<std::string> truths;  ///< OUT.truth.yaml of each recording to judge by, or none
   bool details = false;             ///< wanted in the result
-  bool force = false;               ///< write a calibration that is not better, too
+  bool force = false;  ///< write a calibration that does not improve on the belief, too
   /// Names the outputs; without them nothing is written. States of several recordings are
   /// states_1.nc, states_2.nc, ...
   ResultFiles files;
@@ -56,6 +57,7 @@ struct CalibratedRecordings : RangedInput {
   calibration::Calibration calibration;
   std::optional<BeamComparison> truth;        ///< where it is known
   std::optional<CalibrationDetails> details;  ///< where they were asked for
+  bool calibration_written = false;           ///< calibration.yaml
   Provenance provenance;    ///< of the options, with the inputs; empty where nothing was written
   double solving_time = 0;  ///< s
   double total_time = 0;    ///< of the job, s

@@ -57,8 +57,8 @@ enum class OneUnit {
   caller,   ///< whoever asks, unless the serial numbers are known and differ
 };
 
-/// A quantity's value in a sensor, SI units. @param name  as in parameter_list(), or kRangeOffset
-/// @throws InvalidArgument
+/// A quantity's value in a sensor, SI units. @throws InvalidArgument
+/// @param name  as in parameter_list(), of a size of prisms, or kRangeOffset
 double value_of(const sensors::Sensor& sensor, const std::string& name);
 
 /// How files have a quantity.

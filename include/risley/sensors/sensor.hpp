@@ -80,7 +80,7 @@ struct Sensor {
 
   CalibrationReference reference = CalibrationReference::none;
   /// Joint covariance of named values, SI units; empty for presets that are no calibration. The
-  /// names are those of parameter_list() and range_offset_m.
+  /// names are those of parameter_list(), range_offset_m and sizes of prisms, shared or own.
   std::vector<std::string> covariance_names;
   Eigen::MatrixXd covariance;  ///< [names, names]
 
@@ -96,8 +96,11 @@ struct Sensor {
   double range_minimum = 0;            ///< no return below, m
   double range_maximum = 0;            ///< no return beyond, m
   double field_of_view = 0;            ///< full cone, rad
-  double shot_rate = 0;                ///< shots per second
-  int device_type = 1;                 ///< Livox device type of recordings
+  /// Root mean square error of a unit's directions that its manufacturer allows, rad; 0: not
+  /// stated.
+  double pointing_tolerance = 0;
+  double shot_rate = 0;  ///< shots per second
+  int device_type = 1;   ///< Livox device type of recordings
   double beam_divergence_horizontal = 0, beam_divergence_vertical = 0;  ///< full angle, rad
   PrismGeometry geometry;  ///< sizes of the prisms                       [B21 App. A]
 
@@ -120,7 +123,7 @@ struct Sensor {
   /// prisms together becomes known of each when one of them is set alone.
   /// @throws InvalidArgument naming the parameter, value, unit and range
   void set(std::string_view parameter, double value);
-  /// Sets the prisms' sizes and forgets who said otherwise.
+  /// Sets the prisms' sizes, as exact, and forgets what was known of them.
   /// @throws InvalidArgument as face_positions()
   void set_prism_geometry(const PrismGeometry& geometry);
   /// Knowledge of a parameter, or nullptr when nothing is recorded.
