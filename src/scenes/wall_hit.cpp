@@ -80,8 +80,9 @@ class WallRay {
   /// @param crosses  whether f is known to have the other sign at end
   double root(double begin, double end, double depth, double side, bool crosses) const {
     if (!steep_) return first_root(begin, end, depth, side, crosses);
-    double t = std::clamp((depth - from_.height) / along_.height, begin, end);
+    double t = (depth - from_.height) / along_.height;
     if (!wall_.shape.flat()) {
+      t = std::clamp(t, begin, end);
       for (int i = 0; i < kMostIterations; ++i) {
         const Gap f = gap(t, depth);
         const double step = -f.value / f.rate;

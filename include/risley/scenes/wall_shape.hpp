@@ -45,7 +45,7 @@ class WallShape {
             const std::optional<std::array<double, 2>>& extent,
             const std::array<double, 2>& center);
 
-  bool flat() const { return sines_.empty() && bow_ == 0.0; }  ///< the deviation is 0 everywhere
+  bool flat() const { return fields_.empty() && bow_ == 0.0; }  ///< the deviation is 0 everywhere
   /// @param horizontal, vertical  from the plane's foot, along its axes, m
   Deviation at(double horizontal, double vertical) const;
 
@@ -54,12 +54,15 @@ class WallShape {
   double strongest_bend() const { return bend_; }  ///< no second derivative is above this, 1/m
 
  private:
-  /// amplitude sin(horizontal * wave[0] + vertical * wave[1] + phase)
-  struct Sine {
-    double amplitude = 0, horizontal_wave = 0, vertical_wave = 0, phase = 0;
+  using Each = std::array<double, kSinusoidsOfWaves>;
+  /// The sum of amplitude sin(2 pi (horizontal * horizontal_wave + vertical * vertical_wave +
+  /// phase)); waves in turns per metre, phases in turns.
+  struct Field {
+    double amplitude = 0;
+    Each horizontal_wave{}, vertical_wave{}, phase{};
   };
 
-  std::vector<Sine> sines_;
+  std::vector<Field> fields_;
   double bow_ = 0;
   std::array<double, 2> bow_wave_{0.0, 0.0}, center_{0.0, 0.0};
   double highest_ = 0, steepest_ = 0, bend_ = 0;
