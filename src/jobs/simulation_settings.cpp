@@ -35,7 +35,7 @@ void assign(sensors::Sensor& sensor, const ParameterValues& values) {
 void assign_truth(sensors::Sensor& sensor, const ParameterValues& values) {
   ParameterValues parameters;
   for (const auto& [name, value] : values) {
-    if (sensors::is_range_value(name)) {
+    if (name.starts_with("range_")) {
       sensors::set_range_value(sensor, name, value);
     } else {
       parameters.emplace_back(name, value);

@@ -42,7 +42,7 @@ class Panes {
 };
 
 /// The wall with shape, patches or glass, where it is nearer than what was found.
-void meet_wall(const ScenePlane& wall, std::size_t surface, const Vector3<double>& origin,
+void take_wall(const ScenePlane& wall, std::size_t surface, const Vector3<double>& origin,
                const Vector3<double>& direction, std::optional<Hit>& nearest, Panes& panes) {
   static const double mirrors = std::cos(kGlassReturnAngle);
   const double farthest = nearest ? nearest->range : kFarthestHit;
@@ -113,7 +113,7 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
     const ScenePlane& each = scene.planes[i];
     if (!is_plain(each)) {
       if (!panes) panes.emplace();
-      meet_wall(each, i, origin, direction, nearest, *panes);
+      take_wall(each, i, origin, direction, nearest, *panes);
       continue;
     }
     const double range = hit_distance(each.plane, origin, direction);

@@ -75,45 +75,58 @@ class WallRay {
         d};
   }
 
-  /// Where f is 0 within [begin, end], or NaN.
+  /// Where the ray meets the surface: t, NaN where it does not, and the deviation there, whose
+  /// slopes are those of a place less than a micrometre away.
+  struct Root {
+    double t = std::nan("");
+    Deviation deviation;
+  };
+
+  /// Where f is 0 within [begin, end].
   /// @param side     sign of f at begin; a steep ray does not ask for it
   /// @param crosses  whether f is known to have the other sign at end
-  double root(double begin, double end, double depth, double side, bool crosses) const {
+  Root root(double begin, double end, double depth, double side, bool crosses) const {
     if (!steep_) return first_root(begin, end, depth, side, crosses);
-    double t = (depth - from_.height) / along_.height;
+    Root found{(depth - from_.height) / along_.height, {}};
     if (!wall_.shape.flat()) {
-      t = std::clamp(t, begin, end);
+      found.t = std::clamp(found.t, begin, end);
       for (int i = 0; i < kMostIterations; ++i) {
-        const Gap f = gap(t, depth);
+        const Gap f = gap(found.t, depth);
         const double step = -f.value / f.rate;
-        t += step;
+        found.t += step;
+        found.deviation = f.deviation;
         if (step * step * wall_.shape.strongest_bend() <= kTolerance * std::abs(f.rate)) break;
       }
     }
-    if (crosses) return std::clamp(t, begin, end);
-    return t >= begin - kSeam && t <= end + kSeam ? t : std::nan("");
+    if (crosses) {
+      found.t = std::clamp(found.t, begin, end);
+    } else if (!(found.t >= begin - kSeam && found.t <= end + kSeam)) {
+      return {};
+    }
+    return found;
   }
 
  private:
   /// The first root of a ray that may meet the surface several times. As long as
   /// f + f' s - bend s^2 / 2 > 0 or f - slope s > 0 it has not met it.
-  double first_root(double begin, double end, double depth, double side, bool crosses) const {
+  Root first_root(double begin, double end, double depth, double side, bool crosses) const {
     const double bend = wall_.shape.strongest_bend() * tangent_ * tangent_;
     const double slope = std::abs(along_.height) + wall_.shape.steepest() * tangent_;
     double t = begin;
+    Gap f;
     for (int i = 0; i < kMostSteps && t <= end; ++i) {
-      const Gap f = gap(t, depth);
+      f = gap(t, depth);
       const double left = side * f.value, away = side * f.rate;
-      if (!(left > kTolerance)) return t;
+      if (!(left > kTolerance)) return {t, f.deviation};
       const double bent_root = std::sqrt(away * away + 2.0 * bend * left);
       const double bent = away < 0.0   ? 2.0 * left / (bent_root - away)
                           : bend > 0.0 ? (away + bent_root) / bend
                                        : kInfinite;
       const double step = std::max(bent, left / slope);
-      if (step <= 4e-16 * t) return t;
+      if (step <= 4e-16 * t) return {t, f.deviation};
       t += step;
     }
-    return crosses ? end : std::nan("");
+    return crosses ? Root{end, f.deviation} : Root{};
   }
 
   const ScenePlane& wall_;
@@ -125,11 +138,11 @@ class WallRay {
 double depth_of(const Patch* patch) { return patch == nullptr ? 0.0 : patch->depth; }
 double sign_of(double value) { return value < 0.0 ? -1.0 : 1.0; }
 
-/// What the ray meets at t of the face of a patch or of the wall itself.
-WallHit face_hit(const ScenePlane& wall, const WallRay& ray, double t, const Patch* patch) {
-  const Deviation slope = ray.gap(t, 0.0).deviation;
+/// What the ray meets of the face of a patch or of the wall itself.
+WallHit face_hit(const ScenePlane& wall, const WallRay::Root& root, const Patch* patch) {
+  const Deviation& slope = root.deviation;
   WallHit hit;
-  hit.range = t;
+  hit.range = root.t;
   hit.normal = normalized(wall.plane.normal - slope.horizontal_slope * wall.horizontal_axis -
                           slope.vertical_slope * wall.vertical_axis);
   hit.reflectivity =
@@ -148,10 +161,11 @@ WallHit step_hit(const ScenePlane& wall, double t, const Patch* into, bool horiz
   return hit;
 }
 
-/// Where a ray passes over an edge of a patch.
+/// Where a ray passes over an edge of a patch. Without values of its own, as room for many of them
+/// is made for every ray.
 struct Crossing {
-  double t = 0;
-  bool horizontal = false;  ///< whether the edge limits the patch along the horizontal axis
+  double t;
+  bool horizontal;  ///< whether the edge limits the patch along the horizontal axis
 };
 
 }  // namespace
@@ -211,9 +225,10 @@ std::optional<WallHit> meet_wall(const ScenePlane& wall, const Vector3<double>& 
     const Patch* next = ray.patch_at(0.5 * (end + next_end));
     const double before = ray.gap(end, depth_of(patch)).value;
     const bool crosses = side * before <= 0.0;
-    const double t = crosses || !ray.steep() ? ray.root(begin, end, depth_of(patch), side, crosses)
-                                             : std::nan("");
-    if (t > 0.0) return face_hit(wall, ray, t, patch);
+    const WallRay::Root root = crosses || !ray.steep()
+                                   ? ray.root(begin, end, depth_of(patch), side, crosses)
+                                   : WallRay::Root{};
+    if (root.t > 0.0) return face_hit(wall, root, patch);
     // The sides of a step join both of its faces.
     if (side * (before + depth_of(patch) - depth_of(next)) <= 0.0 && end > 0.0) {
       return step_hit(wall, end, next, crossings[i].horizontal);
@@ -222,10 +237,10 @@ std::optional<WallHit> meet_wall(const ScenePlane& wall, const Vector3<double>& 
     patch = next;
   }
   if (side == 0.0 && !ray.steep()) side = sign_of(ray.gap(begin, depth_of(patch)).value);
-  const double t = ray.root(begin, leave, depth_of(patch), side, false);
-  if (!(t > 0.0 && t <= farthest)) return std::nullopt;
+  const WallRay::Root root = ray.root(begin, leave, depth_of(patch), side, false);
+  if (!(root.t > 0.0 && root.t <= farthest)) return std::nullopt;
   // Without steps the patch is only known where the ray ends.
-  return face_hit(wall, ray, t, count == 0 ? ray.patch_at(t) : patch);
+  return face_hit(wall, root, count == 0 ? ray.patch_at(root.t) : patch);
 }
 
 }  // namespace risley::scenes
