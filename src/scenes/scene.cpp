@@ -16,6 +16,7 @@
 #include "risley/core/require.hpp"
 
 #include "scenes/furniture_hit.hpp"
+#include "scenes/ray.hpp"
 #include "scenes/wall_hit.hpp"
 
 namespace risley::scenes {
@@ -41,13 +42,12 @@ class Panes {
   std::size_t count_ = 0;
 };
 
-/// The wall with shape, patches or glass, where it is nearer than what was found.
+/// Replaces what was found where a wall with shape, patches or glass is nearer.
 void take_wall(const ScenePlane& wall, std::size_t surface, const Vector3<double>& origin,
                const Vector3<double>& direction, std::optional<Hit>& nearest, Panes& panes) {
   static const double mirrors = std::cos(kGlassReturnAngle);
-  const double farthest = nearest ? nearest->range : kFarthestHit;
-  const auto hit = meet_wall(wall, origin, direction, farthest);
-  if (!hit || (nearest && hit->range >= farthest)) return;
+  const auto hit = meet_wall(wall, origin, direction, nearest ? nearest->range : kFarthestHit);
+  if (!hit || (nearest && hit->range >= nearest->range)) return;
   const double cosine = std::min(1.0, std::abs(dot(hit->normal, direction)));
   if (hit->glass && cosine < mirrors) {
     panes.add(hit->range);
@@ -107,17 +107,16 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
         fmt::format("penetration = {:g}, allowed above 0 and below 1", penetration));
   }
   require_finite("time", time, "s");
-  std::optional<Hit> nearest;
-  std::optional<Panes> panes;
-  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
-    const ScenePlane& each = scene.planes[i];
+  const ScenePlane* plain = nullptr;
+  double nearest_range = std::nextafter(kFarthestHit, kInfinite);
+  bool all_plain = true;
+  for (const ScenePlane& each : scene.planes) {
     if (!is_plain(each)) {
-      if (!panes) panes.emplace();
-      take_wall(each, i, origin, direction, nearest, *panes);
+      all_plain = false;
       continue;
     }
     const double range = hit_distance(each.plane, origin, direction);
-    if (!(range > 0.0 && range <= kFarthestHit) || (nearest && range >= nearest->range)) continue;
+    if (!(range > 0.0 && range < nearest_range)) continue;
     if (each.extent) {
       const Vector3<double> from_foot =
           origin + range * direction - each.plane.distance * each.plane.normal;
@@ -127,8 +126,28 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
         continue;
       }
     }
-    nearest = Hit{range, std::min(1.0, std::abs(dot(each.plane.normal, direction))), i,
-                  each.plane.normal, each.reflectivity};
+    nearest_range = range;
+    plain = &each;
+  }
+  const bool found = plain != nullptr;
+  const auto plain_hit = [&] {
+    return Hit{nearest_range, std::min(1.0, std::abs(dot(plain->plane.normal, direction))),
+               static_cast<std::size_t>(plain - scene.planes.data()), plain->plane.normal,
+               plain->reflectivity};
+  };
+  if (all_plain && !scene.terrain && scene.boxes.empty() && scene.people.empty()) {
+    return found ? std::optional<Hit>(plain_hit()) : std::nullopt;  // most scenes: quick
+  }
+  std::optional<Hit> nearest;
+  if (found) nearest = plain_hit();
+  std::optional<Panes> panes;
+  if (!all_plain) {
+    panes.emplace();
+    for (std::size_t i = 0; i < scene.planes.size(); ++i) {
+      if (!is_plain(scene.planes[i])) {
+        take_wall(scene.planes[i], i, origin, direction, nearest, *panes);
+      }
+    }
   }
   if (scene.terrain) {
     const double farthest = nearest ? nearest->range : kFarthestHit;

@@ -37,7 +37,7 @@ class WallRay {
              signed_distance(wall.plane, origin)};
     along_ = {dot(direction, wall.horizontal_axis), dot(direction, wall.vertical_axis),
               dot(direction, wall.plane.normal)};
-    tangent_ = std::hypot(along_.horizontal, along_.vertical);
+    tangent_ = std::sqrt(along_.horizontal * along_.horizontal + along_.vertical * along_.vertical);
     // Then the slope of f stays within a quarter of its mean, and Newton's steps converge.
     steep_ = std::abs(along_.height) > 4.0 * wall.shape.steepest() * tangent_;
   }
@@ -169,10 +169,6 @@ struct Crossing {
 };
 
 }  // namespace
-
-bool is_plain(const ScenePlane& wall) {
-  return wall.patches.empty() && !wall.glass && wall.shape.flat();
-}
 
 std::optional<WallHit> meet_wall(const ScenePlane& wall, const Vector3<double>& origin,
                                  const Vector3<double>& direction, double farthest) {

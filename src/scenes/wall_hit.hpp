@@ -17,7 +17,9 @@ struct WallHit {
 };
 
 /// Whether a wall is a flat surface of one kind, as most are.
-bool is_plain(const ScenePlane& wall);
+inline bool is_plain(const ScenePlane& wall) {
+  return wall.patches.empty() && !wall.glass && wall.shape.flat();
+}
 
 /// The nearest point of a wall with its waves, bow and steps in front of a ray, or nothing. Rays
 /// that stay near a wall they are almost parallel to for more than some thousand half waves end
