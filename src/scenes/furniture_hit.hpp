@@ -10,12 +10,12 @@
 
 namespace risley::scenes {
 
-/// Replaces what a ray met so far where it meets this box or person before; with neither, within
-/// kFarthestHit. A ray that begins within one ends at its inner side.
-/// @param surface  its number in the scene
+/// Replaces what a ray met so far by this box where that is nearer, and within kFarthestHit. A ray
+/// that begins within a box ends at its inner side.
+/// @param surface  number of the box in the scene
 void meet_box(const SceneBox& box, std::size_t surface, const Vector3<double>& origin,
               const Vector3<double>& direction, std::optional<Hit>& nearest);
-/// @param time  s
+/// The same for a person. @param time  s
 void meet_person(const Person& person, std::size_t surface, const Vector3<double>& origin,
                  const Vector3<double>& direction, double time, std::optional<Hit>& nearest);
 

@@ -22,7 +22,7 @@
 namespace risley::scenes {
 namespace {
 
-/// Where a ray passes through panes of glass. Of more panes than have room, the rest count as air.
+/// Where a ray passes through panes of glass, the first sixteen that are found.
 class Panes {
  public:
   void add(double range) {

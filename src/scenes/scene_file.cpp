@@ -33,12 +33,13 @@ Vector3<double> place(const YamlMap& map, std::string_view key) {
   return {x, y, z};
 }
 
-WallWaves read_waves(const YamlMap& map, std::size_t plane) {
+/// @param own_seed  for waves that state none
+WallWaves read_waves(const YamlMap& map, std::uint64_t own_seed) {
   map.allow_only({"peak_to_valley_m", "half_wave_m", "seed"});
   return {number(map, "peak_to_valley_m", 0, 1, "m"),
           number(map, "half_wave_m", 0.05L, kFarthestHit, "m"),
           map.find("seed") == nullptr
-              ? plane
+              ? own_seed
               : static_cast<std::uint64_t>(map.integer("seed", 0, 2'147'483'647))};
 }
 
@@ -64,7 +65,7 @@ Patch read_patch(const YamlMap& map, const ScenePlane& plane) {
 }
 
 /// What makes more of a plane than a flat surface of one kind.
-/// @param number  of the plane in the file, counted from 0
+/// @param number_of_plane  in the file, counted from 0: the seed of waves that state none
 void read_surface(const YamlMap& map, std::size_t number_of_plane, ScenePlane& plane) {
   plane.reflectivity = reflectivity(map);
   plane.glass = map.yes("glass");
@@ -121,7 +122,7 @@ Person read_person(const YamlMap& map, Names& earlier) {
   return person;
 }
 
-/// @param number  of the plane in the file, counted from 0
+/// @param number_of_plane  in the file, counted from 0
 ScenePlane read_plane(const YamlMap& map, std::size_t number_of_plane, Names& earlier) {
   map.allow_only({"name", "distance_m", "normal_azimuth_deg", "normal_zenith_deg", "extent_m",
                   "center_m", "sigma_deg", "waves", "bow_m", "patches", "reflectivity", "glass"});
