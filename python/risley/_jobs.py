@@ -375,7 +375,9 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     rotor : {'constant', 'sinusoidal', 'hunting'}
         How the rotors run.
     set : mapping of str to float
-        Parameters of the true sensor, in the unit of the name.
+        Parameters of the true sensor, in the unit of the name, and what it adds to ranges:
+        "range_offset_m", "range_near_m", "range_incidence", "range_per_decade_m",
+        "range_emitter_1_m", ...
     reported : mapping of str to float
         Parameters for which the sensor believes another value than the true one.
     reported_nominal : bool, default False

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "risley/algebra/products.hpp"
+#include "risley/sensors/range_values.hpp"
 
 namespace risley::calibration {
 
@@ -31,20 +32,7 @@ void set_numbers(const PlanarProblem& problem, const Calibration& result, sensor
   sensor.range_offset = problem.range_offset;
   sensor.range_errors = {};
   for (const RangeTerm& term : problem.range_terms) {
-    switch (term.kind) {
-      case RangeTermKind::near:
-        sensor.range_errors.near = term.value;
-        break;
-      case RangeTermKind::incidence:
-        sensor.range_errors.incidence = term.value;
-        break;
-      case RangeTermKind::per_decade:
-        sensor.range_errors.per_decade = term.value;
-        break;
-      case RangeTermKind::emitter:
-        sensor.range_errors.emitter.push_back(term.value);
-        break;
-    }
+    sensors::set_range_value(sensor, term.name, term.value);
   }
   for (const CalibratedNumber& number : result.numbers) {
     sensor.set_knowledge({number.name, number.sigma, kSource, number.total_sigma});

@@ -3,12 +3,14 @@
 #include "calibration/range_terms.hpp"
 
 #include <cmath>
-#include <string_view>
 
 #include <fmt/format.h>
 
 #include "risley/calibration/rays.hpp"
+#include "risley/sensors/footprint.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 #include "risley/sensors/range_errors.hpp"
+#include "risley/sensors/range_values.hpp"
 
 #include "calibration/shot_blocks.hpp"
 
@@ -17,19 +19,15 @@ namespace {
 
 constexpr double kNearSigma = 0.02, kIncidenceSigma = 0.3, kDecadeSigma = 0.01,
                  kEmitterSigma = 0.01;
-constexpr std::string_view kNear = "range_near_m", kIncidence = "range_incidence",
-                           kPerDecade = "range_per_decade_m", kEmitter = "range_emitter_";
 
 /// Half the depth of the footprint on a plane, m.
 double depth_on(const Vector3<double>& normal, const Vector3<double>& beam, double range,
                 const BeamDivergence& divergence) {
-  // A direction turned across the beam changes the range by -r (n.e) / (n.L).
-  const Vector3<double> horizontal = normalized(cross({0, 0, 1}, beam));
-  const Vector3<double> vertical = cross(beam, horizontal);
-  const double approach = dot(normal, beam);
-  const double depth = sensors::footprint_depth(range, dot(normal, horizontal) / approach,
-                                                dot(normal, vertical) / approach,
-                                                divergence.horizontal, divergence.vertical);
+  const sensors::FootprintAxes axes = sensors::footprint_axes(beam);
+  const double depth =
+      sensors::footprint_depth(range, sensors::footprint_slope(normal, beam, axes.horizontal),
+                               sensors::footprint_slope(normal, beam, axes.vertical),
+                               divergence.horizontal, divergence.vertical);
   return std::isfinite(depth) ? depth : 0.0;
 }
 
@@ -37,24 +35,18 @@ double depth_on(const Vector3<double>& normal, const Vector3<double>& beam, doub
 
 std::vector<RangeTerm> range_terms_of(const sensors::Sensor& sensor, bool intensities) {
   std::vector<RangeTerm> terms;
-  const auto add = [&](std::string name, RangeTermKind kind, int emitter, double value,
-                       double sigma) {
+  const auto add = [&](std::string name, RangeTermKind kind, double sigma, int emitter = 0) {
     const sensors::Knowledge* known = sensor.find_knowledge(name);
-    if (known == nullptr) value = 0;
+    const double value = known ? sensors::get_range_value(sensor, name) : 0.0;
     terms.push_back({std::move(name), value, value, known ? known->sigma : sigma, kind, emitter});
   };
-  const sensors::RangeErrors& errors = sensor.range_errors;
-  add(std::string(kNear), RangeTermKind::near, 0, errors.near, kNearSigma);
+  add("range_near_m", RangeTermKind::near, kNearSigma);
   if (sensor.beam_divergence_horizontal > 0 || sensor.beam_divergence_vertical > 0) {
-    add(std::string(kIncidence), RangeTermKind::incidence, 0, errors.incidence, kIncidenceSigma);
+    add("range_incidence", RangeTermKind::incidence, kIncidenceSigma);
   }
-  if (intensities) {
-    add(std::string(kPerDecade), RangeTermKind::per_decade, 0, errors.per_decade, kDecadeSigma);
-  }
+  if (intensities) add("range_per_decade_m", RangeTermKind::per_decade, kDecadeSigma);
   for (int j = 0; sensor.train.emitters() > 1 && j < sensor.train.emitters(); ++j) {
-    const auto at = static_cast<std::size_t>(j);
-    add(fmt::format("{}{}_m", kEmitter, j + 1), RangeTermKind::emitter, j,
-        at < errors.emitter.size() ? errors.emitter[at] : 0.0, kEmitterSigma);
+    add(fmt::format("range_emitter_{}_m", j + 1), RangeTermKind::emitter, kEmitterSigma, j);
   }
   return terms;
 }
@@ -106,16 +98,11 @@ void fill_range_terms(const PlanarProblem& problem, std::size_t view, RangedShot
 }
 
 std::vector<SizePrior> size_priors(const sensors::Sensor& sensor) {
-  const PrismGeometry geometry = one_size_each(sensor.geometry, sensor.prisms());
   std::vector<SizePrior> priors;
   for (PrismSize& size : own_prism_sizes(sensor.prisms())) {
-    const bool thickness = !size.rate.thickness.empty();
-    const sensors::Knowledge* known = sensor.find_knowledge(size.name);
-    if (known == nullptr) {
-      known = sensor.find_knowledge(thickness ? "prism_thickness_m" : "prism_spacing_m");
-    }
-    const double value = size_value(geometry, size);
-    priors.push_back({std::move(size), value, known ? known->sigma : 0.0});
+    const double value = sensors::prism_size(sensor, size);
+    const double sigma = sensors::prism_size_sigma(sensor, size);
+    priors.push_back({std::move(size), value, sigma});
   }
   return priors;
 }

@@ -11,6 +11,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/sensors/range_values.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "jobs/checks.hpp"
@@ -28,6 +29,19 @@ void assign(sensors::Sensor& sensor, const ParameterValues& values) {
     }
     sensor.set(name, value);
   }
+}
+
+/// Sets what the sensor adds to true ranges, too.
+void assign_truth(sensors::Sensor& sensor, const ParameterValues& values) {
+  ParameterValues parameters;
+  for (const auto& [name, value] : values) {
+    if (name.starts_with("range_")) {
+      sensors::set_range_value(sensor, name, value);
+    } else {
+      parameters.emplace_back(name, value);
+    }
+  }
+  assign(sensor, parameters);
 }
 
 void check_moves(const SimulationOptions& options) {
@@ -94,7 +108,7 @@ simulation::SimulationSettings simulation_settings(const SimulationOptions& opti
   if (options.rate) check_positive(*options.rate, "rate", "Hz");
   simulation::SimulationSettings settings;
   settings.truth = sensors::load_sensor(options.sensor);
-  assign(settings.truth, options.set);
+  assign_truth(settings.truth, options.set);
   if (!options.beam_origin) settings.truth.set_prism_geometry({});
   if (options.reported_nominal || !options.reported.empty()) {
     settings.reported = settings.truth;

@@ -12,61 +12,48 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/io/text_file.hpp"
-#include "risley/io/yaml_map.hpp"
 
-#include "scenes/scene_fields.hpp"
-#include "scenes/terrain_file.hpp"
+#include "scenes/furniture_hit.hpp"
+#include "scenes/ray.hpp"
+#include "scenes/wall_hit.hpp"
 
 namespace risley::scenes {
 namespace {
 
-using io::fail_at;
-using io::YamlMap;
-
-ScenePlane read_plane(const YamlMap& map, Names& earlier) {
-  map.allow_only({"name", "distance_m", "normal_azimuth_deg", "normal_zenith_deg", "extent_m",
-                  "center_m", "sigma_deg"});
-  ScenePlane plane;
-  plane.name = new_name(map, earlier);
-  const double azimuth = angle(map, "normal_azimuth_deg", -360, 360);
-  const double zenith = angle(map, "normal_zenith_deg", 0, 180);
-  plane.plane =
-      plane_from_angles({azimuth, zenith}, number(map, "distance_m", 1e-3L, kFarthestHit, "m"));
-  plane.horizontal_axis = {-std::sin(azimuth), std::cos(azimuth), 0.0};
-  plane.vertical_axis = cross(plane.plane.normal, plane.horizontal_axis);
-  if (map.find("extent_m") != nullptr)
-    plane.extent = numbers<2>(map, "extent_m", 1e-3L, kFarthestHit);
-  if (const auto* center = map.find("center_m")) {
-    if (!plane.extent) {
-      fail_at(map.path(), center->line,
-              fmt::format("{} needs {}", map.field("center_m"), map.field("extent_m")));
+/// Where a ray passes through panes of glass, the first sixteen that are found.
+class Panes {
+ public:
+  void add(double range) {
+    if (count_ < ranges_.size()) ranges_[count_++] = range;
+  }
+  /// What panes leave of the light to a target and back.
+  double transmission(double range) const {
+    double left = 1.0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (ranges_[i] < range) left *= kGlassTransmission;
     }
-    plane.center = numbers<2>(map, "center_m", -kFarthestHit, kFarthestHit);
+    return left;
   }
-  if (map.find("sigma_deg") != nullptr) plane.normal_sigma = angle(map, "sigma_deg", 0, 180);
-  return plane;
-}
 
-Station read_station(const YamlMap& map, Names& earlier) {
-  map.allow_only({"name", "position_m", "roll_deg", "pitch_deg", "yaw_deg", "sigma_deg"});
-  Station station;
-  station.name = new_name(map, earlier);
-  if (map.find("position_m") != nullptr) {
-    const auto [x, y, z] = numbers<3>(map, "position_m", -kFarthestHit, kFarthestHit);
-    station.position = {x, y, z};
+ private:
+  std::array<double, 16> ranges_{};
+  std::size_t count_ = 0;
+};
+
+/// Replaces what was found where a wall with shape, patches or glass is nearer.
+void take_wall(const ScenePlane& wall, std::size_t surface, const Vector3<double>& origin,
+               const Vector3<double>& direction, std::optional<Hit>& nearest, Panes& panes) {
+  static const double mirrors = std::cos(kGlassReturnAngle);
+  const auto hit = meet_wall(wall, origin, direction, nearest ? nearest->range : kFarthestHit);
+  if (!hit || (nearest && hit->range >= nearest->range)) return;
+  const double cosine = std::min(1.0, std::abs(dot(hit->normal, direction)));
+  if (hit->glass && cosine < mirrors) {
+    panes.add(hit->range);
+    return;
   }
-  const auto optional_angle = [&](std::string_view key, double lower_deg) {
-    return map.find(key) == nullptr ? 0.0 : angle(map, key, lower_deg, 360);
-  };
-  station.roll = optional_angle("roll_deg", -360);
-  station.pitch = optional_angle("pitch_deg", -360);
-  station.yaw = optional_angle("yaw_deg", -360);
-  station.sigma = optional_angle("sigma_deg", 0);
-  return station;
+  nearest = Hit{hit->range, cosine, surface, hit->normal, hit->reflectivity};
 }
 
 }  // namespace
@@ -94,16 +81,23 @@ Station Scene::station(std::string_view name) const {
                   known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
 }
 
-std::size_t Scene::surfaces() const { return planes.size() + (terrain ? terrain->surfaces() : 0); }
+std::size_t Scene::surfaces() const {
+  return planes.size() + (terrain ? terrain->surfaces() : 0) + boxes.size() + people.size();
+}
 
 std::string Scene::surface_name(std::size_t surface) const {
   require_place("surface", surface, surfaces());
-  return surface < planes.size() ? planes[surface].name
-                                 : terrain->surface_name(surface - planes.size());
+  if (surface < planes.size()) return planes[surface].name;
+  std::size_t rest = surface - planes.size();
+  if (terrain) {
+    if (rest < terrain->surfaces()) return terrain->surface_name(rest);
+    rest -= terrain->surfaces();
+  }
+  return rest < boxes.size() ? boxes[rest].name : people[rest - boxes.size()].name;
 }
 
 std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin,
-                               const Vector3<double>& direction, double penetration) {
+                               const Vector3<double>& direction, double penetration, double time) {
   require_finite("origin.x", origin.x, "m");
   require_finite("origin.y", origin.y, "m");
   require_finite("origin.z", origin.z, "m");
@@ -112,11 +106,17 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
     throw InvalidArgument(
         fmt::format("penetration = {:g}, allowed above 0 and below 1", penetration));
   }
-  std::optional<Hit> nearest;
-  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
-    const ScenePlane& each = scene.planes[i];
+  require_finite("time", time, "s");
+  const ScenePlane* plain = nullptr;
+  double nearest_range = std::nextafter(kFarthestHit, kInfinite);
+  bool all_plain = true;
+  for (const ScenePlane& each : scene.planes) {
+    if (!is_plain(each)) {
+      all_plain = false;
+      continue;
+    }
     const double range = hit_distance(each.plane, origin, direction);
-    if (!(range > 0.0 && range <= kFarthestHit) || (nearest && range >= nearest->range)) continue;
+    if (!(range > 0.0 && range < nearest_range)) continue;
     if (each.extent) {
       const Vector3<double> from_foot =
           origin + range * direction - each.plane.distance * each.plane.normal;
@@ -126,7 +126,28 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
         continue;
       }
     }
-    nearest = Hit{range, std::min(1.0, std::abs(dot(each.plane.normal, direction))), i};
+    nearest_range = range;
+    plain = &each;
+  }
+  const bool found = plain != nullptr;
+  const auto plain_hit = [&] {
+    return Hit{nearest_range, std::min(1.0, std::abs(dot(plain->plane.normal, direction))),
+               static_cast<std::size_t>(plain - scene.planes.data()), plain->plane.normal,
+               plain->reflectivity};
+  };
+  if (all_plain && !scene.terrain && scene.boxes.empty() && scene.people.empty()) {
+    return found ? std::optional<Hit>(plain_hit()) : std::nullopt;  // most scenes: quick
+  }
+  std::optional<Hit> nearest;
+  if (found) nearest = plain_hit();
+  std::optional<Panes> panes;
+  if (!all_plain) {
+    panes.emplace();
+    for (std::size_t i = 0; i < scene.planes.size(); ++i) {
+      if (!is_plain(scene.planes[i])) {
+        take_wall(scene.planes[i], i, origin, direction, nearest, *panes);
+      }
+    }
   }
   if (scene.terrain) {
     const double farthest = nearest ? nearest->range : kFarthestHit;
@@ -135,24 +156,18 @@ std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin
       nearest = hit;
     }
   }
+  if (!scene.boxes.empty() || !scene.people.empty()) {
+    const std::size_t first = scene.surfaces() - scene.boxes.size() - scene.people.size();
+    for (std::size_t i = 0; i < scene.boxes.size(); ++i) {
+      meet_box(scene.boxes[i], first + i, origin, direction, nearest);
+    }
+    for (std::size_t i = 0; i < scene.people.size(); ++i) {
+      meet_person(scene.people[i], first + scene.boxes.size() + i, origin, direction, time,
+                  nearest);
+    }
+  }
+  if (nearest && panes) nearest->reflectivity *= panes->transmission(nearest->range);
   return nearest;
 }
-
-Scene parse_scene(const std::string& text, const std::string& path) {
-  const YamlMap root(io::parse_yaml(text, path), path, "");
-  root.allow_only({"planes", "stations", "terrain"});
-  Scene scene;
-  Names planes, stations;
-  for_each_map(root, "planes",
-               [&](const YamlMap& map) { scene.planes.push_back(read_plane(map, planes)); });
-  for_each_map(root, "stations",
-               [&](const YamlMap& map) { scene.stations.push_back(read_station(map, stations)); });
-  if (const auto* entry = root.find("terrain")) {
-    scene.terrain = read_terrain(YamlMap(entry->value, path, "terrain"), planes);
-  }
-  return scene;
-}
-
-Scene load_scene(const std::string& path) { return parse_scene(io::read_text_file(path), path); }
 
 }  // namespace risley::scenes

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <string>
 #include <string_view>
@@ -18,14 +17,12 @@
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 
+#include "scenes/ray.hpp"
 #include "scenes/terrain_limits.hpp"
 
 namespace risley::scenes {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
-/// Faces reach so far beyond their edges that no ray slips between two of them, m.
-constexpr double kSeam = 1e-9;
 /// Boxes of the grid are larger by this, far more than coordinates are rounded, m.
 constexpr double kBoxMargin = 1e-6;
 constexpr double kMostCells = 1e6;
@@ -122,17 +119,6 @@ void require_village(const VillageSettings& s) {
     require_range("bush_radius", s.bush_radius, kSizeLimits, "m");
     require_range("bush_height", s.bush_height, kSizeLimits, "m");
   }
-}
-
-/// Where a ray is within low to high of one axis: [enter, leave], enter > leave: nowhere.
-void clip(double origin, double direction, double low, double high, double& enter, double& leave) {
-  if (direction == 0.0) {
-    if (origin < low || origin > high) leave = -kInfinite;
-    return;
-  }
-  const double a = (low - origin) / direction, b = (high - origin) / direction;
-  enter = std::max(enter, std::min(a, b));
-  leave = std::min(leave, std::max(a, b));
 }
 
 }  // namespace
@@ -416,7 +402,7 @@ void Terrain::meet_face(std::size_t face, const Vector3<double>& origin,
   for (std::size_t edge = slab.first_edge; edge < slab.end_edge; ++edge) {
     if (dot(edges_[edge].normal, point) < edges_[edge].offset) return;
   }
-  nearest = Hit{range, std::min(1.0, std::abs(approach)), face};
+  nearest = Hit{range, std::min(1.0, std::abs(approach)), face, slab.normal};
 }
 
 void Terrain::meet_bush(std::size_t bush, const Vector3<double>& origin,
@@ -439,7 +425,7 @@ void Terrain::meet_bush(std::size_t bush, const Vector3<double>& origin,
   if (leave <= 0.0) return;
   const double range = enter + penetration * (leave - enter);
   if (!(range > 0.0 && range <= farthest) || (nearest && range >= nearest->range)) return;
-  nearest = Hit{range, kLeafCosine, faces_.size() + bush};
+  nearest = Hit{range, kLeafCosine, faces_.size() + bush, -direction};
 }
 
 void Terrain::meet_ground(const Vector3<double>& origin, const Vector3<double>& direction,
@@ -450,7 +436,9 @@ void Terrain::meet_ground(const Vector3<double>& origin, const Vector3<double>& 
   if (sines_.empty()) {
     if (direction.z == 0.0) return;
     const double range = (mean - origin.z) / direction.z;
-    if (range > 0.0 && range < end) nearest = Hit{range, std::abs(direction.z), surface};
+    if (range > 0.0 && range < end) {
+      nearest = Hit{range, std::abs(direction.z), surface, {0.0, 0.0, 1.0}};
+    }
     return;
   }
   double enter = 0.0, leave = std::min(end, kFarthestGround);
@@ -500,9 +488,9 @@ void Terrain::meet_ground(const Vector3<double>& origin, const Vector3<double>& 
     if (t <= leave) look(t);
   }
   if (!(t > 0.0 && t <= leave) || t >= end) return;
-  const double cosine =
-      std::abs(rise) / std::sqrt(1.0 + gradient_x * gradient_x + gradient_y * gradient_y);
-  nearest = Hit{t, std::min(1.0, cosine), surface};
+  const double length = std::sqrt(1.0 + gradient_x * gradient_x + gradient_y * gradient_y);
+  nearest = Hit{t, std::min(1.0, std::abs(rise) / length), surface,
+                (1.0 / length) * Vector3<double>{-gradient_x, -gradient_y, 1.0}};
 }
 
 std::optional<Hit> Terrain::nearest_hit(const Vector3<double>& origin,

@@ -18,6 +18,7 @@
 #include "risley/io/yaml_map.hpp"
 #include "risley/io/yaml_output.hpp"
 #include "risley/sensors/prism_sizes.hpp"
+#include "risley/sensors/range_values.hpp"
 
 #include "sensors/builtin_presets.hpp"
 
@@ -71,7 +72,6 @@ constexpr std::array kSpecifications{
                   true},
     Specification{"noise", "range_noise_weak_return_m", "m", &Sensor::range_noise_weak_return, 0,
                   100, true},
-    Specification{"range", "range_offset_m", "m", &Sensor::range_offset, -100, 100, true},
     Specification{"resolution", "angle_resolution_deg", "deg", &Sensor::angle_resolution, 0, 10},
     Specification{"resolution", "range_resolution_m", "m", &Sensor::range_resolution, 0, 10},
     Specification{"limits", "range_minimum_m", "m", &Sensor::range_minimum, 0, 1e5},
@@ -95,7 +95,7 @@ void require_specification(const Specification& s, double value) {
                                     s.unit, s.lower, s.upper));
 }
 
-/// Section names in file order.
+/// Section names in file order; the section range has its own place.
 std::vector<std::string_view> section_names() {
   std::vector<std::string_view> names;
   for (const Specification& entry : kSpecifications) {
@@ -107,7 +107,7 @@ std::vector<std::string_view> section_names() {
 /// Of the values that a covariance can name.
 io::ScaleOfName covariance_scale(const Sensor& sensor) {
   return [shape = sensor.shape()](const std::string& name) {
-    if (name == "range_offset_m" || find_prism_size(name, shape.prisms)) return 1.0L;
+    if (is_range_value(name) || find_prism_size(name, shape.prisms)) return 1.0L;
     return scale_of(find_parameter(name, shape).unit);
   };
 }
@@ -205,12 +205,29 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
   }
 }
 
+/// What the sensor adds to true ranges; absent values are 0.
+void read_range_values(const YamlMap& root, Sensor& sensor) {
+  if (root.find("range") == nullptr) return;
+  const YamlMap map(root.at("range").value, root.path(), "range");
+  const std::vector<RangeValue> values = range_values(sensor.train.emitters());
+  for (const YamlMap::Entry& entry : map.entries()) {
+    const auto known = std::find_if(values.begin(), values.end(),
+                                    [&](const RangeValue& v) { return v.name == entry.key; });
+    if (known == values.end()) {
+      fail_at(map.path(), entry.line, fmt::format("unknown field {}", map.field(entry.key)));
+    }
+    const Quantity quantity = read_quantity(map, known->name, known->unit, sensor);
+    if (quantity.value < known->lower || quantity.value > known->upper) {
+      fail_at(map.path(), quantity.line,
+              fmt::format("{} = {:g} {}, allowed {:g} to {:g}", map.field(known->name),
+                          quantity.value, known->unit, known->lower, known->upper));
+    }
+    set_range_value(sensor, known->name, static_cast<double>(quantity.value));
+  }
+}
+
 void read_specifications(const YamlMap& root, Sensor& sensor) {
   for (const std::string_view section : section_names()) {
-    const bool optional =
-        std::all_of(kSpecifications.begin(), kSpecifications.end(),
-                    [&](const Specification& s) { return s.section != section || s.optional; });
-    if (optional && root.find(std::string(section)) == nullptr) continue;
     const YamlMap map(root.at(section).value, root.path(), std::string(section));
     for (const YamlMap::Entry& entry : map.entries()) {
       const bool known = std::any_of(
@@ -491,6 +508,20 @@ std::string geometry_text(const Sensor& sensor) {
   return text;
 }
 
+/// The section range, or nothing where all of it is 0 and nothing is known of it.
+std::string range_text(const Sensor& sensor) {
+  require_length_or_none("emitter of range_errors", sensor.range_errors.emitter.size(),
+                         static_cast<std::size_t>(sensor.train.emitters()));
+  std::string text;
+  for (const RangeValue& known : range_values(sensor.train.emitters())) {
+    const double value = get_range_value(sensor, known.name);
+    if (value == 0.0 && sensor.find_knowledge(known.name) == nullptr) continue;
+    require_between(known.name, value, known.lower, known.upper, known.unit);
+    text += quantity_text(sensor, known.name, value, known.unit, nullptr);
+  }
+  return text.empty() ? text : "range:\n" + text;
+}
+
 std::string sequence_text(const Sensor& sensor, const ScanSequence& sequence) {
   require_length("rotation_angle of the sequence", sequence.rotation_angle.size(),
                  static_cast<std::size_t>(sensor.prisms()));
@@ -616,6 +647,7 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
   sensor.device_type = root.integer("device_type", 0, 255);
   read_parameters(YamlMap(root.at("parameters").value, path, "parameters"), sensor);
   read_specifications(root, sensor);
+  read_range_values(root, sensor);
   read_geometry(root, sensor);
   if (root.find("sequence") != nullptr) read_sequence(root, sensor);
   if (root.find("calibrated_against") != nullptr) {
@@ -668,6 +700,7 @@ std::string preset_text(const Sensor& sensor) {
       fields += quantity_text(sensor, s.name, sensor.*s.member, s.unit, nullptr);
     }
     if (!fields.empty()) text += fmt::format("{}:\n{}", section, fields);
+    if (section == "noise") text += range_text(sensor);
   }
   text += geometry_text(sensor);
   if (sensor.sequence) text += sequence_text(sensor, *sensor.sequence);

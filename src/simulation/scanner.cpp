@@ -18,8 +18,10 @@
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/parallel/parallel.hpp"
+#include "risley/sensors/range_values.hpp"
 #include "risley/simulation/noise.hpp"
 
+#include "simulation/beam_returns.hpp"
 #include "simulation/platform_poses.hpp"
 #include "simulation/streams.hpp"
 
@@ -28,7 +30,9 @@ namespace {
 
 constexpr std::size_t kBlockRows = 4096;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kMattIntensity = 120.0;
+/// On the sensor's scale, of a matt surface of reflectivity 1 that faces the sensor.
+constexpr double kFullIntensity = 150.0;
+constexpr double kMostIntensity = 255.0;
 
 /// What a simulation needs of the true sensor.
 void require_sensor(const sensors::Sensor& sensor) {
@@ -39,6 +43,23 @@ void require_sensor(const sensors::Sensor& sensor) {
   require_not_below("range_minimum", sensor.range_minimum, 0, "m");
   require_not_below("range_maximum", sensor.range_maximum, 0, "m");
   require_finite("range_offset", sensor.range_offset, "m");
+  require_length_or_none("emitter of range_errors", sensor.range_errors.emitter.size(),
+                         static_cast<std::size_t>(sensor.train.emitters()));
+  for (const sensors::RangeValue& value : sensors::range_values(sensor.train.emitters())) {
+    require_finite(value.name, sensors::get_range_value(sensor, value.name), value.unit);
+  }
+  require_not_below("beam_divergence_horizontal", sensor.beam_divergence_horizontal, 0, "rad");
+  require_not_below("beam_divergence_vertical", sensor.beam_divergence_vertical, 0, "rad");
+}
+
+/// What a sensor adds to the range of a return.
+double range_error(const sensors::Sensor& sensor, const BeamReturn& found, double intensity,
+                   std::size_t emitter) {
+  const sensors::RangeErrors& errors = sensor.range_errors;
+  return sensor.range_offset + errors.near * sensors::near_share(found.range) +
+         errors.incidence * found.footprint_depth +
+         errors.per_decade * sensors::intensity_decades(intensity) +
+         (errors.emitter.empty() ? 0.0 : errors.emitter[emitter]);
 }
 
 SimulationSettings checked(SimulationSettings settings) {
@@ -145,7 +166,10 @@ class Scanner::Work {
         bush_depth_(settings.seed, stream::kBushDepth),
         has_bushes_(settings.scene && settings.scene->terrain &&
                     !settings.scene->terrain->parts().bushes.empty()) {
-    if (settings.scene) station_ = settings.scene->station(settings.station);
+    if (settings.scene) {
+      station_ = settings.scene->station(settings.station);
+      returns_.emplace(*settings.scene, settings.truth);
+    }
     if (settings.platform) poses_.emplace(*settings.platform, *settings.scene, time_of(shots - 1));
     for (int i = 0; i < settings.truth.prisms(); ++i) {
       const auto at = static_cast<std::size_t>(i);
@@ -237,16 +261,7 @@ class Scanner::Work {
 
     std::optional<PlatformPoses::Cursor> cursor;
     if (poses_) cursor.emplace(*poses_);
-    /// Where a beam's origin and direction are in the scene.
-    const auto in_scene = [&](std::int64_t time_ns, const Vector3<double>& origin,
-                              const Vector3<double>& direction) {
-      if (!cursor) {
-        return std::pair{station_.position + station_.scene_from_sensor(origin),
-                         station_.scene_from_sensor(direction)};
-      }
-      const PlatformPoses::SensorPose pose = cursor->at(time_ns);
-      return std::pair{pose.point(origin), pose.direction(direction)};
-    };
+    const bool plain = settings.truth.range_errors == sensors::RangeErrors{};
     const auto range = part(rows.range, first, count);
     const auto true_range = part(truth.range, first, count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -255,19 +270,18 @@ class Scanner::Work {
       range[i] = settings.scene ? 0.0 : kNaN;
       rows.intensity[row] = 0;
       if (settings.scene && !std::isnan(beam.azimuth[i])) {
-        const auto [origin, direction] =
-            in_scene(times[i], {origin_x[i], origin_y[i], origin_z[i]}, {x[i], y[i], z[i]});
-        const auto hit =
-            scenes::nearest_hit(*settings.scene, origin, direction,
-                                has_bushes_ ? bush_depth_.uniform(first_shot + i) : 0.5);
-        if (hit) {
-          true_range[i] = hit->range;
-          if (hit->range >= settings.truth.range_minimum &&
-              hit->range <= settings.truth.range_maximum) {
-            range[i] = std::max(0.0, hit->range + settings.truth.range_offset);
-            rows.intensity[row] =
-                static_cast<std::uint8_t>(std::lround(kMattIntensity * hit->cosine));
-          }
+        SceneBeam of_shot =
+            in_scene(cursor, times[i], {origin_x[i], origin_y[i], origin_z[i]}, {x[i], y[i], z[i]});
+        if (has_bushes_) of_shot.penetration = bush_depth_.uniform(first_shot + i);
+        const BeamReturn found = returns_->of(of_shot);
+        true_range[i] = found.true_range;
+        if (found.range > 0.0) {
+          const double intensity =
+              std::min(kMostIntensity, std::round(kFullIntensity * found.reflectance));
+          rows.intensity[row] = static_cast<std::uint8_t>(intensity);
+          const double error = plain ? settings.truth.range_offset
+                                     : range_error(settings.truth, found, intensity, emitter[i]);
+          range[i] = std::max(0.0, found.range + error);
         }
       }
     }
@@ -289,10 +303,31 @@ class Scanner::Work {
     }
   }
 
+  /// A beam of the sensor where the sensor is then.
+  /// @param cursor  of the calling thread, where the sensor moves
+  SceneBeam in_scene(std::optional<PlatformPoses::Cursor>& cursor, std::int64_t time_ns,
+                     const Vector3<double>& origin, const Vector3<double>& direction) const {
+    const auto beam_of = [&](const Vector3<double>& from, const auto& turned) {
+      SceneBeam beam{from, turned(direction), {}, 0.5, 1e-9 * static_cast<double>(time_ns)};
+      if (returns_->needs_axes()) {
+        const sensors::FootprintAxes axes = sensors::footprint_axes(direction);
+        beam.axes = {turned(axes.horizontal), turned(axes.vertical)};
+      }
+      return beam;
+    };
+    if (!cursor) {
+      return beam_of(station_.position + station_.scene_from_sensor(origin),
+                     [&](const Vector3<double>& v) { return station_.scene_from_sensor(v); });
+    }
+    const PlatformPoses::SensorPose pose = cursor->at(time_ns);
+    return beam_of(pose.point(origin), [&](const Vector3<double>& v) { return pose.direction(v); });
+  }
+
   ObservationNoise noise_;
   parallel::Threads threads_;
   scenes::Station station_;
   std::optional<PlatformPoses> poses_;
+  std::optional<BeamReturns> returns_;
   RandomStream bush_depth_;
   bool has_bushes_ = false;
   std::vector<RotorMotion> rotors_;

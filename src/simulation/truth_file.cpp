@@ -13,6 +13,7 @@
 #include "risley/parallel/parallel.hpp"
 #include "risley/recordings/writer.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/sensors/range_values.hpp"
 #include "risley/simulation/trajectory_noise.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
@@ -172,6 +173,11 @@ SimulationResult simulate_to_file(
 
 std::vector<sensors::NamedValue> true_values(const SimulationResult& result) {
   std::vector<sensors::NamedValue> values = sensors::named_values(result.truth);
+  for (const sensors::RangeValue& of_ranges :
+       sensors::range_values(result.truth.train.emitters())) {
+    const double value = sensors::get_range_value(result.truth, of_ranges.name);
+    if (value != 0.0) values.push_back({of_ranges.name, value, of_ranges.unit});
+  }
   for (std::size_t i = 0; i < result.start_angles.size(); ++i) {
     values.push_back({fmt::format("rotation_angle_{}_deg", prism_letter(static_cast<int>(i))),
                       degrees_from_radians(result.start_angles[i]), "deg"});

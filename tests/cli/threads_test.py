@@ -9,6 +9,8 @@ from command import SOURCE, CommandTest
 RUNS = [
     ("simulate", "--rotor", "hunting", "--scene", SOURCE / "data/hall.yaml", "--duration-s", "0.2",
      "-o", "made.nc"),
+    ("simulate", "--scene", SOURCE / "data/real-hall.yaml", "--duration-s", "0.2", "--set", "range_near_m=0.015",
+     "--set", "range_incidence=0.3", "--set", "range_per_decade_m=0.01", "-o", "real.nc"),
     ("convert", "../walls.lvx", "-o", "walls.nc"),
     ("convert", "../walls.lvx", "-o", "walls.openpylivox.csv"),
     ("estimate", "../walls.lvx", "-o", "estimate"),

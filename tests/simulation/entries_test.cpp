@@ -134,6 +134,14 @@ TEST(Entries, ScannersAskForASensorThatFits) {
   EXPECT_EQ(run([](Sensor& s) { s.range_maximum = kNan; }),
             "range_maximum = nan m, allowed 0 and above");
   EXPECT_EQ(run([](Sensor& s) { s.range_offset = kNan; }), "range_offset = nan m, allowed finite");
+  EXPECT_EQ(run([](Sensor& s) { s.range_errors.incidence = kNan; }),
+            "range_incidence = nan 1, allowed finite");
+  EXPECT_EQ(run([](Sensor& s) {
+              s.range_errors.emitter = {0.0, 0.0};
+            }),
+            "emitter of range_errors has 2 values, expected 1 or none");
+  EXPECT_EQ(run([](Sensor& s) { s.beam_divergence_vertical = -1; }),
+            "beam_divergence_vertical = -1 rad, allowed 0 and above");
 }
 
 TEST(Entries, ScannersAskForRowsToRead) {

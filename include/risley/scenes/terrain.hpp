@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "risley/core/vector3.hpp"
+#include "risley/scenes/furniture.hpp"
 
 namespace risley::scenes {
 
@@ -19,9 +20,11 @@ inline constexpr double kFarthestHit = 1e6,  ///< to planes and faces
 
 /// Where a ray ends.
 struct Hit {
-  double range = 0;         ///< m
-  double cosine = 0;        ///< of the angle of incidence, [0, 1]
-  std::size_t surface = 0;  ///< of the scene, see Scene::surface_name
+  double range = 0;                         ///< m
+  double cosine = 0;                        ///< of the angle of incidence, [0, 1]
+  std::size_t surface = 0;                  ///< of the scene, see Scene::surface_name
+  Vector3<double> normal;                   ///< of the surface, unit vector, on either side
+  double reflectivity = kMattReflectivity;  ///< seen through all panes before it, (0, 1]
 };
 
 /// Where a map lies on the Earth: geodetic latitude and longitude, rad, and height above the

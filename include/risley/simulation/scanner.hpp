@@ -56,9 +56,17 @@ struct SimulationSettings {
 /// prism sizes are 0 sends all of them from its origin. A beam that hits nothing, or beyond the
 /// sensor's limits of range, has no return: range 0 and valid 0, with the direction it was reported
 /// for. A beam that does not get through the prisms has NaN angles too. Without a scene every range
-/// is NaN and the header says has_range = false. Intensity is that of a matt surface of 80 %
-/// reflectivity, 120 times the cosine of incidence on the sensor's scale where 150 stands for 100
-/// %; ranges do not weaken it.
+/// is NaN and the header says has_range = false. Intensity is reflectivity times the cosine of
+/// incidence on the sensor's scale, where 150 stands for 100 %; ranges do not weaken it. Reported
+/// ranges have the true sensor's range_offset and range_errors; those that depend on the intensity
+/// take the one that is reported.
+///
+/// In a scene with a footprint the true range is still that of the middle of the beam. What is
+/// reported is the mean of nine rays of equal energy, spread over the divergences of the sensor and
+/// weighted with what it receives of each, as far as their ranges follow each other within a pulse
+/// (0.6 m, assumed): the first pulse counts. Its intensity falls with the part of the beam in it.
+/// In a scene with limit_by_reflectivity a return needs reflectivity cos(incidence) / range^2 as a
+/// surface of 80 % has that faces the sensor at its range_maximum.
 class Scanner {
  public:
   /// @throws InvalidArgument naming setting, value and allowed range

@@ -59,7 +59,8 @@ SimulationResult simulate_to_file(
     const std::vector<std::pair<std::string, std::string>>& provenance,
     const Progress& progress = {});
 
-/// The true parameters, and the rotation angles at the start.
+/// The true parameters, what the sensor adds to ranges where that is not 0, and the rotation angles
+/// at the start.
 std::vector<sensors::NamedValue> true_values(const SimulationResult& result);
 
 }  // namespace risley::simulation
