@@ -68,13 +68,16 @@ void print_calibration(const CalibratedRecordings& outcome) {
     }
     table.add(row);
   }
-  if (c.range_offset_sigma > 0) {
-    const NumberText text = number_text(1e3 * c.range_offset, 1e3 * c.range_offset_sigma);
+  for (const calibration::CalibratedNumber& number : c.numbers) {
+    const bool length = number.name.ends_with("_m");
+    const double scale = length ? 1e3 : 1.0;
+    const NumberText text = number_text(scale * number.value, scale * number.sigma);
     std::vector<std::string> row = {
-        "range offset", text.value,
-        number_text(1e3 * c.range_offset, 1e3 * c.range_offset_total_sigma()).sigma};
+        length ? number.name + "m" : number.name, text.value,
+        number_text(scale * number.value, scale * number.total_sigma).sigma};
     if (any_held) row.push_back(text.sigma);
-    row.insert(row.end(), {"mm", "0"});
+    row.insert(row.end(),
+               {length ? "mm" : "1", text_to_place_of(scale * number.prior, scale * number.sigma)});
     table.add(row);
   }
   table.print();

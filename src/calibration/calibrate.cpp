@@ -391,7 +391,7 @@ void Work::fill_result(const PlanarSolution& solution) {
   result_.shape = solution.shape.mean;
   fill_held(solution);
   fill_numbers(solution);
-  WallThickness walls = wall_thickness(p, belief_.sensor.train, all_);
+  WallThickness walls = wall_thickness(solution, belief_.sensor.train, all_);
   result_.planes = std::move(walls.planes);
   result_.profiles = std::move(walls.profiles);
   result_.rms_before = walls.rms_before;

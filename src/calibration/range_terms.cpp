@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/range_terms.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -101,7 +102,11 @@ std::vector<SizePrior> size_priors(const sensors::Sensor& sensor) {
   std::vector<SizePrior> priors;
   for (PrismSize& size : own_prism_sizes(sensor.prisms())) {
     const double value = sensors::prism_size(sensor, size);
-    const double sigma = sensors::prism_size_sigma(sensor, size);
+    double sigma = sensors::prism_size_sigma(sensor, size);
+    for (const PrismSize& shared : shared_prism_sizes()) {
+      const bool same_kind = shared.rate.thickness.empty() == size.rate.thickness.empty();
+      if (same_kind) sigma = std::max(sigma, sensors::prism_size_sigma(sensor, shared));
+    }
     priors.push_back({std::move(size), value, sigma});
   }
   return priors;

@@ -103,6 +103,18 @@ FittedView fitted_view(const PrismTrain& train, const PrismGeometry& geometry,
   return view;
 }
 
+/// Root mean square of a wall's deviation over the cells with shots, m.
+double rms_where_seen(const WallGrid& grid, const Eigen::VectorXd& height) {
+  double squares = 0;
+  for (const std::uint32_t cell : grid.cells) {
+    const Eigen::Index u = cell % grid.row(), v = cell / grid.row(), row = grid.cells_u + 1;
+    const double middle = 0.25 * (height[v * row + u] + height[v * row + u + 1] +
+                                  height[(v + 1) * row + u] + height[(v + 1) * row + u + 1]);
+    squares += middle * middle;
+  }
+  return std::sqrt(squares / static_cast<double>(grid.cells.size()));
+}
+
 /// What the shots of one view say.
 struct ViewThickness {
   CalibratedPlane plane;
@@ -112,6 +124,7 @@ struct ViewThickness {
 
 ViewThickness thickness_of(const PlanarProblem& problem, std::size_t view,
                            const PrismTrain& believed, const LabelledShots& recording,
+                           double shape_sigma, double shape_length,
                            std::vector<ProfileBuilder> empty) {
   const WallView& own = problem.views[view];
   const ViewDistances d = view_distances(problem, view, recording, recording.labels.view);
@@ -141,13 +154,23 @@ ViewThickness thickness_of(const PlanarProblem& problem, std::size_t view,
   plane.rms_before = before.rms;
   plane.rms = std::sqrt(result.squares_after / n);
   plane.range_sigma = std::sqrt(own.range_variance);
+  plane.shape_sigma = shape_sigma;
+  plane.shape_length = shape_sigma > 0 ? shape_length : 0.0;
   return result;
 }
 
 }  // namespace
 
-WallThickness wall_thickness(const PlanarProblem& problem, const PrismTrain& believed,
+WallThickness wall_thickness(const PlanarSolution& solution, const PrismTrain& believed,
                              const std::vector<LabelledShots>& recordings) {
+  const PlanarProblem& problem = solution.problem;
+  // Heights are of the walls that have a grid, in their order.
+  std::vector<double> shape_sigma(problem.walls.size(), 0.0);
+  for (std::size_t w = 0, row = 0; w < problem.walls.size(); ++w) {
+    const WallGrid& grid = problem.walls[w].grid;
+    if (grid.empty() || row == solution.shape.height.size()) continue;
+    shape_sigma[w] = rms_where_seen(grid, solution.shape.height[row++]);
+  }
   std::vector<ProfileBuilder> builders;
   builders.emplace_back("incidence", 0.0, kPi / 2, kIncidenceBins);
   for (int k = 0; k < problem.train.prisms(); ++k) {
@@ -156,7 +179,8 @@ WallThickness wall_thickness(const PlanarProblem& problem, const PrismTrain& bel
   }
   std::vector<ViewThickness> views(problem.views.size());
   parallel::for_each(views.size(), [&, empty = builders](std::size_t v) {
-    views[v] = thickness_of(problem, v, believed, recordings[problem.views[v].recording], empty);
+    views[v] = thickness_of(problem, v, believed, recordings[problem.views[v].recording],
+                            shape_sigma[problem.views[v].wall], solution.shape.mean.length, empty);
   });
   WallThickness result;
   double before2 = 0, after2 = 0;

@@ -19,10 +19,10 @@ struct WallThickness {
   std::size_t points = 0;
 };
 
-/// @param problem     as adjusted
+/// @param solution    of the problem
 /// @param believed    what the sensor computed directions with
 /// @param recordings  [recordings], with labels
-WallThickness wall_thickness(const PlanarProblem& problem, const PrismTrain& believed,
+WallThickness wall_thickness(const PlanarSolution& solution, const PrismTrain& believed,
                              const std::vector<LabelledShots>& recordings);
 
 }  // namespace risley::calibration

@@ -24,6 +24,7 @@
 #include "risley/jobs/result_files.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/sensors/prism_sizes.hpp"
+#include "risley/sensors/range_values.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -88,7 +89,13 @@ std::vector<ParameterDifference> differences(const Pair& pair) {
     for (const int place : one.places) told[static_cast<std::size_t>(place)] = true;
     result.push_back(difference_of(one.name, pair, a.get(one.name), b.get(one.name)));
   }
-  result.push_back(difference_of(kRangeOffset, pair, a.range_offset, b.range_offset));
+  for (const sensors::RangeValue& value : sensors::range_values(b.train.emitters())) {
+    const bool known =
+        pair.known_a.find(value.name) >= 0 || pair.known_b.find(value.name) >= 0;
+    if (value.name != kRangeOffset && !known) continue;
+    result.push_back(difference_of(value.name, pair, sensors::get_range_value(a, value.name),
+                                   sensors::get_range_value(b, value.name)));
+  }
   for (const PrismSize& size : own_prism_sizes(b.prisms())) {
     if (pair.known_a.find(size.name) < 0 && pair.known_b.find(size.name) < 0) continue;
     result.push_back(
@@ -152,7 +159,7 @@ ChangeTest test_of_change(const Pair& pair, const NamedCovariance& sum) {
 }  // namespace
 
 double value_of(const Sensor& sensor, const std::string& name) {
-  if (name == kRangeOffset) return sensor.range_offset;
+  if (sensors::is_range_value(name)) return sensors::get_range_value(sensor, name);
   const std::optional<PrismSize> size = sensors::find_prism_size(name, sensor.prisms());
   return size ? sensors::prism_size(sensor, *size) : sensor.get(name);
 }

@@ -7,6 +7,8 @@
 #include "risley/calibration/rays.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/require.hpp"
+#include "risley/sensors/footprint.hpp"
+#include "risley/sensors/range_values.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -41,15 +43,31 @@ std::vector<SamplePoint> wall_sample(const std::vector<calibration::RangedRecord
       const SphericalAngles<double> angles = angles_from_direction(after.direction(i));
       SamplePoint one{r,
                       plane_of_shot[rows[i]],
-                      after.point(i, shots.range[i] - calibration.range_offset),
+                      {},
                       kNaN,
                       kNaN,
                       angles.azimuth,
                       angles.zenith,
                       before.direction(i) - after.direction(i)};
+      double error = sensor.range_offset;
       if (one.plane >= 0) {
         const auto& plane = calibration.planes[static_cast<std::size_t>(one.plane)];
+        const Vector3<double> beam = after.direction(i);
+        const double range = hit_distance({plane.normal, plane.distance}, after.origin(i), beam);
+        const sensors::FootprintAxes axes = sensors::footprint_axes(beam);
+        const double depth = sensors::footprint_depth(
+            range, sensors::footprint_slope(plane.normal, beam, axes.horizontal),
+            sensors::footprint_slope(plane.normal, beam, axes.vertical),
+            sensor.beam_divergence_horizontal, sensor.beam_divergence_vertical);
+        error = sensors::range_error(
+            sensor, range, depth,
+            shots.intensity.empty() ? sensors::kWalkIntensity : shots.intensity[i],
+            shots.beam.empty() ? std::size_t{0} : shots.beam[i]);
         one.before = signed_distance(plane.believed, before.point(i, shots.range[i]));
+      }
+      one.point = after.point(i, shots.range[i] - error);
+      if (one.plane >= 0) {
+        const auto& plane = calibration.planes[static_cast<std::size_t>(one.plane)];
         one.after = signed_distance({plane.normal, plane.distance}, one.point);
       }
       sample.push_back(one);

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <string_view>
 
 #include "risley/jobs/calibrate_recordings.hpp"
 #include "risley/jobs/plan_calibration.hpp"
@@ -30,6 +31,33 @@ Json unobservable_json(const std::vector<estimation::WeakDirection>& directions)
   return list;
 }
 
+Json number_json(const calibration::CalibratedNumber& number) {
+  return {{"value", number.value},
+          {"sigma", number_or_null(number.total_sigma)},
+          {"sigma_given_held", number_or_null(number.sigma)},
+          {"prior_sigma", number_or_null(number.prior_sigma)}};
+}
+
+/// By the names that presets have, less their "range_"; the offset is the constant.
+Json ranges_json(const Calibration& c) {
+  Json ranges = Json::object();
+  constexpr std::string_view kPrefix = "range_";
+  for (const calibration::CalibratedNumber& number : c.numbers) {
+    if (!number.name.starts_with(kPrefix)) continue;
+    const bool constant = number.name == "range_offset_m";
+    ranges[constant ? "constant_m" : number.name.substr(kPrefix.size())] = number_json(number);
+  }
+  return ranges;
+}
+
+Json sizes_json(const Calibration& c) {
+  Json sizes = Json::object();
+  for (const calibration::CalibratedNumber& number : c.numbers) {
+    if (number.name.starts_with("prism_")) sizes[number.name] = number_json(number);
+  }
+  return sizes;
+}
+
 }  // namespace
 
 Json of(const jobs::CalibratedRecordings& found) {
@@ -46,15 +74,17 @@ Json of(const jobs::CalibratedRecordings& found) {
          number_or_null(in_file_unit(c.free[j].name, std::sqrt(c.covariance(at, at)), shape))}};
   }
   for (const calibration::CalibratedPlane& plane : c.planes) {
-    planes.push_back({{"name", plane.name},
-                      {"recording", found.recordings[plane.recording].path},
-                      {"normal", vector_json(plane.normal)},
-                      {"offset_m", plane.distance},
-                      {"points", plane.points},
-                      {"outliers", plane.outliers},
-                      {"rms_m", plane.rms},
-                      {"before_rms_m", plane.rms_before},
-                      {"range_sigma_m", plane.range_sigma}});
+    planes.push_back(
+        {{"name", plane.name},
+         {"recording", found.recordings[plane.recording].path},
+         {"normal", vector_json(plane.normal)},
+         {"offset_m", plane.distance},
+         {"points", plane.points},
+         {"outliers", plane.outliers},
+         {"rms_m", plane.rms},
+         {"before_rms_m", plane.rms_before},
+         {"range_sigma_m", plane.range_sigma},
+         {"shape", {{"sigma_m", plane.shape_sigma}, {"length_m", plane.shape_length}}}});
   }
   for (const calibration::SurfaceStep& step : c.steps) {
     steps.push_back({{"recording", found.recordings[step.recording].path},
@@ -85,6 +115,7 @@ Json of(const jobs::CalibratedRecordings& found) {
     }
     profiles[profile.variable] = rows;
   }
+  const calibration::CalibratedNumber* offset = c.number("range_offset_m");
   Json object = {
       {"serial", found.recordings.front().serial()},
       {"verdict", verdict_json(c.verdict)},
@@ -95,10 +126,10 @@ Json of(const jobs::CalibratedRecordings& found) {
       {"observations", found.observations},
       {"points", c.points},
       {"parameters", parameters},
-      {"range_offset_m",
-       {{"value", c.range_offset},
-        {"sigma", c.range_offset_total_sigma()},
-        {"sigma_given_held", c.range_offset_sigma}}},
+      {"range_offset_m", offset ? number_json(*offset) : Json(nullptr)},
+      {"ranges", ranges_json(c)},
+      {"sizes", sizes_json(c)},
+      {"same_walls", c.same_walls},
       {"planes", planes},
       {"steps", steps},
       {"datum", datum_json(c.datum_kind, c.datum)},
@@ -117,8 +148,8 @@ Json of(const jobs::CalibratedRecordings& found) {
       {"before", {{"plane_rms_m", c.rms_before}}},
       {"after", {{"plane_rms_m", c.rms_after}}},
       {"sigma0", c.sigma0},
-      {"unevenness", c.unevenness},
-      {"variance_factor", c.variance_factor},
+      {"shape",
+       {{"sigma_m", c.shape.sigma}, {"length_m", c.shape.length}, {"white_m", c.shape.white}}},
       {"thickness", profiles}};
   add_end(found, object);
   return object;

@@ -69,9 +69,9 @@ ValueTable table_of(const jobs::CalibratedRecordings& found) {
   ValueTable table;
   const calibration::Calibration& c = found.calibration;
   add_free(table, c, c.sensor.shape());
-  if (c.range_offset_sigma > 0) {
-    add(table, "range_offset_m", "m", c.range_offset, c.range_offset_total_sigma(),
-        c.range_offset_sigma);
+  for (const calibration::CalibratedNumber& number : c.numbers) {
+    add(table, number.name, number.name == "range_incidence" ? "1" : "m", number.value,
+        number.total_sigma, number.sigma);
   }
   return table;
 }

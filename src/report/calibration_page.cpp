@@ -3,6 +3,7 @@
 #include "risley/report/calibration_page.hpp"
 
 #include <cmath>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -182,16 +183,6 @@ std::string parameters_html(const CalibrationReport& r) {
   if (truth) html += "<th>truth</th><th>error</th><th>error / σ</th>";
   html += "</tr></thead><tbody>\n";
   for (const ReportedParameter& row : r.parameters) html += parameter_row(r, row, any_held);
-  if (r.range_offset_sigma > 0) {
-    const double value = kMillimetres * r.range_offset;
-    const double sigma = kMillimetres * r.range_offset_sigma;
-    const std::string shown = to_place_of(value, sigma);
-    html += fmt::format(
-        "<tr><th scope=\"row\">range offset, which the sensor adds to every "
-        "range</th><td>{}</td>{}{}<td>mm</td><td>0</td><td>0</td><td>{}</td>{}</tr>\n",
-        shown, sigma_cell(value, sigma), any_held ? "<td></td>" : "", shown,
-        truth ? "<td></td><td></td><td></td>" : "");
-  }
   return html +
          "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation, everything "
          "included" +
@@ -201,6 +192,46 @@ std::string parameters_html(const CalibrationReport& r) {
                    : ". Nominal") +
          ": the preset. Believed: what the sensor used to compute its directions. Difference: "
          "value minus believed.</p>\n";
+}
+
+/// What a row of the table of range errors and sizes says, for readers.
+std::string number_words(const std::string& name) {
+  if (name == "range_offset_m") return "every range is longer by";
+  if (name == "range_near_m") return "at 1 m from the sensor, ranges are longer by";
+  if (name == "range_incidence")
+    return "part of a tilted footprint's depth that ranges are longer by";
+  if (name == "range_per_decade_m") return "ranges are longer for each tenth of the intensity by";
+  constexpr std::string_view kEmitter = "range_emitter_", kThickness = "prism_thickness_",
+                             kSpacing = "prism_spacing_";
+  const auto part = [&](std::string_view prefix) {
+    return name.substr(prefix.size(), name.size() - prefix.size() - 2);
+  };
+  if (name.starts_with(kEmitter)) return "ranges of emitter " + part(kEmitter) + " are longer by";
+  if (name.starts_with(kThickness)) return "thickness of prism " + part(kThickness);
+  if (name.starts_with(kSpacing)) return "spacing behind prism " + part(kSpacing);
+  return name;
+}
+
+/// Range errors and sizes of the prisms.
+std::string numbers_html(const CalibrationReport& r) {
+  if (!r.numbers || r.numbers->empty()) return "";
+  std::string html =
+      "<div class=\"wide\"><table><thead><tr><th>ranges and beam origin</th><th>value</th>"
+      "<th>σ</th><th>σ before</th><th>unit</th></tr></thead><tbody>\n";
+  for (const calibration::CalibratedNumber& number : *r.numbers) {
+    const bool length = number.name.ends_with("_m");
+    const double scale = length ? kMillimetres : 1.0;
+    const double value = scale * number.value, sigma = scale * number.total_sigma;
+    html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td>{}<td>{}</td><td>{}</td></tr>\n",
+                        escape_html(number_words(number.name)), to_place_of(value, sigma),
+                        sigma_cell(value, sigma), finite_text("{:.2g}", scale * number.prior_sigma),
+                        length ? "mm" : "1");
+  }
+  return html +
+         "</tbody></table></div>\n<p class=\"note\">σ before: what was assumed. A σ that hardly "
+         "changed means that these walls do not determine the value: boards of one material and "
+         "known thickness, or dark and light patches on one wall, determine the error that depends "
+         "on intensity.</p>\n";
 }
 
 std::string formal_datum_row(const char* name, const FormalDatum& datum) {
@@ -354,15 +385,16 @@ std::string planes_html(const CalibrationReport& r) {
       "before with the believed parameters and a plane fitted to them. Outliers: shots near the "
       "plane that were not used. Range σ: noise of one range that the residuals show.</p>\n";
   html += fmt::format(
-      "<p>The residuals scatter {} times as much as the stated range noise predicts. Means over "
-      "cells of one degree have {} times the variance that noise alone would give them; 1 is a "
-      "flat wall.{}</p>\n",
-      finite_text("{:.3g}", r.sigma0), finite_text("{:.3g}", r.unevenness),
-      r.variance_factor == 1
-          ? ""
-          : fmt::format(" Because the walls are uneven, every variance on this page was "
-                        "multiplied by {}.",
-                        finite_text("{:.3g}", r.variance_factor)));
+      "<p>The residuals scatter {} times as much as the stated range noise "
+      "predicts.</p>\n",
+      finite_text("{:.3g}", r.sigma0));
+  if (r.shape && r.shape->sigma > 0) {
+    html += fmt::format(
+        "<p>The walls wave by {} mm (one standard deviation) over {} m. Every sigma on this page "
+        "includes what this may do to the result.</p>\n",
+        finite_text("{:.2g}", kMillimetres * r.shape->sigma),
+        finite_text("{:.2g}", r.shape->length));
+  }
   return html;
 }
 
@@ -396,7 +428,7 @@ std::string calibration_page(const CalibrationReport& r) {
   std::string pointing = pointing_html(r);
   if (r.pointing_charts) pointing += charts_html(*r.pointing_charts, figures, 1);
   sections.add("Where the sensor points", pointing, Sections::Shown::unfolded);
-  sections.add("Parameters", parameters_html(r), Sections::Shown::unfolded);
+  sections.add("Parameters", parameters_html(r) + numbers_html(r), Sections::Shown::unfolded);
   sections.add("Datum", datum_html(r) + charts_html(r.truth_charts, figures));
   sections.add("Walls", planes_html(r) + steps_html(r) + charts_html(r.wall_charts, figures));
   sections.add("Thickness of the walls",

@@ -466,8 +466,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
   report.points = c.points;
   report.parameters = parameters_of(input);
-  report.range_offset = c.range_offset;
-  report.range_offset_sigma = c.range_offset_total_sigma();
+  report.numbers = c.numbers;
   for (const estimation::FreeParameter& free : c.free) report.free.push_back(free.name);
   report.covariance = c.covariance;
   report.unobservable = c.unobservable;
@@ -481,8 +480,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.rms_before = c.rms_before;
   report.rms_after = c.rms_after;
   report.sigma0 = c.sigma0;
-  report.unevenness = c.unevenness;
-  report.variance_factor = c.variance_factor;
+  report.shape = c.shape;
   if (input.truth) report.truth = {input.truth->before, input.truth->after};
   report.provenance = input.provenance;
   const CalibrationCharts charts(input);

@@ -152,6 +152,23 @@ void fields(Archive& archive, T& plane) {
   archive("range_sigma_m", plane.range_sigma);
 }
 
+template <class Archive, report::FieldsOf<CalibratedNumber> T>
+void fields(Archive& archive, T& number) {
+  archive("name", number.name);
+  archive("value", number.value);
+  archive("prior", number.prior);
+  archive("prior_sigma", number.prior_sigma);
+  archive("sigma", number.sigma);
+  archive("total_sigma", number.total_sigma);
+}
+
+template <class Archive, report::FieldsOf<ShapeParameters> T>
+void fields(Archive& archive, T& shape) {
+  archive("sigma_m", shape.sigma);
+  archive("length_m", shape.length);
+  archive("white_m", shape.white);
+}
+
 template <class Archive, report::FieldsOf<SurfaceStep> T>
 void fields(Archive& archive, T& step) {
   archive("recording", step.recording);
@@ -371,8 +388,7 @@ void fields(Archive& archive, T& report) {
   archive("warnings", report.warnings);
   archive("points", report.points);
   archive("parameters", report.parameters);
-  archive("range_offset_m", report.range_offset);
-  archive("range_offset_sigma_m", report.range_offset_sigma);
+  archive("numbers", report.numbers);
   archive("free", report.free);
   archive("covariance", report.covariance);
   archive("unobservable", report.unobservable);
@@ -386,8 +402,7 @@ void fields(Archive& archive, T& report) {
   archive("rms_before_m", report.rms_before);
   archive("rms_after_m", report.rms_after);
   archive("sigma0", report.sigma0);
-  archive("unevenness", report.unevenness);
-  archive("variance_factor", report.variance_factor);
+  archive("shape", report.shape);
   archive("truth", report.truth);
   archive("truth_charts", report.truth_charts);
   archive("pointing_charts", report.pointing_charts);

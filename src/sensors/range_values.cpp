@@ -61,6 +61,14 @@ bool is_range_value(std::string_view name) {
                      [&](const RangeValue& value) { return value.name == name; });
 }
 
+double range_error(const Sensor& sensor, double range, double footprint_depth, double intensity,
+                   std::size_t emitter) {
+  const RangeErrors& errors = sensor.range_errors;
+  return sensor.range_offset + errors.near * near_share(range) +
+         errors.incidence * footprint_depth + errors.per_decade * intensity_decades(intensity) +
+         (errors.emitter.empty() ? 0.0 : errors.emitter[emitter]);
+}
+
 double get_range_value(const Sensor& sensor, std::string_view name) {
   find_range_value(sensor, name);
   if (name == kOffset) return sensor.range_offset;

@@ -52,16 +52,6 @@ void require_sensor(const sensors::Sensor& sensor) {
   require_not_below("beam_divergence_vertical", sensor.beam_divergence_vertical, 0, "rad");
 }
 
-/// What a sensor adds to the range of a return.
-double range_error(const sensors::Sensor& sensor, const BeamReturn& found, double intensity,
-                   std::size_t emitter) {
-  const sensors::RangeErrors& errors = sensor.range_errors;
-  return sensor.range_offset + errors.near * sensors::near_share(found.range) +
-         errors.incidence * found.footprint_depth +
-         errors.per_decade * sensors::intensity_decades(intensity) +
-         (errors.emitter.empty() ? 0.0 : errors.emitter[emitter]);
-}
-
 SimulationSettings checked(SimulationSettings settings) {
   const auto prisms = static_cast<std::size_t>(settings.truth.prisms());
   require_between("duration", settings.duration, 1e-9, 1e7, "s");
@@ -279,8 +269,10 @@ class Scanner::Work {
           const double intensity =
               std::min(kMostIntensity, std::round(kFullIntensity * found.reflectance));
           rows.intensity[row] = static_cast<std::uint8_t>(intensity);
-          const double error = plain ? settings.truth.range_offset
-                                     : range_error(settings.truth, found, intensity, emitter[i]);
+          const double error =
+              plain ? settings.truth.range_offset
+                    : sensors::range_error(settings.truth, found.range, found.footprint_depth,
+                                           intensity, emitter[i]);
           range[i] = std::max(0.0, found.range + error);
         }
       }

@@ -215,8 +215,9 @@ class WallMonteCarlo {
     formal_shape2_ += std::pow(datum.shape, 2);
     steps += static_cast<int>(c.steps.size());
     iterations = std::max(iterations, c.iterations);
-    variance_factor_ += c.variance_factor;
-    if (c.range_offset_sigma > 0) offset2_ += std::pow(c.range_offset / c.range_offset_sigma, 2);
+    if (const auto* offset = c.number("range_offset_m")) {
+      offset2_ += std::pow(offset->value / offset->sigma, 2);
+    }
     Eigen::VectorXd error = c.parameters;
     for (Eigen::Index j = 0; j < error.size(); ++j) {
       error[j] -= truth.train[c.free[static_cast<std::size_t>(j)].places.front()];
@@ -244,7 +245,6 @@ class WallMonteCarlo {
   /// Half the width of the band around 1 that holds it in 999 of 1000 cases.
   double nees_band() const { return 3.3 * std::sqrt(2.0 / parameters_); }
   double within_two_sigma() const { return covered_ / parameters_; }
-  double mean_variance_factor() const { return variance_factor_ / runs; }
   double mean_azimuth_before() const { return azimuth_before / runs; }
   double mean_zenith_before() const { return zenith_before / runs; }
 
@@ -269,7 +269,6 @@ class WallMonteCarlo {
     one("nees", nees());
     one("nees_band", nees_band());
     one("within_two_sigma", within_two_sigma());
-    one("variance_factor", mean_variance_factor());
     one("steps", steps);
     one("iterations", iterations);
   }
@@ -283,7 +282,7 @@ class WallMonteCarlo {
   double total_ = 0, gauge_ = 0, shape_ = 0;
   double total2_ = 0, shape2_ = 0, formal_total2_ = 0, formal_shape2_ = 0, offset2_ = 0;
   double reported_over_sigma2_ = 0;
-  double nees_ = 0, parameters_ = 0, covered_ = 0, variance_factor_ = 0;
+  double nees_ = 0, parameters_ = 0, covered_ = 0;
 };
 
 /// Simulates, estimates and calibrates one recording for every seed.

@@ -37,8 +37,9 @@ struct CalibrationReport {
   std::size_t points = 0;  ///< used
 
   std::vector<ReportedParameter> parameters;
-  double range_offset = 0, range_offset_sigma = 0;  ///< m; sigma 0 where it was held
-  std::vector<std::string> free;                    ///< what the covariance is of
+  /// Sizes of the prisms and range errors; not in files of older versions.
+  std::optional<std::vector<calibration::CalibratedNumber>> numbers;
+  std::vector<std::string> free;  ///< what the covariance is of
   Eigen::MatrixXd covariance;                       ///< [free, free]
   std::vector<estimation::WeakDirection> unobservable;
 
@@ -49,7 +50,8 @@ struct CalibrationReport {
   std::vector<calibration::CalibratedPlane> planes;
   std::vector<calibration::SurfaceStep> steps;
   double rms_before = kUnknown, rms_after = kUnknown;  ///< of all planes, m
-  double sigma0 = 0, unevenness = 1, variance_factor = 1;
+  double sigma0 = 0;
+  std::optional<calibration::ShapeParameters> shape;  ///< not in files of older versions
 
   /// Of the beams of all recordings together, against the truth of simulations.
   struct Truth {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,14 @@ std::vector<RangeValue> range_values(int emitters);
 
 /// Whether it is the name of a range value of some sensor.
 bool is_range_value(std::string_view name);
+
+/// What a sensor adds to one range, m, see RangeErrors.
+/// @param range            true, m
+/// @param footprint_depth  see footprint_depth(), m
+/// @param intensity        as reported
+/// @param emitter          that fired, from 0
+double range_error(const Sensor& sensor, double range, double footprint_depth, double intensity,
+                   std::size_t emitter);
 
 /// @throws InvalidArgument for a name that the sensor does not have
 double get_range_value(const Sensor& sensor, std::string_view name);
