@@ -28,6 +28,10 @@ TEST(Entries, RaysAskForAnOriginAndAUnitVector) {
   EXPECT_EQ(run({0, 0, 0}, {2, 0, 0}), "direction has length 2, expected a unit vector");
   EXPECT_EQ(run({0, 0, 0}, {0, kNan, 0}), "direction has length nan, expected a unit vector");
   EXPECT_EQ(run({0, 0, 0}, {1, 0, 0}), "");
+  EXPECT_EQ(refusal([&] {
+              return nearest_hit(scene, {0, 0, 0}, {1, 0, 0}, 0.5, kNan);
+            }),
+            "time = nan s, allowed finite");
 }
 
 TEST(Entries, StationsAskForAKnownName) {

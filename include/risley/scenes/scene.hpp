@@ -97,8 +97,8 @@ struct Scene {
 /// @param direction    unit vector, scene frame
 /// @param penetration  how much of its way through a bush the ray gets, (0, 1)
 /// @param time         when, for people who walk, s
-/// @throws InvalidArgument for an origin that is not finite, a direction that is no unit vector or
-///         a penetration that is not between 0 and 1
+/// @throws InvalidArgument for an origin or a time that is not finite, a direction that is no unit
+///         vector or a penetration that is not between 0 and 1
 std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin,
                                const Vector3<double>& direction, double penetration = 0.5,
                                double time = 0.0);
