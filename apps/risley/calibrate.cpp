@@ -44,7 +44,7 @@ struct CalibrateCommandOptions {
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg, tolerance_deg;
   std::optional<double> range_offset_sigma_m, knot_spacing_s, cell_size_m;
   double duration_s = 10.0, empty_circle_m = cloud::PointDistributionOptions{}.empty_circle;
-  bool force = false, no_report = false;
+  bool force = false, no_report = false, same_walls = false;
   ParameterWishes parameters;
   ReadingWishes reading;
 };
@@ -105,6 +105,7 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   jobs::CalibrateRecordingsOptions job;
   take_recordings(options, common, job);
   job.beam_origin = options.beam_origin == "yes";
+  if (options.same_walls) job.same_walls = calibration::SameWalls::yes;
   if (options.method == "paper") job.method = calibration::CalibrationMethod::paper;
   if (!options.planes.empty()) job.planes = scenes::load_scene(options.planes);
   job.stations = jobs::stations_of(options.stations, options.station_names, options.inputs.size());
@@ -383,6 +384,12 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
                   "Prior: 1 sigma of the range offset about what the sensor states, m; 0 holds it "
                   "there (default: 0.05, for a flight 0.02)");
+  verb.add_flag(
+          "--same-walls", o.same_walls,
+          "The recordings are of the same walls from poses that differ by a turn, best a roll "
+          "of 180 degrees on the spot: the walls' shape then cancels (default: if their planes "
+          "fit in one way only)")
+      ->excludes("--plan");
   verb.add_option("--tolerance-deg", o.tolerance_deg,
                   "Root mean square error of directions up to which a unit counts as sound, deg "
                   "(default: the manufacturer's specification, as in the preset)")

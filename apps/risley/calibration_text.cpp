@@ -138,8 +138,12 @@ void print_forecast(const CalibrationForecast& f, TrainShape shape) {
   table.print();
   say("\n");
   print_datum(f.datum_kind, f.datum);
-  say("error of a direction by noise alone: {} deg ({})\n", plain_text(deg(f.datum.total), 2),
-      offset_text(f.datum.total));
+  say("error of a direction, from noise and the shape of the walls: {} deg ({})\n",
+      plain_text(deg(f.datum.total), 2), offset_text(f.datum.total));
+  if (f.rolled) {
+    say("the same time in two poses, rolled by 180 degrees on the spot: {} deg ({})\n",
+        plain_text(deg(f.rolled->total), 2), offset_text(f.rolled->total));
+  }
   for (const auto& weak : f.unobservable) {
     say("not told by these walls: {}\n", direction_text(weak));
   }

@@ -43,6 +43,7 @@ constexpr OptionName kNames[] = {
     {"rate", "--rate-hz"},
     {"recordings", "INPUT"},
     {"rotor_process", "--process-noise"},
+    {"same_walls", "--same-walls"},
     {"scene", "--scene"},
     {"sensor", "--sensor"},
     {"sensor_type", "--sensor-type"},

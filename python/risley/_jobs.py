@@ -98,9 +98,10 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
               range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
               prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
               tolerance: Optional[float] = None, tolerance_deg: Optional[float] = None,
-              beam_origin: bool = True, fixed: Fixed = (), free: Iterable[str] = (),
-              mirrored: Optional[bool] = None, truth: Union[Path, Sequence[Path]] = (),
-              force: bool = False, states: str = "knots", shot_rate: Optional[float] = None,
+              beam_origin: bool = True, same_walls: Optional[bool] = None, fixed: Fixed = (),
+              free: Iterable[str] = (), mirrored: Optional[bool] = None,
+              truth: Union[Path, Sequence[Path]] = (), force: bool = False,
+              states: str = "knots", shot_rate: Optional[float] = None,
               extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None, seed: int = 0,
               threads: int = 0,
               progress: Progress = None) -> Union[Calibration, FlightCalibration]:
@@ -150,6 +151,9 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         default the manufacturer's specification, as in the preset.
     beam_origin : bool, default True
         Whether beams start where they leave the last prism.
+    same_walls : bool, optional
+        Whether the recordings are of the same walls from poses that differ by a turn, so that the
+        walls' shape cancels; by default where their planes fit in one way only.
     fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, threads, progress
         As in `risley.estimate`.
     truth : str, path or a sequence of them
@@ -185,7 +189,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         "mirrored": mirrored, "truth": _paths(truth), "force": force, "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
     on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),
-                "station": list(station), "beam_origin": beam_origin, "states": states}
+                "station": list(station), "beam_origin": beam_origin, "same_walls": same_walls,
+                "states": states}
     in_flight = {"trajectory": os.fspath(trajectory), "trajectory_topic": trajectory_topic,
                  "mount": os.fspath(mount), "accuracy": os.fspath(accuracy),
                  "trajectory_errors": os.fspath(trajectory_errors),

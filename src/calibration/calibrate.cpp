@@ -321,9 +321,21 @@ class Work {
     }
   }
 
+  /// Labels all shots, less the steps, and gives every view its own. Views that are left with too
+  /// few are none, and their shots look for another.
+  void share_out(bool steps) {
+    for (;;) {
+      label_all();
+      if (steps && !paper()) result_.steps = leave_out_steps(problem_, all_);
+      hand_out_all();
+      const std::size_t before = problem_.views.size();
+      drop_empty_views(problem_);
+      if (problem_.views.size() == before) return;
+    }
+  }
+
   PlanarSolution adjust_fully() {
-    label_all();
-    hand_out_all();
+    share_out(false);
     // The first solution bends towards steps and hides their rims: labels and solution take turns
     // until what is left out stays the same.
     PlanarSolution solution;
@@ -335,12 +347,10 @@ class Work {
       problem_ = solution.problem;
       progress_.report(0.5 + 0.08 * (round + 1));
       if (settled || round + 1 == kMostFullRounds) break;
-      label_all();
-      if (!paper()) result_.steps = leave_out_steps(problem_, all_);
+      share_out(true);
       const std::size_t before = std::exchange(left_out, 0);
       for (const SurfaceStep& step : result_.steps) left_out += step.points;
       settled = std::max(before, left_out) - std::min(before, left_out) <= left_out / kSettledPart;
-      hand_out_all();
     }
     if (paper()) return solution;
     problem_.shape = building_walls();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -13,13 +14,17 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/batch.hpp"
+#include "risley/sensors/range_errors.hpp"
 
+#include "calibration/range_terms.hpp"
 #include "calibration/shot_labels.hpp"
 #include "calibration/wall_matching.hpp"
 
 namespace risley::calibration {
 namespace {
 
+/// A second pose is worth its trouble where it makes sigmas smaller by this.
+constexpr double kWorthRolling = 0.8;
 /// Shots of every recording that stand for all of them: their own share of a wall is then known to
 /// 0.4 %, sqrt(0.25 / 20000).
 constexpr std::size_t kSampleShots = 20000;
@@ -64,6 +69,13 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
     advice.push_back(fmt::format(
         "only {:.0f} % of the shots meet a wall: walls that fill the field of view show more",
         100.0 * all / recordings));
+  }
+  if (f.rolled && f.rolled->total < kWorthRolling * f.datum.total) {
+    advice.push_back(fmt::format(
+        "scan half of the time, roll the sensor by 180 degrees on the spot and scan the same walls "
+        "again (option same_walls): their shape then cancels, and directions are known to {:.2g} "
+        "instead of {:.2g} degrees",
+        degrees_from_radians(f.rolled->total), degrees_from_radians(f.datum.total)));
   }
   if (std::hypot(f.datum.sigma_pitch, f.datum.sigma_yaw) > kPoorDatum) {
     if (steep < 0.5 * all) {
@@ -131,7 +143,12 @@ AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
   return adjusted;
 }
 
-CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress) {
+namespace {
+
+/// What the plan is good for with the poses of its stations.
+/// @param poses_found  nobody states how the stations stood to each other, and their walls tell it
+CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
+                                  const Progress& progress) {
   const sensors::Sensor& sensor = plan.sensor;
   const double rate = plan.rate.value_or(sensor.shot_rate);
   const double noise = plan.range_noise.value_or(sensor.range_noise);
@@ -149,6 +166,12 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
   problem.free = std::move(adjusted.free);
   problem.prior_sigma = std::move(adjusted.prior_sigma);
   problem.range_offset_sigma = plan.range_offset_sigma;
+  problem.range_terms = range_terms_of(sensor, true);
+  problem.divergence = {sensor.beam_divergence_horizontal, sensor.beam_divergence_vertical};
+  if (plan.beam_origin) {
+    problem.geometry = one_size_each(problem.geometry, sensor.prisms());
+    problem.sizes = size_priors(sensor);
+  }
   // One shot of the sample stands for several: its variance is divided by their number.
   const double weight = plan.duration * rate / static_cast<double>(kSampleShots);
   const double variance =
@@ -205,6 +228,8 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
                               seen.incidence[w] / n, seen.range[w] / n});
       result.shots += n * weight;
       auto shots = std::make_shared<RangedShots>(rows_of(all, seen.rows[w]));
+      // Intensities as of one matt material: walls of one colour do not tell the walk error.
+      shots->intensity.assign(shots->size(), static_cast<std::uint8_t>(sensors::kWalkIntensity));
       // The plane in the sensor's frame: R^T n, and nearer by what the station stands towards it.
       const Vector3<double>& n_scene = plane.plane.normal;
       const Vector3<double> axes[] = {station.scene_from_sensor({1, 0, 0}),
@@ -222,7 +247,7 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
   const bool known_normals =
       std::any_of(plan.scene.planes.begin(), plan.scene.planes.end(),
                   [](const scenes::ScenePlane& plane) { return plane.normal_sigma.has_value(); });
-  const bool tied = plan.stations_known && with_stations;
+  const bool tied = (plan.stations_known || poses_found) && with_stations;
   std::optional<scenes::Scene> planes;
   if (known_normals || tied) planes = plan.scene;
   WallMatching matching = match_walls(found, names, planes,
@@ -234,7 +259,21 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
     problem.views[i].wall = found[i].wall;
     problem.views[i].side = found[i].side;
   }
-  result.datum_kind = datum_kind(known_normals, tied && stations.size() > 1);
+  if (poses_found) {
+    for (std::size_t s = 0; s < problem.stations.size(); ++s) {
+      problem.stations[s].sigma = s == 0 ? 0.0 : std::numeric_limits<double>::infinity();
+    }
+  }
+  result.datum_kind = datum_kind(known_normals, tied && !poses_found && stations.size() > 1);
+  problem.shape = building_walls();
+  problem.shape.from_data = false;
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+    auto shots = std::make_shared<RangedShots>(*problem.views[v].shots);
+    fill_range_terms(problem, v, *shots);
+    problem.views[v].shots = std::move(shots);
+  }
+  lay_grids(problem);
+  std::erase_if(problem.views, [](const WallView& view) { return view.shots->size() == 0; });
 
   AdjustmentOptions options;
   options.most_iterations = 0;  // ranges are exact: the plan is its own solution
@@ -247,6 +286,24 @@ CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progre
       solution.information + prior_information(problem), problem.free, kWidestDirection);
   result.datum =
       BeamBundle(problem.train, problem.free, bundle, bundle_beam).formal_datum(result.covariance);
+  return result;
+}
+
+}  // namespace
+
+CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress) {
+  CalibrationForecast result = forecast_once(plan, false, progress);
+  if (plan.scene.stations.size() < 2) {
+    // The same time in two poses, of which the second is the first rolled on the spot.
+    CalibrationPlan rolled = plan;
+    rolled.duration = 0.5 * plan.duration;
+    if (rolled.scene.stations.empty()) rolled.scene.stations.emplace_back();
+    rolled.scene.stations.front().name = "upright";
+    rolled.scene.stations.push_back(rolled.scene.stations.front());
+    rolled.scene.stations.back().name = "rolled";
+    rolled.scene.stations.back().roll += kPi;
+    result.rolled = forecast_once(rolled, true, progress.silent()).datum;
+  }
   result.advice = advice_for(result, plan);
   progress.report(1.0);
   return result;

@@ -642,9 +642,11 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
   const HeldQuantities none;
   const Places places(problem, none);
   PlanarSolution solution;
-  System system = build_system(problem, none, at, places, options.set);
+  const bool shaped = has_shape(problem);
+  System system;
+  if (!shaped) system = build_system(problem, none, at, places, options.set);
   double damping = 1e-8;
-  while (solution.iterations < options.most_iterations) {
+  while (!shaped && solution.iterations < options.most_iterations) {
     const algebra::SymmetricSolver solver(system.hessian, damping);
     if (!solver.positive()) {  // flat in some direction
       damping = std::max(10.0 * damping, 1e-8);
@@ -676,19 +678,11 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
       if (damping > kMostDamping) break;
     }
   }
-  for (std::size_t view = 0; view < problem.views.size(); ++view) {
-    if (system.view_shots[view] == 0) {
-      throw EstimationError(fmt::format("no shot meets the plane of wall {}",
-                                        problem.walls[problem.views[view].wall].name));
-    }
-  }
   const Index free = at.free(), n = at.size();
-  const bool shaped = has_shape(problem);
   Eigen::MatrixXd covariance, shift, normal;
   bool positive = false;
   if (shaped) {
-    solution.converged = solution.converged &&
-                         take_shape_steps(problem, at, places, options, system, solution, progress);
+    solution.converged = take_shape_steps(problem, at, places, options, system, solution, progress);
     positive = solution.shape.positive;
     covariance = solution.shape.covariance;
     shift = solution.shape.response;
@@ -700,6 +694,12 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
     if (positive) {
       covariance = solver.inverse();
       shift = -algebra::product(covariance, system.considered);
+    }
+  }
+  for (std::size_t view = 0; view < problem.views.size(); ++view) {
+    if (system.view_shots[view] == 0) {
+      throw EstimationError(fmt::format("no shot meets the plane of wall {}",
+                                        problem.walls[problem.views[view].wall].name));
     }
   }
   if (!positive) {

@@ -33,6 +33,9 @@ calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOption
         "option method paper cannot be combined with option planes, option stations or option "
         "prior_sigma: it uses the walls of the recordings alone");
   }
+  if (options.same_walls == calibration::SameWalls::yes && options.recordings.size() < 2) {
+    throw InvalidArgument("option same_walls needs two recordings or more, found 1");
+  }
   if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
   calibration::CalibrationOptions result;
   result.method = options.method;
@@ -42,6 +45,7 @@ calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOption
   result.prior_sigma = options.prior_sigma;
   result.range_offset_sigma = options.range_offset_sigma;
   result.tolerance = options.tolerance;
+  result.same_walls = options.same_walls;
   result.beam_origin = options.beam_origin;
   result.planes = options.planes;
   result.stations = options.stations;

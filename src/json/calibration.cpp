@@ -179,6 +179,8 @@ Json of(const jobs::PlannedCalibration& planned) {
                  {"unobservable", unobservable_json(f.unobservable)},
                  {"walls", walls},
                  {"observations", f.shots},
+                 {"rolled_180_deg",
+                  f.rolled ? datum_json(calibration::DatumKind::none, *f.rolled) : Json(nullptr)},
                  {"advice", f.advice}});
   return object;
 }

@@ -202,6 +202,9 @@ std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int thre
                                    calibration::CalibrationMethod::paper};
   job.method = kMethods.at(options.choice("method", {"adjustment", "paper"}));
   options.take("beam_origin", job.beam_origin);
+  if (std::optional<bool> same; options.take("same_walls", same), same) {
+    job.same_walls = *same ? calibration::SameWalls::yes : calibration::SameWalls::no;
+  }
   std::string planes, stations;
   std::vector<std::string> station_names;
   options.take("planes", planes);

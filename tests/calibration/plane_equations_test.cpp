@@ -113,7 +113,7 @@ struct Reference {
                                       Jet(0.0, kParameters + N + 1) * lifted(view.tangent_2);
     const Jet plane_distance(view.plane.distance, kParameters + N + 2);
 
-    const PlaneColumns columns{static_cast<int>(view.places.size()), N};
+    const PlaneColumns columns(view);
     hessian = hessian_size = Eigen::MatrixXd::Zero(columns.size(), columns.size());
     gradient = gradient_size = Eigen::VectorXd::Zero(columns.size());
     for (std::size_t i = 0; i < shots.size(); ++i) {
@@ -493,6 +493,94 @@ TEST(PlaneEquations, WrongLengthsAndPlacesAreRefused) {
   std::vector<double> column(shots.size() + 1);
   EXPECT_THROW(plane_equations(shots, view, {column, {}}), InvalidArgument);
   EXPECT_THROW(plane_equations(shots, view, {{}, column}), InvalidArgument);
+}
+
+/// Shots with terms of range errors and sizes of the prisms among the columns.
+struct WithNumbers {
+  PlaneView view = wall_view("PA-AP", {place::incident_beam_vertical()}, 1);
+  RangedShots shots;
+
+  WithNumbers() {
+    view.sizes = own_prism_sizes(2);
+    view.range_terms = {0.02, -0.01};
+    shots = shoot(view, 500, kRangeNoise, 6);
+    std::mt19937_64 generator(7);
+    std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+    shots.range_terms.resize(2);
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      for (auto& term : shots.range_terms) term.push_back(uniform(generator));
+    }
+  }
+};
+
+TEST(PlaneEquations, SizesAndRangeTermsHaveTheirDerivatives) {
+  const WithNumbers at;
+  for (const InstructionSet set : available_instruction_sets()) {
+    const PlaneColumns columns(at.view);
+    const PlaneEquations middle = plane_equations(at.shots, at.view, {}, set);
+    // The cost is quadratic in these but for the weights: half its slope is the gradient.
+    const auto slope = [&](auto change) {
+      constexpr double kStep = 1e-4;
+      PlaneView forth = at.view, back = at.view;
+      change(forth, kStep);
+      change(back, -kStep);
+      return (plane_equations(at.shots, forth, {}, set).cost -
+              plane_equations(at.shots, back, {}, set).cost) /
+             (2.0 * kStep);
+    };
+    for (int i = 0; i < columns.sizes; ++i) {
+      const double found = slope([i](PlaneView& view, double step) {
+        if (i < 2) {
+          view.geometry.thickness[static_cast<std::size_t>(i)] += step;
+        } else {
+          view.geometry.spacing[0] += step;
+        }
+      });
+      EXPECT_NEAR(middle.gradient[columns.prism_size(i)], -0.5 * found, 1e-5 * std::abs(found))
+          << i;
+    }
+    for (int i = 0; i < columns.terms; ++i) {
+      const double found = slope([i](PlaneView& view, double step) {
+        view.range_terms[static_cast<std::size_t>(i)] += step;
+      });
+      EXPECT_NEAR(middle.gradient[columns.range_term(i)], -0.5 * found, 1e-5 * std::abs(found))
+          << i;
+    }
+  }
+}
+
+TEST(PlaneEquations, CellsSumUpToAllShots) {
+  WithNumbers at;
+  const std::vector<std::uint32_t> cells{0, 3, 3, 70, 71, 300, 500};
+  for (const InstructionSet set : available_instruction_sets()) {
+    const PlaneColumns columns(at.view);
+    at.view.cell_begin = {};
+    const PlaneEquations all = plane_equations(at.shots, at.view, {}, set);
+    EXPECT_EQ(all.cells.size(), 0);
+    at.view.cell_begin = cells;
+    const PlaneEquations by_cells = plane_equations(at.shots, at.view, {}, set);
+    ASSERT_EQ(by_cells.cells.rows(), 18);
+    const int rows[] = {columns.distance(), columns.normal(0), columns.normal(1)};
+    for (int kind = 0; kind < 3; ++kind) {
+      for (int column = 0; column <= columns.size(); ++column) {
+        double sum = 0;
+        for (int cell = 0; cell < 6; ++cell) sum += by_cells.cells(3 * cell + kind, column);
+        const double expected =
+            column < columns.size() ? all.hessian(rows[kind], column) : all.gradient[rows[kind]];
+        EXPECT_NEAR(sum, expected,
+                    1e-9 * std::sqrt(all.hessian(rows[kind], rows[kind])) *
+                        std::sqrt(column < columns.size() ? all.hessian(column, column) : all.cost))
+            << kind << ' ' << column;
+      }
+    }
+    // A cell alone: the shots of the third one.
+    EXPECT_TRUE((by_cells.cells.middleRows<3>(3).array() == 0).all());
+  }
+  const std::vector<std::uint32_t> wrong{0, 5, 3, 500}, short_by_one{0, 499};
+  at.view.cell_begin = wrong;
+  EXPECT_THROW(plane_equations(at.shots, at.view), InvalidArgument);
+  at.view.cell_begin = short_by_one;
+  EXPECT_THROW(plane_equations(at.shots, at.view), InvalidArgument);
 }
 
 }  // namespace risley::calibration::plane_equations_test

@@ -56,7 +56,7 @@ MatrixXd precision_of(const WallGrid& grid, const ShapeParameters& p) {
 
 struct Wall {
   calibration::WallSums sums;
-  MatrixXd rows;  ///< [shots, unknowns + quantities + 1], weighted: columns and the residual
+  MatrixXd rows;   ///< [shots, unknowns + quantities + 1], weighted: columns and the residual
   MatrixXd nodes;  ///< [shots, nodes], weighted
   MatrixXd white;  ///< [shots, cells], weighted
 };
@@ -75,7 +75,8 @@ Wall wall_of(const WallGrid& grid, Index columns, std::uint64_t seed) {
   wall.white.setZero(kShots, cells);
   std::uint64_t number = 0;
   for (Index i = 0; i < kShots; ++i) {
-    const auto cell = static_cast<std::size_t>(random.uniform(number++) * static_cast<double>(cells));
+    const auto cell =
+        static_cast<std::size_t>(random.uniform(number++) * static_cast<double>(cells));
     const double du = grid.spacing * (random.uniform(number++) - 0.5);
     const double dv = grid.spacing * (random.uniform(number++) - 0.5);
     const double d = 50.0 * (1.0 + random.uniform(number++));
@@ -127,8 +128,8 @@ Dense dense(const std::vector<Wall>& walls, const ShapeParameters& p, const Matr
   result.covariance = normal.inverse();
   result.step = result.covariance * right;
   result.response = -result.covariance * cross;
-  result.log_likelihood = -0.5 * (determinant + std::log(normal.determinant()) + squares -
-                                  right.dot(result.step));
+  result.log_likelihood =
+      -0.5 * (determinant + std::log(normal.determinant()) + squares - right.dot(result.step));
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -472,43 +473,115 @@ INSTANTIATE_TEST_SUITE_P(Calibration, DoorTest, ::testing::Values(0.02, 0.05, 0.
                            return fmt::format("{:.0f}mm", 1e3 * depth.param);
                          });
 
-/// Waves of the wall along both of its axes.
-void add_waves(WallRecording& walls, double amplitude, double wavelength) {
-  const RandomStream phases(walls.settings.seed, 95);
-  const scenes::ScenePlane& wall = walls.settings.scene->planes.front();
-  for (std::size_t i = 0; i < walls.size(); ++i) {
-    const scenes::Hit hit = walls.hit(i);
-    const Vector3<double> point = hit.range * walls.direction(i);
-    const double right = kTwoPi * dot(point, wall.horizontal_axis) / wavelength;
-    const double up = kTwoPi * dot(point, wall.vertical_axis) / wavelength;
-    walls.recording.shots.range[i] +=
-        amplitude *
-        (std::sin(right + kTwoPi * phases.uniform(0)) + std::sin(up + kTwoPi * phases.uniform(1))) /
-        hit.cosine;
+/// A scene whose walls all wave, each by a field of its own.
+scenes::Scene waving(scenes::Scene scene, double peak_to_valley, double half_wave,
+                     std::uint64_t seed) {
+  for (scenes::ScenePlane& plane : scene.planes) {
+    const scenes::WallWaves waves{peak_to_valley, half_wave, ++seed};
+    plane.shape = scenes::WallShape(std::span(&waves, 1), 0.0, plane.extent, plane.center);
   }
+  return scene;
 }
 
-TEST(Calibration, AWavyWallIsSaidAndPaidFor) {
-  // Paid for in part: the variance factor takes the cells for independent, and waves that are
-  // longer than a cell are not.
+/// A hall whose walls wave, seen by a sound unit or by Table 3's.
+simulation::SimulationSettings waving_hall(double peak_to_valley, double half_wave, bool sound,
+                                           std::uint64_t seed) {
+  auto settings =
+      wall_settings(waving(hall(), peak_to_valley, half_wave, 100 * seed), seed, 5000.0);
+  if (sound)
+    settings.truth.train = settings.reported->train = settings.truth.train.without_errors();
+  return settings;
+}
+
+// Flat walls are what made a sound unit "bent": its error was 6 to 14 times what was stated.
+TEST(Calibration, ASoundUnitBeforeWavingWallsIsSound) {
+  const struct {
+    double peak_to_valley, half_wave;
+  } cases[] = {{0.0, 1.0}, {0.002, 3.5}, {0.005, 1.0}, {0.005, 3.5}};
+  WallMonteCarlo all;
+  for (const auto& one : cases) {
+    for (int seed = 0; seed < seeds_or(3); ++seed) {
+      const WallRecording walls = record_walls(
+          waving_hall(one.peak_to_valley, one.half_wave, true, static_cast<std::uint64_t>(seed)));
+      const JudgedCalibration judged = calibrate_walls({&walls}, wall_options());
+      EXPECT_EQ(judged.calibration.verdict.code, calibration::CalibrationCode::as_believed)
+          << judged.calibration.verdict.words;
+      all.add(judged, walls.settings.truth);
+    }
+  }
+  all.record();
+  EXPECT_LE(all.mean_total(), 0.02);
+  EXPECT_LE(all.total_ratio(), 1.0 + 2.5 / std::sqrt(2.0 * all.runs));
+  EXPECT_GE(all.total_ratio(), 0.5);
+  EXPECT_LE(all.shape_ratio(), 1.0 + 2.5 / std::sqrt(2.0 * all.runs));
+}
+
+TEST(Calibration, ABentUnitBeforeWavingWallsIsBentByAsMuch) {
   WallMonteCarlo result;
-  for (int seed = 0; seed < seeds_or(2); ++seed) {
-    auto scene = tilted_wall();
-    scene.stations.clear();
-    WallRecording walls =
-        record_walls(wall_settings(scene, static_cast<std::uint64_t>(seed), 100000.0));
-    add_waves(walls, 0.002, 2.0);
+  for (int seed = 0; seed < seeds_or(4); ++seed) {
+    const WallRecording walls =
+        record_walls(waving_hall(0.005, 3.5, false, static_cast<std::uint64_t>(seed)));
     const JudgedCalibration judged = calibrate_walls({&walls}, wall_options());
-    const calibration::Calibration& c = judged.calibration;
-    EXPECT_GT(c.unevenness, 2.0);
-    EXPECT_EQ(c.variance_factor, c.unevenness);
-    EXPECT_TRUE(c.steps.empty());
-    EXPECT_TRUE(std::any_of(c.warnings.begin(), c.warnings.end(), [](const std::string& text) {
-      return text.find("uneven") != std::string::npos;
-    }));
+    EXPECT_EQ(judged.calibration.verdict.code, calibration::CalibrationCode::bent);
+    EXPECT_GT(judged.calibration.shape.sigma, 0.8e-3);
     result.add(judged, walls.settings.truth);
   }
   result.record();
+  EXPECT_LE(result.mean_total(), 0.025);
+  EXPECT_LE(result.total_ratio(), 1.0 + 2.5 / std::sqrt(2.0 * result.runs));
+}
+
+// The same walls from two poses, the second rolled by 180 degrees and moved by centimetres.
+TEST(Calibration, TwoRollsBeforeTheSameWallsCancelTheirShape) {
+  WallMonteCarlo one_pose, two_poses;
+  for (int seed = 0; seed < seeds_or(3); ++seed) {
+    auto settings = waving_hall(0.005, 3.5, false, static_cast<std::uint64_t>(seed));
+    settings.scene->stations = {{"upright", {0, 0, 0}, 0, 0, 0, 0},
+                                {"rolled",
+                                 {0.01, -0.02, 0.03},
+                                 radians_from_degrees(178.5),
+                                 radians_from_degrees(0.7),
+                                 radians_from_degrees(-1.2),
+                                 0}};
+    settings.station = "upright";
+    const WallRecording upright = record_walls(settings);
+    settings.station = "rolled";
+    settings.seed += 1000;
+    const WallRecording rolled = record_walls(settings);
+    one_pose.add(calibrate_walls({&upright}, wall_options()), upright.settings.truth);
+    const JudgedCalibration judged = calibrate_walls({&upright, &rolled}, wall_options());
+    EXPECT_TRUE(judged.calibration.same_walls);
+    EXPECT_EQ(judged.calibration.datum_kind, calibration::DatumKind::none);
+    two_poses.add(judged, upright.settings.truth);
+  }
+  one_pose.record("one_pose_");
+  two_poses.record("two_poses_");
+  EXPECT_LE(two_poses.mean_total(), 0.005);
+  EXPECT_LE(two_poses.total_ratio(), 1.0 + 2.5 / std::sqrt(2.0 * two_poses.runs));
+}
+
+// Near range, incidence and intensity bend no beam, and are found with the sigmas that are stated.
+TEST(Calibration, RangeErrorsBendNoBeam) {
+  double off = 0, of = 0;
+  WallMonteCarlo result;
+  for (int seed = 0; seed < seeds_or(3); ++seed) {
+    auto settings = waving_hall(0.0, 1.0, true, static_cast<std::uint64_t>(seed));
+    settings.truth.range_errors = {0.015, 0.3, 0.01, {}};
+    const WallRecording walls = record_walls(settings);
+    const JudgedCalibration judged = calibrate_walls({&walls}, wall_options());
+    result.add(judged, walls.settings.truth);
+    for (const auto& [name, truth] :
+         {std::pair{"range_near_m", 0.015}, std::pair{"range_incidence", 0.3},
+          std::pair{"range_per_decade_m", 0.01}}) {
+      const calibration::CalibratedNumber* number = judged.calibration.number(name);
+      ASSERT_NE(number, nullptr) << name;
+      off += std::pow((number->value - truth) / number->sigma, 2);
+      of += 1;
+    }
+  }
+  result.record();
+  EXPECT_LE(result.total_ratio(), 1.0 + 2.5 / std::sqrt(2.0 * result.runs));
+  EXPECT_LE(off / of, 2.0);
 }
 
 }  // namespace risley::calibration_test

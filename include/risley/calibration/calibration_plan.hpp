@@ -48,6 +48,9 @@ struct CalibrationForecast {
   double range_offset_sigma = 0;  ///< m
   DatumKind datum_kind = DatumKind::none;
   FormalDatum datum;
+  /// Of a plan with one pose: if half of the time went to a second one before the same walls,
+  /// rolled by 180 degrees on the spot, and nobody knew the turn.
+  std::optional<FormalDatum> rolled;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PlannedWall> walls;
   double shots = 0;                 ///< with a return, of all recordings
@@ -55,8 +58,8 @@ struct CalibrationForecast {
 };
 
 /// Cramer-Rao bound of the calibration: the normal equations of the default method at the sensor's
-/// parameters for shots that meet the scene, noise alone. Uneven walls and wrong indices come on
-/// top. A sample of the shots stands for all.
+/// parameters for shots that meet the scene, with walls that have shape as building_walls() says,
+/// whatever the scene's are. Wrong indices come on top. A sample of the shots stands for all.
 /// @throws EstimationError when no shot meets a wall; Cancelled; InvalidArgument for a duration,
 ///         rate, noise or sigma out of its range, and as calibration_parameters()
 CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress = {});

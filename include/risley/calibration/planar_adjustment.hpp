@@ -175,8 +175,9 @@ struct AdjustmentOptions {
 /// meets its plane decides, as the problem has it.
 void lay_grids(PlanarProblem& problem);
 
-/// Levenberg-Marquardt on normal equations that every view accumulates by itself, as if the walls
-/// were flat; then, where walls have grids, Gauss-Newton steps with their shape integrated out.
+/// Levenberg-Marquardt on normal equations that every view accumulates by itself. Where walls have
+/// grids: Gauss-Newton steps with the walls' shape integrated out, from start values that an
+/// adjustment on flat walls has found.
 /// @throws EstimationError when a beam leaves all planes, or nothing is to be estimated
 PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options = {},
                       const Progress& progress = {});
