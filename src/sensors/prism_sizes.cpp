@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 namespace risley::sensors {
 namespace {
@@ -16,7 +17,7 @@ std::vector<PrismSize> all_sizes(int prisms) {
   return sizes;
 }
 
-bool is_thickness(const PrismSize& size) { return !size.rate.thickness.empty(); }
+bool is_a_thickness(const PrismSize& size) { return !size.rate.thickness.empty(); }
 
 }  // namespace
 
@@ -28,7 +29,7 @@ std::optional<PrismSize> find_prism_size(std::string_view name, int prisms) {
 }
 
 double prism_size(const Sensor& sensor, const PrismSize& size) {
-  const bool thickness = is_thickness(size);
+  const bool thickness = is_a_thickness(size);
   const std::vector<double>& values =
       thickness ? sensor.geometry.thickness : sensor.geometry.spacing;
   const std::vector<double>& rate = thickness ? size.rate.thickness : size.rate.spacing;
@@ -51,7 +52,7 @@ std::vector<PrismSize> uncertain_prism_sizes(const Sensor& sensor) {
   std::vector<PrismSize> result;
   for (const PrismSize& size : all) {
     const bool joint = std::any_of(all.begin(), all.end(), [&](const PrismSize& other) {
-      return is_thickness(other) == is_thickness(size) && in_covariance(other);
+      return is_a_thickness(other) == is_a_thickness(size) && in_covariance(other);
     });
     if (joint ? in_covariance(size) : prism_size_sigma(sensor, size) > 0) result.push_back(size);
   }

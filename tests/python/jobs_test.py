@@ -105,7 +105,12 @@ def test_estimate(estimate, hall, truth):
 def test_calibrate(calibration, hall, truth):
     assert_same(calibration.to_dict(),
                 command("calibrate", hall, "--truth", truth, "--rate-hz", 5000))
-    assert calibration.verdict.code == calibration.to_dict()["verdict"]["code"] == "bent"
+    code = calibration.verdict.code
+    assert code == calibration.to_dict()["verdict"]["code"] == "off_within_tolerance"
+    strict = risley.calibrate([hall], truth=truth, rate=5000, tolerance_deg=0.001)
+    assert strict.verdict.code == "bent"
+    assert strict.to_dict()["tolerance_deg"] == pytest.approx(0.001)
+    assert calibration.to_dict()["tolerance_deg"] == pytest.approx(0.1)
     assert calibration.pointing_error["total_deg"]["value"] > 0.01
     assert calibration.names[-1] == "range_offset" and calibration.units[-1] == "m"
     assert calibration.covariance.shape == (len(calibration.free),) * 2
