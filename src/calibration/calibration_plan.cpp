@@ -265,8 +265,7 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
     }
   }
   result.datum_kind = datum_kind(known_normals, tied && !poses_found && stations.size() > 1);
-  problem.shape = building_walls();
-  problem.shape.from_data = false;
+  problem.shape = typical_walls();
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
     auto shots = std::make_shared<RangedShots>(*problem.views[v].shots);
     fill_range_terms(problem, v, *shots);

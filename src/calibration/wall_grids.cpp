@@ -18,7 +18,7 @@ namespace {
 
 /// Narrower cells change nothing that the shortest waves leave, wider ones are not linear in them:
 /// docs/theory/calibration.md, section Walls have shape. M.
-constexpr double kLeastSpacing = 0.25;
+constexpr double kLeastSpacing = 0.3;
 /// Cells of one wall at most: the time of a solution grows with them.
 constexpr double kMostCells = 6000;
 /// The process is defined so far beyond the shots, in cells.

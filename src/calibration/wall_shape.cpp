@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
+#include <set>
+#include <tuple>
 #include <utility>
 
 #include <Eigen/SparseCore>
@@ -26,6 +30,9 @@ using Eigen::MatrixXd;
 
 /// Smoothness nu of the process, and the power nu + 1 of kappa^2 - Laplace that is its precision.
 constexpr int kSmoothness = 2, kPower = kSmoothness + 1;
+
+/// Parameters that weigh less against the likeliest ones are left aside.
+constexpr double kUnlikely = 1e-3;
 
 /// Numbers of the nodes: those along the shorter side follow each other, which keeps the band
 /// narrow.
@@ -206,7 +213,193 @@ Remaining remaining(const MatrixXd& system, Index unknowns, double log_determina
   return r;
 }
 
+/// Tries the parameters of a prior from the likeliest one before the data on, and goes on beside
+/// those that turn out likely: most of a grid is not worth its time.
+class ShapeSearch {
+ public:
+  ShapeSearch(const ShapeProblem& problem, const ShapePrior& prior)
+      : problem_(problem), prior_(prior), tried_(prior.parameters.size()) {
+    for (const WallSums& wall : problem.walls) precision_.emplace_back(wall.grid);
+  }
+
+  ShapeSolution run() {
+    std::vector<std::size_t> next{static_cast<std::size_t>(
+        std::max_element(prior_.weight.begin(), prior_.weight.end()) - prior_.weight.begin())};
+    while (!next.empty()) {
+      try_all(next);
+      next = beside_likely();
+    }
+    return mixture();
+  }
+
+ private:
+  /// A wall's equations, and what its cells' own parts take from the system.
+  struct WithoutWhite {
+    WallEquations equations{BandMatrix(0, 0), {}};
+    MatrixXd taken;
+    double log_determinant = 0;
+  };
+  struct Tried {
+    Remaining result;
+    double log_weight = -std::numeric_limits<double>::infinity();
+    bool done = false;
+  };
+
+  /// The same equations serve every process with the same own part of the cells [walls].
+  const std::vector<WithoutWhite>& without_white(double white) {
+    const auto [at, is_new] = of_white_.try_emplace(white);
+    if (is_new) {
+      at->second.resize(problem_.walls.size());
+      parallel::for_each(at->second.size(), [&, &all = at->second](std::size_t wall) {
+        WithoutWhite& own = all[wall];
+        own.taken = MatrixXd::Zero(problem_.system.rows(), problem_.system.cols());
+        std::tie(own.equations, own.log_determinant) =
+            without_white_part(problem_.walls[wall], white, own.taken);
+      });
+    }
+    return at->second;
+  }
+
+  void try_all(const std::vector<std::size_t>& rows) {
+    const std::size_t walls = problem_.walls.size();
+    for (const std::size_t row : rows) without_white(prior_.parameters[row].white);
+    std::vector<WallShare> shares(rows.size() * walls);
+    parallel::for_each(shares.size(), [&](std::size_t i) {
+      const ShapeParameters& p = prior_.parameters[rows[i / walls]];
+      const std::size_t wall = i % walls;
+      shares[i] = share_of(precision_[wall], of_white_.at(p.white)[wall].equations, p);
+    });
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      Tried& own = tried_[rows[i]];
+      own.done = true;
+      MatrixXd system = problem_.system;
+      double log_determinant = 0;
+      bool positive = true;
+      const auto& white = of_white_.at(prior_.parameters[rows[i]].white);
+      for (std::size_t wall = 0; wall < walls && positive; ++wall) {
+        const WallShare& share = shares[i * walls + wall];
+        positive = share.positive;
+        if (!positive) break;
+        system += white[wall].taken - share.system;
+        log_determinant += share.log_determinant + white[wall].log_determinant;
+      }
+      if (positive) own.result = remaining(system, problem_.unknowns, log_determinant);
+      if (!own.result.positive) continue;
+      own.log_weight = std::log(prior_.weight[rows[i]]) + own.result.log_likelihood;
+    }
+  }
+
+  double best() const {
+    double most = -std::numeric_limits<double>::infinity();
+    for (const Tried& one : tried_) most = std::max(most, one.log_weight);
+    return most;
+  }
+
+  bool likely(std::size_t row) const {
+    return tried_[row].done && tried_[row].log_weight > best() + std::log(kUnlikely);
+  }
+
+  /// How many steps of the values that occur two sets of parameters are apart.
+  int steps_between(const ShapeParameters& a, const ShapeParameters& b) const {
+    int steps = 0;
+    for (const auto member :
+         {&ShapeParameters::sigma, &ShapeParameters::length, &ShapeParameters::white}) {
+      std::set<double> between;
+      for (const ShapeParameters& p : prior_.parameters) between.insert(p.*member);
+      const auto [low, high] = std::minmax(a.*member, b.*member);
+      steps += static_cast<int>(std::distance(between.find(low), between.find(high)));
+    }
+    return steps;
+  }
+
+  std::vector<std::size_t> beside_likely() const {
+    std::vector<std::size_t> rows;
+    for (std::size_t row = 0; row < tried_.size(); ++row) {
+      if (tried_[row].done) continue;
+      for (std::size_t other = 0; other < tried_.size(); ++other) {
+        if (!likely(other) ||
+            steps_between(prior_.parameters[row], prior_.parameters[other]) != 1) {
+          continue;
+        }
+        rows.push_back(row);
+        break;
+      }
+    }
+    return rows;
+  }
+
+  ShapeSolution mixture() {
+    ShapeSolution solution;
+    const double most = best();
+    double sum = 0;
+    for (std::size_t k = 0; k < tried_.size(); ++k) {
+      const double weight = std::isinf(most) ? 0.0 : std::exp(tried_[k].log_weight - most);
+      solution.weight.push_back(weight);
+      if (weight > solution.weight[solution.likeliest]) solution.likeliest = k;
+      sum += weight;
+    }
+    solution.positive = sum > 0;
+    if (!solution.positive) return solution;
+    const Index n = problem_.unknowns;
+    solution.step = Eigen::VectorXd::Zero(n);
+    solution.covariance = MatrixXd::Zero(n, n);
+    solution.response = MatrixXd::Zero(n, problem_.system.cols() - n - 1);
+    for (std::size_t k = 0; k < tried_.size(); ++k) {
+      const double weight = solution.weight[k] /= sum;
+      if (weight == 0) continue;
+      const ShapeParameters& p = prior_.parameters[k];
+      solution.mean.sigma += weight * p.sigma;
+      solution.mean.length += weight * p.length;
+      solution.mean.white += weight * p.white;
+      solution.step += weight * tried_[k].result.step;
+      solution.response += weight * tried_[k].result.response;
+    }
+    for (std::size_t k = 0; k < tried_.size(); ++k) {
+      if (solution.weight[k] == 0) continue;
+      const Eigen::VectorXd off = tried_[k].result.step - solution.step;
+      solution.covariance +=
+          solution.weight[k] * (tried_[k].result.covariance + off * off.transpose());
+    }
+    solution.normal = tried_[solution.likeliest].result.normal;
+    fill_heights(solution);
+    return solution;
+  }
+
+  void fill_heights(ShapeSolution& solution) {
+    const ShapeParameters& p = prior_.parameters[solution.likeliest];
+    const auto& white = without_white(p.white);
+    solution.height.resize(problem_.walls.size());
+    parallel::for_each(problem_.walls.size(), [&](std::size_t wall) {
+      const WallGrid& grid = problem_.walls[wall].grid;
+      WallEquations equations = white[wall].equations;
+      precision_[wall].add_to(equations.nodes, p);
+      equations.nodes.factorise();
+      BandMatrix::Rows right = equations.columns.rightCols(1) -
+                               equations.columns.leftCols(problem_.unknowns) * solution.step;
+      equations.nodes.solve_lower(right);
+      Eigen::VectorXd height = right.col(0);
+      equations.nodes.solve_upper(height);
+      const NodeOrder order(grid);
+      Eigen::VectorXd& sorted = solution.height[wall];
+      sorted.resize(grid.nodes());
+      for (Index v = 0; v <= grid.cells_v; ++v) {
+        for (Index u = 0; u <= grid.cells_u; ++u) {
+          sorted[v * (grid.cells_u + 1) + u] = height[order.node(u, v)];
+        }
+      }
+    });
+  }
+
+  const ShapeProblem& problem_;
+  const ShapePrior& prior_;
+  std::vector<Precision> precision_;                      // [walls]
+  std::map<double, std::vector<WithoutWhite>> of_white_;  // by the white part
+  std::vector<Tried> tried_;                              // [parameters]
+};
+
 }  // namespace
+
+ShapePrior typical_walls() { return {{{1.5e-3, 2.0, 0.5e-3}}, {1.0}}; }
 
 ShapePrior building_walls() {
   constexpr double kSigmas[] = {0.6e-3, 1.2e-3, 2.4e-3, 4.8e-3, 9.6e-3};
@@ -235,6 +428,7 @@ ShapeSolution solve_with_shape(const ShapeProblem& problem, const ShapePrior& pr
                  static_cast<std::size_t>(columns));
   require_between("unknowns", static_cast<double>(problem.unknowns), 1,
                   static_cast<double>(columns - 1));
+  require_at_least("number of parameters", static_cast<long long>(prior.parameters.size()), 1);
   require_length("weights of the shape", prior.weight.size(), prior.parameters.size());
   for (const WallSums& wall : problem.walls) {
     require_length("cells", wall.weight.size(), wall.grid.cells.size());
@@ -243,119 +437,12 @@ ShapeSolution solve_with_shape(const ShapeProblem& problem, const ShapePrior& pr
     require_length("columns of cells", static_cast<std::size_t>(wall.columns.cols()),
                    static_cast<std::size_t>(columns));
   }
-
-  const std::size_t walls = problem.walls.size(), tried = prior.parameters.size();
-  // The cells' own part first: the same equations serve every process.
-  std::vector<double> whites;
-  for (const ShapeParameters& p : prior.parameters) whites.push_back(p.white);
-  std::sort(whites.begin(), whites.end());
-  whites.erase(std::unique(whites.begin(), whites.end()), whites.end());
-  const auto white_row = [&](double white) {
-    return static_cast<std::size_t>(std::find(whites.begin(), whites.end(), white) -
-                                    whites.begin());
-  };
-  struct OfWhite {
-    std::vector<WallEquations> equations;
-    std::vector<MatrixXd> taken;
-    std::vector<double> log_determinant;
-  };
-  std::vector<OfWhite> of_white(whites.size());
-  for (OfWhite& own : of_white) {
-    own.equations.assign(walls, {BandMatrix(0, 0), {}});
-    own.taken.assign(walls, MatrixXd::Zero(columns, columns));
-    own.log_determinant.assign(walls, 0.0);
-  }
-  parallel::for_each(whites.size() * walls, [&](std::size_t i) {
-    OfWhite& own = of_white[i / walls];
-    const std::size_t wall = i % walls;
-    std::tie(own.equations[wall], own.log_determinant[wall]) =
-        without_white_part(problem.walls[wall], whites[i / walls], own.taken[wall]);
-  });
-  std::vector<Precision> precision;
-  for (const WallSums& wall : problem.walls) precision.emplace_back(wall.grid);
-  std::vector<WallShare> shares(tried * walls);
-  parallel::for_each(shares.size(), [&](std::size_t i) {
-    const ShapeParameters& p = prior.parameters[i / walls];
-    const std::size_t wall = i % walls;
-    shares[i] = share_of(precision[wall], of_white[white_row(p.white)].equations[wall], p);
-  });
-
-  std::vector<Remaining> all;
-  ShapeSolution solution;
-  double best = 0;
-  for (std::size_t k = 0; k < tried; ++k) {
-    const OfWhite& own = of_white[white_row(prior.parameters[k].white)];
-    MatrixXd system = problem.system;
-    double log_determinant = 0;
-    bool positive = true;
-    for (std::size_t wall = 0; wall < walls; ++wall) {
-      const WallShare& share = shares[k * walls + wall];
-      positive = positive && share.positive;
-      if (!share.positive) break;
-      system += own.taken[wall];
-      system -= share.system;
-      log_determinant += share.log_determinant + own.log_determinant[wall];
-    }
-    all.push_back(positive ? remaining(system, problem.unknowns, log_determinant) : Remaining{});
-    double weight = all.back().positive ? std::log(prior.weight[k]) : -1e300;
-    if (prior.from_data) weight += all.back().log_likelihood;
-    if (!all.back().positive) weight = -std::numeric_limits<double>::infinity();
-    solution.weight.push_back(weight);
-    if (k == 0 || weight > best) {
-      best = weight;
-      solution.likeliest = k;
-    }
-  }
-  if (!all[solution.likeliest].positive) return solution;
-  solution.positive = true;
-  double sum = 0;
-  for (double& weight : solution.weight) sum += weight = std::exp(weight - best);
-  for (double& weight : solution.weight) weight /= sum;
-  const Index n = problem.unknowns;
-  solution.step = Eigen::VectorXd::Zero(n);
-  solution.covariance = MatrixXd::Zero(n, n);
-  solution.response = MatrixXd::Zero(n, columns - n - 1);
-  for (std::size_t k = 0; k < tried; ++k) {
-    if (solution.weight[k] == 0) continue;
-    solution.mean.sigma += solution.weight[k] * prior.parameters[k].sigma;
-    solution.mean.length += solution.weight[k] * prior.parameters[k].length;
-    solution.mean.white += solution.weight[k] * prior.parameters[k].white;
-    solution.step += solution.weight[k] * all[k].step;
-    solution.response += solution.weight[k] * all[k].response;
-  }
-  for (std::size_t k = 0; k < tried; ++k) {
-    if (solution.weight[k] == 0) continue;
-    const Eigen::VectorXd off = all[k].step - solution.step;
-    solution.covariance += solution.weight[k] * (all[k].covariance + off * off.transpose());
-  }
-  solution.normal = all[solution.likeliest].normal;
-  const ShapeParameters& likeliest = prior.parameters[solution.likeliest];
-  for (std::size_t wall = 0; wall < walls; ++wall) {
-    const WallGrid& grid = problem.walls[wall].grid;
-    WallEquations equations = of_white[white_row(likeliest.white)].equations[wall];
-    precision[wall].add_to(equations.nodes, likeliest);
-    equations.nodes.factorise();
-    BandMatrix::Rows right =
-        equations.columns.rightCols(1) - equations.columns.leftCols(n) * solution.step;
-    equations.nodes.solve_lower(right);
-    Eigen::VectorXd height = right.col(0);
-    equations.nodes.solve_upper(height);
-    const NodeOrder order(grid);
-    Eigen::VectorXd& sorted = solution.height.emplace_back(grid.nodes());
-    for (Index v = 0; v <= grid.cells_v; ++v) {
-      for (Index u = 0; u <= grid.cells_u; ++u) {
-        sorted[v * (grid.cells_u + 1) + u] = height[order.node(u, v)];
-      }
-    }
-  }
-  return solution;
+  return ShapeSearch(problem, prior).run();
 }
 
 ShapePrior likely_part(const ShapePrior& prior, const ShapeSolution& solution) {
-  constexpr double kUnlikely = 1e-3;
   require_length("weights", solution.weight.size(), prior.parameters.size());
   ShapePrior part;
-  part.from_data = prior.from_data;
   double sum = 0;
   for (std::size_t k = 0; k < prior.parameters.size(); ++k) {
     if (solution.weight[k] < kUnlikely) continue;

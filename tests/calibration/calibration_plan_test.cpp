@@ -87,8 +87,7 @@ void expect_adjustment(const CalibrationPlan& plan) {
     calibration::fill_range_terms(p, v, *own);
     p.views[v].shots = std::move(own);
   }
-  p.shape = calibration::building_walls();
-  p.shape.from_data = false;
+  p.shape = calibration::typical_walls();
   calibration::lay_grids(p);
   const PlanarSolution expected = adjust(p, {0});
   const CalibrationForecast found = forecast(plan);
@@ -288,12 +287,13 @@ TEST(Forecast, AdvisesWhereSomethingIsPoor) {
 
   CalibrationPlan small = plan_of({{wall("tilted", 60, 90, 15)}, {}});
   small.duration = 1000;
-  EXPECT_THAT(advice_of(small), ElementsAre());  // nothing to say
+  // Nothing to say but that the walls' shape would cancel.
+  EXPECT_THAT(advice_of(small), ElementsAre(HasSubstr("roll the sensor by 180 degrees")));
   scenes::ScenePlane& plane = small.scene.planes[0];
   plane.horizontal_axis = normalized(cross(Vector3<double>{0, 0, 1}, plane.plane.normal));
   plane.vertical_axis = cross(plane.plane.normal, plane.horizontal_axis);
   plane.extent = {2000.0, 9.0};
-  EXPECT_THAT(advice_of(small), ElementsAre(HasSubstr("% of the shots meet a wall")));
+  EXPECT_THAT(advice_of(small), Contains(HasSubstr("% of the shots meet a wall")));
   // Of each of several stations.
   small.scene.stations = {kUpright, kUpright};
   EXPECT_THAT(advice_of(small), ElementsAre(HasSubstr("% of the shots meet a wall")));
@@ -303,7 +303,7 @@ TEST(Forecast, AdvisesWhereSomethingIsPoor) {
   const double share = forecast(small).walls.at(0).share;
   EXPECT_GT(share, 0.91);
   EXPECT_LT(share, 0.98);
-  EXPECT_THAT(advice_of(small), ElementsAre());
+  EXPECT_THAT(advice_of(small), Not(Contains(HasSubstr("% of the shots"))));
 
   CalibrationPlan tied = plan_of(stations());
   tied.duration = 0.05;

@@ -501,11 +501,14 @@ struct WithNumbers {
   RangedShots shots;
 
   WithNumbers() {
+    view.geometry = {{0.007, 0.008}, {0.03}};
     view.sizes = own_prism_sizes(2);
     view.range_terms = {0.02, -0.01};
     shots = shoot(view, 500, kRangeNoise, 6);
     std::mt19937_64 generator(7);
     std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+    // Weights that do not depend on the geometry.
+    for (auto& column : shots.angle_covariance) std::fill(column.begin(), column.end(), 0.0F);
     shots.range_terms.resize(2);
     for (std::size_t i = 0; i < shots.size(); ++i) {
       for (auto& term : shots.range_terms) term.push_back(uniform(generator));
@@ -518,7 +521,7 @@ TEST(PlaneEquations, SizesAndRangeTermsHaveTheirDerivatives) {
   for (const InstructionSet set : available_instruction_sets()) {
     const PlaneColumns columns(at.view);
     const PlaneEquations middle = plane_equations(at.shots, at.view, {}, set);
-    // The cost is quadratic in these but for the weights: half its slope is the gradient.
+    // The cost is quadratic in these: half its slope is the gradient.
     const auto slope = [&](auto change) {
       constexpr double kStep = 1e-4;
       PlaneView forth = at.view, back = at.view;

@@ -58,7 +58,7 @@ struct CalibrationForecast {
 };
 
 /// Cramer-Rao bound of the calibration: the normal equations of the default method at the sensor's
-/// parameters for shots that meet the scene, with walls that have shape as building_walls() says,
+/// parameters for shots that meet the scene, with walls that have shape as typical_walls() says,
 /// whatever the scene's are. Wrong indices come on top. A sample of the shots stands for all.
 /// @throws EstimationError when no shot meets a wall; Cancelled; InvalidArgument for a duration,
 ///         rate, noise or sigma out of its range, and as calibration_parameters()

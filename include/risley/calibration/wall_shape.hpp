@@ -44,12 +44,12 @@ struct ShapeParameters {
 struct ShapePrior {
   std::vector<ShapeParameters> parameters;
   std::vector<double> weight;  ///< [parameters], sum 1
-  /// Whether data say which parameters are right; a plan has no data.
-  bool from_data = true;
 };
 
 /// Finished walls of buildings. docs/theory/calibration.md, section Walls have shape
 ShapePrior building_walls();
+/// One set of parameters in their midst, for plans, which have no data to weigh them by.
+ShapePrior typical_walls();
 
 /// Sums over the shots of all views of one wall, by cells. With e = (1, u - middle, v - middle) and
 /// the derivative d of a shot's range by the wall's height:
@@ -87,7 +87,8 @@ struct ShapeSolution {
 };
 
 /// Integrates the walls' shape out, parameter by parameter, and weighs the parameters by their
-/// marginal likelihood.                                   Derivation: docs/theory/calibration.md
+/// marginal likelihood. Those that are far from all likely ones are not tried and weigh 0.
+///                                   Derivation: docs/theory/calibration.md
 /// @throws InvalidArgument for a system or sums of other sizes
 ShapeSolution solve_with_shape(const ShapeProblem& problem, const ShapePrior& prior);
 
