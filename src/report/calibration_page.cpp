@@ -388,12 +388,12 @@ std::string planes_html(const CalibrationReport& r) {
       "<p>The residuals scatter {} times as much as the stated range noise "
       "predicts.</p>\n",
       finite_text("{:.3g}", r.sigma0));
-  if (r.shape && r.shape->sigma > 0) {
+  if (r.wall_shape && r.wall_shape->sigma > 0) {
     html += fmt::format(
         "<p>The walls wave by {} mm (one standard deviation) over {} m. Every sigma on this page "
         "includes what this may do to the result.</p>\n",
-        finite_text("{:.2g}", kMillimetres * r.shape->sigma),
-        finite_text("{:.2g}", r.shape->length));
+        finite_text("{:.2g}", kMillimetres * r.wall_shape->sigma),
+        finite_text("{:.2g}", r.wall_shape->length));
   }
   return html;
 }

@@ -480,7 +480,7 @@ CalibrationReport calibration_report(const CalibrationReportInput& input) {
   report.rms_before = c.rms_before;
   report.rms_after = c.rms_after;
   report.sigma0 = c.sigma0;
-  report.shape = c.shape;
+  report.wall_shape = c.shape;
   if (input.truth) report.truth = {input.truth->before, input.truth->after};
   report.provenance = input.provenance;
   const CalibrationCharts charts(input);

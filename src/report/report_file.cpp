@@ -402,7 +402,7 @@ void fields(Archive& archive, T& report) {
   archive("rms_before_m", report.rms_before);
   archive("rms_after_m", report.rms_after);
   archive("sigma0", report.sigma0);
-  archive("shape", report.shape);
+  archive("wall_shape", report.wall_shape);
   archive("truth", report.truth);
   archive("truth_charts", report.truth_charts);
   archive("pointing_charts", report.pointing_charts);

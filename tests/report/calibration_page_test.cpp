@@ -112,8 +112,7 @@ Calibration example() {
       c.covariance(i, j) = std::pow(-0.7, std::abs(i - j)) * deg(0.002) * deg(0.002);
     }
   }
-  c.range_offset = -0.0123;
-  c.range_offset_sigma = 0.0021;
+  c.numbers = {{"range_offset_m", -0.0123, 0.0, 0.05, 0.0021, 0.0021}};
   c.planes = {wall("front <wall> & door", 0, 5, 92, 8.0), wall("left", 0, 70, 90, 3.0),
               wall("floor", 0, 0, 178, 1.2), wall("hall", 1, -55, 88, 6.0)};
   c.steps.push_back({0, 0, -0.0213, deg(3.2), deg(91.5), deg(2.5), 341});
@@ -133,8 +132,7 @@ Calibration example() {
                       deg(0.0006)};
   c.verdict = {calibration::CalibrationCode::as_believed, "walls <confirm> the belief", "nothing"};
   c.sigma0 = 0.98;
-  c.unevenness = 1.4;
-  c.variance_factor = 1.4;
+  c.shape = {0.0014, 2.1, 0.0005};
   c.iterations = 6;
   c.rms_before = 0.0214;
   c.rms_after = 0.0151;
@@ -396,8 +394,8 @@ TEST(CalibrationPage, NumbersThatAreNotFiniteAreDashes) {
   c.parameters[2] = kNaN;
   c.covariance(3, 3) = kNaN;
   c.covariance(4, 4) = -1.0;
-  c.range_offset = kNaN;
-  c.unevenness = std::numeric_limits<double>::infinity();
+  c.numbers.front().value = kNaN;
+  c.shape.sigma = std::numeric_limits<double>::infinity();
   c.steps[0].height = kNaN;
   auto& sample = page.sample;
   sample[1].azimuth = sample[2].point.x = sample[3].after = sample[4].before = kNaN;
@@ -420,7 +418,7 @@ TEST(CalibrationPage, ParametersStandBesideWhatWasBelievedAndTrue) {
                                "<td>0.190</td><td>0.220</td><td>0.080</td>"
                                "<td class=\"far\">4.00</td>"));
   EXPECT_THAT(shown, HasSubstr("<td>-12.3</td><td>2.1</td><td>mm</td>"));
-  c.range_offset_sigma = 0;  // it was held
+  c.numbers.clear();  // it was held
   EXPECT_THAT(visible(page.html()), Not(HasSubstr("range offset")));
 }
 

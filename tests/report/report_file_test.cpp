@@ -80,8 +80,8 @@ CalibrationReport calibration_example() {
   r.points = 993551;
   r.parameters = {
       {"prism_tilt_a_vertical_deg", 0.0016, 1e-6, {}, 0, 0.001, kUnknown, kUnknown, kUnknown}};
-  r.range_offset = 0.012;
-  r.range_offset_sigma = 0.001;
+  r.numbers = {{"range_offset_m", 0.012, 0.0, 0.05, 0.001, 0.001}};
+  r.wall_shape = calibration::ShapeParameters{0.002, 1.4, 0.0005};
   r.free = {"prism_tilt_a_vertical_deg"};
   r.covariance = Eigen::MatrixXd::Constant(1, 1, 1e-12);
   r.datum_kind = calibration::DatumKind::both;

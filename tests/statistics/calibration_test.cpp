@@ -396,7 +396,7 @@ TEST(Calibration, WithoutNoiseEveryParameterIsFoundToTheLastDigit) {
     }
     ::testing::Test::RecordProperty(fmt::format("largest_error_deg_{}_planes", c.planes.size()),
                                     fmt::format("{:.2g}", largest));
-    EXPECT_NEAR(c.range_offset, 0.0, 1e-9);
+    EXPECT_NEAR(c.sensor.range_offset, 0.0, 1e-9);
   }
 }
 

@@ -51,7 +51,7 @@ struct CalibrationReport {
   std::vector<calibration::SurfaceStep> steps;
   double rms_before = kUnknown, rms_after = kUnknown;  ///< of all planes, m
   double sigma0 = 0;
-  std::optional<calibration::ShapeParameters> shape;  ///< not in files of older versions
+  std::optional<calibration::ShapeParameters> wall_shape;  ///< not in files of older versions
 
   /// Of the beams of all recordings together, against the truth of simulations.
   struct Truth {
