@@ -42,7 +42,7 @@ struct CalibrateCommandOptions {
   std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, control, stations,
                       beam_origin = "yes", states = "knots", mirror = "auto", plan, scene, page;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg, tolerance_deg;
-  std::optional<double> range_offset_sigma_m, knot_spacing_s, cell_size_m;
+  std::optional<double> range_offset_sigma_m, patch_thickness_m, knot_spacing_s, cell_size_m;
   double duration_s = 10.0, empty_circle_m = cloud::PointDistributionOptions{}.empty_circle;
   bool force = false, no_report = false, same_walls = false;
   ParameterWishes parameters;
@@ -105,6 +105,10 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   jobs::CalibrateRecordingsOptions job;
   take_recordings(options, common, job);
   job.beam_origin = options.beam_origin == "yes";
+  if (options.patch_thickness_m) {
+    check_not_negative(*options.patch_thickness_m, "--patch-thickness-m", "m");
+    job.patch_thickness = *options.patch_thickness_m;
+  }
   if (options.same_walls) job.same_walls = calibration::SameWalls::yes;
   if (options.method == "paper") job.method = calibration::CalibrationMethod::paper;
   if (!options.planes.empty()) job.planes = scenes::load_scene(options.planes);
@@ -384,6 +388,10 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
                   "Prior: 1 sigma of the range offset about what the sensor states, m; 0 holds it "
                   "there (default: 0.05, for a flight 0.02)");
+  verb.add_option("--patch-thickness-m", o.patch_thickness_m,
+                  "1 sigma of how far dark or light patches stand off their wall, m: 0 for paint, "
+                  "which makes the range error that depends on intensity exact (default: 0.005)")
+      ->excludes("--plan");
   verb.add_flag(
           "--same-walls", o.same_walls,
           "The recordings are of the same walls from poses that differ by a turn, best a roll "

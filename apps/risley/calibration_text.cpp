@@ -91,6 +91,11 @@ void print_calibration(const CalibratedRecordings& outcome) {
                 fmt::format("{:.2f}", 1e3 * plane.rms)});
   }
   planes.print();
+  if (c.shape.sigma > 0) {
+    say("the walls wave by {:.1f} mm (1 sigma) over {:.1f} m\n", 1e3 * c.shape.sigma,
+        c.shape.length);
+  }
+  if (c.same_walls) say("the recordings share these walls and their shape\n");
   say("\n");
   print_datum(c.datum_kind, c.datum);
   for (const calibration::PriorTest& test : c.prior_tests) {

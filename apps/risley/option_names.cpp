@@ -36,6 +36,7 @@ constexpr OptionName kNames[] = {
     {"list", "--list"},
     {"mirrored", "--mirror"},
     {"mount", "--mount"},
+    {"patch_thickness", "--patch-thickness-m"},
     {"planes", "--planes"},
     {"prior_sigma", "--prior-sigma-deg"},
     {"range_noise", "--noise-range-m"},

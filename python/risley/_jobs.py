@@ -98,7 +98,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
               range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
               prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
               tolerance: Optional[float] = None, tolerance_deg: Optional[float] = None,
-              beam_origin: bool = True, same_walls: Optional[bool] = None, fixed: Fixed = (),
+              beam_origin: bool = True, same_walls: Optional[bool] = None,
+              patch_thickness: Optional[float] = None, fixed: Fixed = (),
               free: Iterable[str] = (), mirrored: Optional[bool] = None,
               truth: Union[Path, Sequence[Path]] = (), force: bool = False,
               states: str = "knots", shot_rate: Optional[float] = None,
@@ -154,6 +155,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     same_walls : bool, optional
         Whether the recordings are of the same walls from poses that differ by a turn, so that the
         walls' shape cancels; by default where their planes fit in one way only.
+    patch_thickness : float, optional
+        How far dark or light patches stand off their wall, one standard deviation, m; 0 for paint.
     fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, threads, progress
         As in `risley.estimate`.
     truth : str, path or a sequence of them
@@ -190,6 +193,7 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
     on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),
                 "station": list(station), "beam_origin": beam_origin, "same_walls": same_walls,
+                "patch_thickness": patch_thickness,
                 "states": states}
     in_flight = {"trajectory": os.fspath(trajectory), "trajectory_topic": trajectory_topic,
                  "mount": os.fspath(mount), "accuracy": os.fspath(accuracy),

@@ -3,41 +3,30 @@
 #include "calibration/band_cholesky.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <cstddef>
+
+#include "calibration/band_cholesky_kernel.hpp"
 
 namespace risley::calibration {
 
 using Eigen::Index;
 
 bool BandMatrix::factorise() {
-  for (Index i = 0; i < size(); ++i) {
-    const Index first = std::max<Index>(0, i - width_);
-    double* const own = rows_.row(i).data() + width_ - i;  // indexed by column
-    for (Index j = first; j <= i; ++j) {
-      const Index from = std::max(first, j - width_);
-      const double* const other = rows_.row(j).data() + width_ - j;
-      const double product = Eigen::Map<const Eigen::VectorXd>(own + from, j - from)
-                                 .dot(Eigen::Map<const Eigen::VectorXd>(other + from, j - from));
-      if (j < i) {
-        own[j] = (own[j] - product) / other[j];
-      } else {
-        const double square = own[i] - product;
-        if (!(square > 0) || !std::isfinite(square)) return false;
-        own[i] = std::sqrt(square);
-      }
-    }
-  }
-  return true;
+  BandArguments all;
+  all.rows = rows_.data();
+  all.size = static_cast<std::size_t>(size());
+  all.width = static_cast<std::size_t>(width_);
+  return RISLEY_KERNEL_COPIES(factorise_band).at(best_instruction_set())(all);
 }
 
 void BandMatrix::solve_lower(Rows& columns) const {
-  for (Index i = 0; i < size(); ++i) {
-    for (Index j = std::max<Index>(0, i - width_); j < i; ++j) {
-      const double factor = at(i, j);
-      if (factor != 0) columns.row(i) -= factor * columns.row(j);
-    }
-    columns.row(i) /= at(i, i);
-  }
+  BandArguments all;
+  all.rows = const_cast<double*>(rows_.data());  // the kernel only reads it here
+  all.size = static_cast<std::size_t>(size());
+  all.width = static_cast<std::size_t>(width_);
+  all.columns = columns.data();
+  all.count = static_cast<std::size_t>(columns.cols());
+  RISLEY_KERNEL_COPIES(solve_lower_band).at(best_instruction_set())(all);
 }
 
 void BandMatrix::solve_upper(Eigen::VectorXd& vector) const {

@@ -128,6 +128,7 @@ class Work {
     require_not_below("range resolution", options_.sensor.range_resolution, 0, "m");
     if (options_.prior_sigma) require_above("prior sigma", *options_.prior_sigma, 0, "rad");
     require_not_below("sigma of the range offset", options_.range_offset_sigma, 0, "m");
+    require_not_below("patch thickness", options_.patch_thickness, 0, "m");
     if (options_.tolerance) require_not_below("tolerance", *options_.tolerance, 0, "rad");
     for (const auto& [name, value] : options_.fixed) {
       if (value) require_finite(name, *value);
@@ -359,6 +360,10 @@ class Work {
       solution = solve(problem_);
       update_range_variances(solution);
       problem_ = solution.problem;
+    }
+    // An error of a decade's share moves the term of the intensity by as much, and nothing else.
+    if (const Eigen::Index row = solution.number("range_per_decade_m"); row >= 0) {
+      solution.number_covariance(row, row) += options_.patch_thickness * options_.patch_thickness;
     }
     return solution;
   }

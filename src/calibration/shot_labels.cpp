@@ -20,6 +20,9 @@ namespace {
 /// Part of the rotation angles' sigma that a direction has: the sine of a prism's deflection. Two
 /// of a Mid-40 reach 19.2 degrees, one half of it.
 constexpr double kAngleLever = 0.17;
+/// A beam that meets a plane at a flatter angle, as the cosine of incidence, tells nothing of it:
+/// the pointing's share of its range would explain any range.
+constexpr double kFlattestApproach = 0.01;
 
 }  // namespace
 
@@ -66,7 +69,7 @@ Labels label_shots(const PlanarProblem& problem, std::size_t recording, const Ra
         const double error = range_error(
             problem, term_shot(shots, i, rays.origin(i - begin), direction, plane.plane));
         const double off = std::abs(shots.range[i] - error - range) / sigma[p];
-        if (range > 0 && off < best) {
+        if (range > 0 && cosine > kFlattestApproach && off < best) {
           best = off;
           nearest = p;
         }

@@ -26,6 +26,7 @@ calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOption
   if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
   if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
   check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
+  check_not_negative(options.patch_thickness, "patch_thickness", "m");
   if (options.tolerance) check_not_negative(*options.tolerance, "tolerance", "rad");
   if (options.method == calibration::CalibrationMethod::paper &&
       (options.planes || !options.stations.empty() || options.prior_sigma)) {
@@ -46,6 +47,7 @@ calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOption
   result.range_offset_sigma = options.range_offset_sigma;
   result.tolerance = options.tolerance;
   result.same_walls = options.same_walls;
+  result.patch_thickness = options.patch_thickness;
   result.beam_origin = options.beam_origin;
   result.planes = options.planes;
   result.stations = options.stations;

@@ -202,6 +202,7 @@ std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int thre
                                    calibration::CalibrationMethod::paper};
   job.method = kMethods.at(options.choice("method", {"adjustment", "paper"}));
   options.take("beam_origin", job.beam_origin);
+  options.take("patch_thickness", job.patch_thickness);
   if (std::optional<bool> same; options.take("same_walls", same), same) {
     job.same_walls = *same ? calibration::SameWalls::yes : calibration::SameWalls::no;
   }

@@ -65,7 +65,13 @@ TEST(Entries, RaysAskForAnglesOfEveryPrismAndShot) {
 }
 
 TEST(Entries, PlaneEquationsAskForColumnsPlacesAndNumbers) {
-  const PlaneView sound{two_prisms(), {}, {0}, 0, 4e-4, {{1, 0, 0}, 10}, {0, 1, 0}, {0, 0, 1}};
+  PlaneView sound;
+  sound.train = two_prisms();
+  sound.places = {0};
+  sound.range_variance = 4e-4;
+  sound.plane = {{1, 0, 0}, 10};
+  sound.tangent_1 = {0, 1, 0};
+  sound.tangent_2 = {0, 0, 1};
   const auto run = [](const RangedShots& shots, const PlaneView& view,
                       const ResidualColumns& columns = {}) {
     return refusal([&] { return plane_equations(shots, view, columns); });

@@ -269,7 +269,7 @@ TEST_P(PlaneEquationsOfEmitters, AreTheSumOfThoseOfEach) {
   }
   view.plane.distance += 0.01;
   const int prisms = view.train.prisms();
-  const PlaneColumns columns{static_cast<int>(view.places.size()), prisms};
+  const PlaneColumns columns(view);
   Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(columns.size(), columns.size());
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(columns.size());
   double cost = 0;
@@ -426,7 +426,7 @@ TEST(PlaneEquations, StepsLeadToTheTruth) {
   for (const int place : places) view.train.set_place(place, truth.train[place] + 2e-3);
   view.plane.distance += 0.2;
   view.plane.normal = normalized(view.plane.normal + 1e-3 * view.tangent_1);
-  const PlaneColumns columns{static_cast<int>(places.size()), 2};
+  const PlaneColumns columns(view);
   std::vector<int> chosen{0, 1, 2, 3, columns.normal(0), columns.normal(1), columns.distance()};
   double cost = 0;
   for (int iteration = 0; iteration < 6; ++iteration) {
