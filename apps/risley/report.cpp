@@ -74,12 +74,6 @@ ExitStatus report_two(const std::string& a, const std::string& b, const std::str
   const jobs::ResultComparison c = jobs::compare_results(a, b);
   const std::string html =
       report::comparison_page({a, report_a}, {b, report_b}, c, provenance_of(common));
-  Json differences = Json::object();
-  for (const jobs::ParameterDifference& one : c.parameters) {
-    const bool in_metres = one.name == jobs::kRangeOffset;
-    const double unit = in_metres ? 1 : find_parameter(one.name, c.b.shape()).si_per_unit;
-    differences[one.name] = {{"value", one.difference / unit}, {"sigma", one.sigma / unit}};
-  }
   Json facts{{"verbs", {report::verb_of(report_a), report::verb_of(report_b)}}};
   facts.update(json::of(c));
   return write_page(page, html, facts, common);

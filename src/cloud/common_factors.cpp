@@ -3,6 +3,7 @@
 #include "cloud/common_factors.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -34,10 +35,16 @@ Eigen::MatrixXd lower_factor(const Eigen::MatrixXd& c) {
   return factor;
 }
 
+bool has_any(const sensors::RangeErrors& errors) {
+  return errors.near != 0 || errors.incidence != 0 || errors.per_decade != 0 ||
+         std::any_of(errors.emitter.begin(), errors.emitter.end(),
+                     [](double error) { return error != 0; });
+}
+
 }  // namespace
 
 Factors::Factors(PointingModel& model, const SensorBelief& belief)
-    : model_(model), belief_(belief) {
+    : model_(model), belief_(belief), range_values_(sensors::range_values(model.train.emitters())) {
   for (int place = 0; place < all_places(); ++place) model_.places.push_back(place);
 }
 
@@ -48,8 +55,8 @@ void Factors::add(const algebra::NamedCovariance& uncertain, bool moves_beam, bo
     CommonFactor common = nothing(uncertain.names[static_cast<std::size_t>(j)]);
     for (Index i = j; i < factor.rows(); ++i) {
       const std::string& name = uncertain.names[static_cast<std::size_t>(i)];
-      if (name == kRangeOffset) {
-        common.range_offset = factor(i, j);
+      if (double* number = range_number(name, common)) {
+        *number = factor(i, j);
         continue;
       }
       const auto size = std::find_if(model_.sizes.begin(), model_.sizes.end(),
@@ -63,10 +70,9 @@ void Factors::add(const algebra::NamedCovariance& uncertain, bool moves_beam, bo
         common.mount[static_cast<std::size_t>(own - of_mount.begin())] = factor(i, j);
         continue;
       }
+      const ParameterInfo parameter = find_parameter(name, model_.train.shape());
       if (moves_beam) {
-        for (const int place : find_parameter(name, model_.train.shape()).places) {
-          common.weights[place] += factor(i, j);
-        }
+        for (const int place : parameter.places) common.weights[place] += factor(i, j);
       }
       if (moves_angles) move_angles(name, factor(i, j), common);
     }
@@ -97,11 +103,13 @@ void Factors::add_geometry(const sensors::Sensor& sensor) {
     common.weights[size_row(static_cast<Index>(i))] = sensors::prism_size_sigma(sensor, size);
     keep(std::move(common));
   }
-  const sensors::Knowledge* offset = sensor.find_knowledge(kRangeOffset);
-  if (offset == nullptr || is_joint(kRangeOffset)) return;
-  CommonFactor common = nothing(kRangeOffset);
-  common.range_offset = std::max(offset->sigma, offset->total_sigma);
-  keep(std::move(common));
+  for (const sensors::RangeValue& value : range_values_) {
+    const sensors::Knowledge* known = sensor.find_knowledge(value.name);
+    if (known == nullptr || is_joint(value.name)) continue;
+    CommonFactor common = nothing(value.name);
+    *range_number(value.name, common) = std::max(known->sigma, known->total_sigma);
+    keep(std::move(common));
+  }
 }
 
 void Factors::finish() {
@@ -126,7 +134,22 @@ CommonFactor Factors::nothing(std::string name) const {
   return {std::move(name),
           Eigen::VectorXd::Zero(all_places() + prisms() + static_cast<Index>(model_.sizes.size())),
           0.0,
+          {},
           {}};
+}
+
+double* Factors::range_number(std::string_view name, CommonFactor& common) const {
+  const auto found =
+      std::find_if(range_values_.begin(), range_values_.end(),
+                   [name](const sensors::RangeValue& value) { return value.name == name; });
+  if (found == range_values_.end()) return nullptr;
+  sensors::RangeErrors& errors = common.range_errors;
+  const std::array<double*, 4> shared{&common.range_offset, &errors.near, &errors.incidence,
+                                      &errors.per_decade};
+  const auto at = static_cast<std::size_t>(found - range_values_.begin());
+  if (at < shared.size()) return shared[at];
+  errors.emitter.resize(range_values_.size() - shared.size(), 0.0);
+  return &errors.emitter[at - shared.size()];
 }
 
 void Factors::move_angles(const std::string& name, double value, CommonFactor& common) const {
@@ -142,7 +165,8 @@ void Factors::move_angles(const std::string& name, double value, CommonFactor& c
 void Factors::keep(CommonFactor common) {
   const bool moves_mount = std::any_of(common.mount.begin(), common.mount.end(),
                                        [](double weight) { return weight != 0; });
-  if (common.range_offset == 0 && common.weights.isZero(0.0) && !moves_mount) return;
+  const bool moves_range = common.range_offset != 0 || has_any(common.range_errors);
+  if (!moves_range && common.weights.isZero(0.0) && !moves_mount) return;
   model_.factors.push_back(std::move(common));
 }
 

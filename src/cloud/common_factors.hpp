@@ -3,24 +3,24 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "risley/algebra/named_covariance.hpp"
 #include "risley/cloud/pointing_model.hpp"
+#include "risley/sensors/range_values.hpp"
 
 namespace risley::cloud {
-
-/// The range offset among the names of a calibration's quantities.
-inline constexpr const char* kRangeOffset = "range_offset_m";
 
 /// Builds the common factors of a model.
 class Factors {
  public:
   Factors(PointingModel& model, const SensorBelief& belief);
 
-  /// The quantities may be parameters, sizes of prisms, the range offset and those of a mount.
+  /// The quantities may be parameters, sizes of prisms, range errors and those of a mount.
+  /// @throws InvalidArgument for a name that is none of these
   /// @param moves_beam    errors of the parameters move the beam at given rotation angles
   /// @param moves_angles  they also move the rotation angles that were found
   void add(const algebra::NamedCovariance& uncertain, bool moves_beam, bool moves_angles);
@@ -28,7 +28,7 @@ class Factors {
   /// What errors of the believed parameters do to the rotation angles, as one factor per prism.
   void add_angles(const algebra::NamedCovariance& uncertain);
 
-  /// Those of the prisms' sizes and of the range offset that the calibration's covariance has not.
+  /// Those of the prisms' sizes and of the range errors that the calibration's covariance has not.
   void add_geometry(const sensors::Sensor& sensor);
 
   /// Leaves only the places that some factor has.
@@ -43,11 +43,14 @@ class Factors {
   Eigen::Index size_row(Eigen::Index size) const { return all_places() + prisms() + size; }
 
   CommonFactor nothing(std::string name) const;
+  /// The number of a factor that belongs to a range error, or nullptr for other names.
+  double* range_number(std::string_view name, CommonFactor& common) const;
   void move_angles(const std::string& name, double value, CommonFactor& common) const;
   void keep(CommonFactor common);
 
   PointingModel& model_;
   const SensorBelief& belief_;
+  std::vector<sensors::RangeValue> range_values_;
 };
 
 }  // namespace risley::cloud

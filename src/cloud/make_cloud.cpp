@@ -19,6 +19,7 @@
 #include "risley/core/require.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/parallel/parallel.hpp"
+#include "risley/sensors/range_values.hpp"
 #include "risley/trajectories/clock.hpp"
 
 #include "cloud/georeference_kernel.hpp"
@@ -55,6 +56,9 @@ constexpr std::size_t kBlockRows = 2048;
 const double kOutlierChi2 = estimation::BatchMapOptions{}.outlier_chi2;
 /// For telling surfaces: the step in which these sensors give ranges, m.
 constexpr double kLeastRangeNoise = 1e-3;
+
+/// Steps that find a true range by a reported one: each leaves some hundredths of what is wrong.
+constexpr int kRangeSteps = 4;
 
 double square(double x) { return x * x; }
 
@@ -103,7 +107,8 @@ class Work {
         path_(path),
         options_(options),
         progress_(progress),
-        rotors_(needs_rotation_angles(calibration, options.pointing)) {}
+        rotors_(needs_rotation_angles(calibration, options.pointing)),
+        plain_ranges_(calibration.range_errors == sensors::RangeErrors{}) {}
 
   CloudSummary run() {
     check_sensor();
@@ -266,6 +271,13 @@ class Work {
           *options_.platform, reader_.header().time_reference, piece.rows.time_ns.front());
       first_time_ns_ = last_time_ns_ = piece.rows.time_ns.front();
     }
+    has_intensity_ = reader_.header().has_intensity;
+    if (!has_intensity_ && calibration_.range_errors.per_decade != 0) {
+      summary_.warnings.push_back(fmt::format(
+          "the recording has no intensities: ranges are not corrected by the {:.1f} mm that they "
+          "are longer for each tenth of the intensity",
+          1e3 * calibration_.range_errors.per_decade));
+    }
     expect_distortion(0);
     const recordings::Device& device = reader_.header().devices.front();
     if (device.extrinsic_enabled) {
@@ -339,6 +351,20 @@ class Work {
     return row;
   }
 
+  /// A range without the range errors that need no surface to be known, but with the offset.
+  double range_with_offset(std::size_t row) const {
+    const double reported = piece_->rows.range[row];
+    if (plain_ranges_) return reported;
+    const double intensity =
+        has_intensity_ ? static_cast<double>(piece_->rows.intensity[row]) : sensors::kWalkIntensity;
+    double range = reported - calibration_.range_offset;
+    for (int step = 0; step < kRangeSteps; ++step) {
+      range = reported -
+              sensors::range_error(calibration_, range, 0, intensity, piece_->rows.beam[row]);
+    }
+    return range + calibration_.range_offset;
+  }
+
   void find_surfaces(std::size_t begin, std::size_t end) {
     normals_->clear();
     const std::size_t most = georeference_ ? kMovingSurfaceShots : kSurfaceShots;
@@ -354,7 +380,7 @@ class Work {
     } else {
       for (const std::size_t row : rows) {
         normals_->add(piece_->rows.azimuth[row], piece_->rows.zenith[row],
-                      piece_->rows.range[row] - calibration_.range_offset);
+                      range_with_offset(row) - calibration_.range_offset);
       }
     }
     normals_->fit();
@@ -377,7 +403,7 @@ class Work {
     for (const std::size_t i : known) {
       shots.azimuth.push_back(piece_->rows.azimuth[rows[i]]);
       shots.zenith.push_back(piece_->rows.zenith[rows[i]]);
-      shots.range.push_back(piece_->rows.range[rows[i]]);
+      shots.range.push_back(range_with_offset(rows[i]));
     }
     stand_still(poses, shots.azimuth, shots.zenith, shots.range, stood);
     for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -386,7 +412,7 @@ class Work {
   }
 
   /// Shots of a moving sensor as they would have been from where the sensor is in the middle of a
-  /// surface's time.
+  /// surface's time. @param range  as range_with_offset() says
   void stand_still(const SensorPoses& poses, const std::vector<double>& azimuth,
                    const std::vector<double>& zenith, const std::vector<double>& range,
                    PolarShots& stood) const {
@@ -412,6 +438,8 @@ class Work {
   void find_normals(Block& block) const {
     PointedShots& shots = block.shots;
     const std::size_t n = shots.size();
+    std::vector<double> range(n);
+    for (std::size_t i = 0; i < n; ++i) range[i] = range_with_offset(block.rows[i]);
     const auto set = [&shots](std::size_t i, const Vector3<double>& normal) {
       shots.surface_normal[0][i] = normal.x;
       shots.surface_normal[1][i] = normal.y;
@@ -421,12 +449,12 @@ class Work {
       const double nowhere = std::nan("");
       for (std::size_t i = 0; i < n; ++i) {
         set(i, normals_->normal(georeference_ ? nowhere : shots.azimuth[i], shots.zenith[i],
-                                shots.range[i]));
+                                range[i] - calibration_.range_offset));
       }
       return;
     }
     if (n == 0) return;
-    stand_still(block.poses, shots.azimuth, shots.zenith, shots.range, block.stood);
+    stand_still(block.poses, shots.azimuth, shots.zenith, range, block.stood);
     for (std::size_t i = 0; i < n; ++i) {
       set(i, normals_->normal(block.stood.azimuth[i], block.stood.zenith[i], block.stood.range[i]));
     }
@@ -528,7 +556,7 @@ class Work {
     take(piece_->rows.zenith, shots.zenith, same);
     take(piece_->rows.range, shots.range, same);
     take(piece_->rows.intensity, shots.intensity,
-         [](std::uint8_t value) { return static_cast<double>(value); });
+         [this](std::uint8_t value) { return has_intensity_ ? static_cast<double>(value) : -1.0; });
     take(piece_->rows.azimuth_resolution, shots.azimuth_rounding, variance);
     take(piece_->rows.zenith_resolution, shots.zenith_rounding, variance);
     take(piece_->rows.range_resolution, shots.range_rounding, variance);
@@ -685,7 +713,9 @@ class Work {
   CloudSummary summary_;
   std::optional<SensorBelief> belief_;
   PointingModel model_;
-  bool rotors_;  ///< points depend on the rotation angles
+  bool rotors_;        ///< points depend on the rotation angles
+  bool plain_ranges_;  ///< they have no errors but the offset
+  bool has_intensity_ = true;
   std::unique_ptr<SurfaceNormals> normals_;
   std::unique_ptr<Georeference> georeference_;  ///< of a moving sensor
   SensorPoses surface_pose_;  ///< in the middle of a surface's time, where it is known

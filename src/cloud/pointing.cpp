@@ -18,6 +18,15 @@ namespace {
 
 static_assert(kMountEffects == trajectories::kMountQuantities);
 
+void require_range_errors(const sensors::RangeErrors& errors, int emitters) {
+  require_finite("near of range_errors", errors.near, "m");
+  require_finite("incidence of range_errors", errors.incidence, "1");
+  require_finite("per_decade of range_errors", errors.per_decade, "m");
+  require_length_or_none("emitter of range_errors", errors.emitter.size(),
+                         static_cast<std::size_t>(emitters));
+  for (const double error : errors.emitter) require_finite("emitter of range_errors", error, "m");
+}
+
 void require_model(const PointingModel& model) {
   require_between("number of sizes of prisms", static_cast<double>(model.sizes.size()), 0,
                   kMostSizes);
@@ -31,6 +40,7 @@ void require_model(const PointingModel& model) {
   }
   require_not_below("angle noise", model.angle_noise, 0, "rad");
   require_finite("range offset", model.range_offset, "m");
+  require_range_errors(model.range_errors, model.train.emitters());
   const auto all_places = static_cast<std::size_t>(parameter_count(model.train.shape()));
   for (const int place : model.places) {
     require_place("place", static_cast<std::size_t>(place), all_places);
@@ -39,6 +49,7 @@ void require_model(const PointingModel& model) {
       model.places.size() + static_cast<std::size_t>(model.train.prisms()) + model.sizes.size();
   for (const CommonFactor& factor : model.factors) {
     require_length("weights of a factor", static_cast<std::size_t>(factor.weights.size()), rows);
+    require_range_errors(factor.range_errors, model.train.emitters());
   }
 }
 
@@ -142,6 +153,13 @@ struct SparseRows {
   }
 };
 
+/// In the order of RangeShare; not those of emitters where all are 0.
+std::vector<double> range_row(const sensors::RangeErrors& errors) {
+  std::vector<double> row{errors.near, errors.incidence, errors.per_decade};
+  row.insert(row.end(), errors.emitter.begin(), errors.emitter.end());
+  return row;
+}
+
 /// Pointers to the columns of some shots and points.
 class Columns {
  public:
@@ -244,12 +262,25 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     a.divergence_variance_vertical = square(kDivergenceSigma * sensor.beam_divergence_vertical);
   }
   std::vector<double> range_factor;
-  SparseRows of_sensor, of_mount;
+  SparseRows of_sensor, of_mount, of_range;
   for (const CommonFactor& factor : model.factors) {
     range_factor.push_back(factor.range_offset);
     of_sensor.add(factor.weights);
     of_mount.add(factor.mount);
+    of_range.add(range_row(factor.range_errors));
   }
+  std::vector<double> range_emitter = model.range_errors.emitter;
+  range_emitter.resize(static_cast<std::size_t>(a.emitters), 0.0);
+  a.range_errors = model.range_errors != sensors::RangeErrors{} || !of_range.column.empty();
+  a.range_near = model.range_errors.near;
+  a.range_incidence = model.range_errors.incidence;
+  a.range_per_decade = model.range_errors.per_decade;
+  a.range_emitter = range_emitter.data();
+  a.divergence_horizontal = sensor.beam_divergence_horizontal;
+  a.divergence_vertical = sensor.beam_divergence_vertical;
+  a.range_begin = of_range.begin.data();
+  a.range_row = of_range.column.data();
+  a.range_weight = of_range.weight.data();
   a.places = model.places.data();
   a.place_count = static_cast<int>(model.places.size());
   a.factors = static_cast<int>(model.factors.size());

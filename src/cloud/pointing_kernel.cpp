@@ -9,6 +9,7 @@
 #include "risley/optics/beam_origin.hpp"
 #include "risley/optics/emitter_lanes.hpp"
 #include "risley/optics/observation_adjoint.hpp"
+#include "risley/sensors/range_errors.hpp"
 
 namespace risley::cloud::RISLEY_KERNEL_NAMESPACE {
 namespace {
@@ -48,14 +49,15 @@ class Points {
   explicit Points(const PointArguments& a) : a_(a) {}
 
   /// Shots [at, at + kLanes) of which no rotation angles are known: directions as reported, beams
-  /// from the frame's origin, a footprint along azimuth and zenith. Of the common factors the range
-  /// offset remains.
+  /// from the frame's origin, a footprint along azimuth and zenith. Of the common factors those of
+  /// the range remain.
   [[gnu::flatten]] void compute_reported(std::size_t at) const {
     const Sines azimuth = sines(a_.azimuth, at), zenith = sines(a_.zenith, at);
     const Batch zero(0.0);
     Ray ray{{zero, zero, zero}, {}, {}};
     set_reported(azimuth, zenith, ray);
-    const Batch range = load(a_.range, at) - Batch(a_.range_offset);
+    RangeShares shares;
+    const Batch range = corrected_range(at, ray, shares);
     const Batch cosine = store_point(at, ray, range);
     if (!a_.covariance[0]) return;
     BeamCovariance own{zero, zero, zero, zero, zero, range_noise(at, range, cosine)};
@@ -66,7 +68,7 @@ class Points {
     if (a_.own_covariance[0]) store_covariance(at, ray, own, a_.own_covariance);
     const MountEffects effects = mount_effects(at, ray, range);
     for (int factor = 0; factor < a_.factors; ++factor) {
-      add_factor(at, factor, zero, zero, effects, ray, own);
+      add_factor(at, factor, zero, zero, effects, shares, ray, own);
     }
     store_covariance(at, ray, own, a_.covariance);
   }
@@ -94,6 +96,70 @@ class Points {
         Vector3<Batch>{zenith.cosine * azimuth.cosine, zenith.cosine * azimuth.sine, -zenith.sine}};
   }
 
+  /// What a unit of each range error adds to a range, see RangeShare.
+  using RangeShares = std::array<Batch, kEmitterShares + kMaxEmitters>;
+
+  Vector3<Batch> surface_normal(std::size_t at) const {
+    return {load(a_.surface_normal[0], at), load(a_.surface_normal[1], at),
+            load(a_.surface_normal[2], at)};
+  }
+
+  /// True range by the reported one. @param shares  filled where there are range errors
+  Batch corrected_range(std::size_t at, const Ray& ray, RangeShares& shares) const {
+    const Batch without_offset = load(a_.range, at) - Batch(a_.range_offset);
+    if (!a_.range_errors) return without_offset;
+    return without_range_errors(at, ray, without_offset, shares);
+  }
+
+  /// Not inlined: it would cost the ranges that have no such errors registers.
+  [[gnu::noinline]] Batch without_range_errors(std::size_t at, const Ray& ray,
+                                               const Batch& without_offset,
+                                               RangeShares& shares) const {
+    const Batch zero(0.0), intensity = load(a_.intensity, at);
+    const Batch decades =
+        xsimd::log10(Batch(sensors::kWalkIntensity) / xsimd::max(intensity, Batch(1.0)));
+    shares[kDecadeShare] = xsimd::select(intensity >= zero, decades, zero);
+    Batch measured = without_offset - Batch(a_.range_per_decade) * shares[kDecadeShare];
+    for (int emitter = 0; emitter < a_.emitters; ++emitter) {
+      alignas(64) double fired[kLanes];
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        fired[i] = (a_.beam ? a_.beam[at + i] : 0) == emitter ? 1.0 : 0.0;
+      }
+      const Batch share = Batch::load_aligned(fired);
+      measured = measured - Batch(a_.range_emitter[emitter]) * share;
+      shares[static_cast<std::size_t>(kEmitterShares + emitter)] = share;
+    }
+    // Those that depend on the true range by two steps of Newton's method: the first is off by less
+    // than the square of the error, of some centimetres, over kNearDecay.
+    const Batch depth = depth_per_range(at, ray);
+    const Batch near(a_.range_near), incidence(a_.range_incidence), decay(sensors::kNearDecay);
+    Batch range = measured;
+    for (int step = 0; step < 2; ++step) {
+      const Batch share = xsimd::exp((Batch(1.0) - range) / decay);
+      const Batch off = range + near * share + incidence * depth * range - measured;
+      range = range - off / (Batch(1.0) - near * share / decay + incidence * depth);
+    }
+    shares[kNearShare] = xsimd::exp((Batch(1.0) - range) / decay);
+    shares[kIncidenceShare] = depth * range;
+    return range;
+  }
+
+  /// sensors::footprint_depth() of a range of 1 m on the surface, 0 where it is not known.
+  Batch depth_per_range(std::size_t at, const Ray& ray) const {
+    const Vector3<Batch>& d = ray.direction;
+    const Batch zero(0.0), one(1.0), level = xsimd::sqrt(d.x * d.x + d.y * d.y);
+    const Lanes upright = level == zero;  // as sensors::footprint_axes() says
+    const Batch over = one / xsimd::select(upright, one, level);
+    const Vector3<Batch> horizontal{-d.y * over, xsimd::select(upright, one, d.x * over), zero};
+    const Vector3<Batch> vertical = cross(d, horizontal);
+    const Vector3<Batch> normal = surface_normal(at);
+    const Lanes known = normal.x == normal.x;
+    const Batch cosine = xsimd::max(xsimd::abs(dot(normal, d)), Batch(kLeastCosine));
+    const Batch h = dot(normal, horizontal) * Batch(a_.divergence_horizontal) / cosine;
+    const Batch v = dot(normal, vertical) * Batch(a_.divergence_vertical) / cosine;
+    return xsimd::select(known, Batch(0.5) * xsimd::sqrt(h * h + v * v), zero);
+  }
+
   /// @return cosine of the angle of incidence, NaN where no surface is known
   Batch store_point(std::size_t at, const Ray& ray, const Batch& range) const {
     const Vector3<Batch> point = ray.origin + range * ray.direction;
@@ -101,8 +167,7 @@ class Points {
     point.y.store_unaligned(a_.point[1] + at);
     point.z.store_unaligned(a_.point[2] + at);
     range.store_unaligned(a_.corrected_range + at);
-    const Vector3<Batch> normal{load(a_.surface_normal[0], at), load(a_.surface_normal[1], at),
-                                load(a_.surface_normal[2], at)};
+    const Vector3<Batch> normal = surface_normal(at);
     const Batch nan(__builtin_nan(""));
     const Lanes known = normal.x == normal.x;  // min and acos need not hand NaN on
     const Batch cosine =
@@ -143,9 +208,16 @@ class Points {
   /// Adds what one common factor does, beam and mount together, and stores its loading.
   /// @param fu, fv  what it does across the beam, m
   void add_factor(std::size_t at, int factor, const Batch& fu, const Batch& fv,
-                  const MountEffects& effects, const Ray& ray, BeamCovariance& c) const {
+                  const MountEffects& effects, const RangeShares& shares, const Ray& ray,
+                  BeamCovariance& c) const {
     const Vector3<Batch>&u = ray.across[0], &v = ray.across[1], &d = ray.direction;
     Vector3<Batch> f{fu, fv, Batch(-a_.range_factor[factor])};  // the offset is taken off the range
+    if (a_.range_errors) {
+      for (int entry = a_.range_begin[factor]; entry < a_.range_begin[factor + 1]; ++entry) {
+        f.z = f.z -
+              Batch(a_.range_weight[entry]) * shares[static_cast<std::size_t>(a_.range_row[entry])];
+      }
+    }
     if (a_.mount_begin) {
       for (int entry = a_.mount_begin[factor]; entry < a_.mount_begin[factor + 1]; ++entry) {
         f = f +
@@ -304,7 +376,7 @@ class Kernel : public Points {
     } else {
       ray.across = vectors_across(ray.direction);
     }
-    range_[g] = load(a_.range, at) - Batch(a_.range_offset);
+    range_[g] = corrected_range(at, ray, shares_[g]);
     cosine_[g] = store_point(at, ray, range_[g]);
   }
 
@@ -430,7 +502,7 @@ class Kernel : public Points {
         fu = xsimd::fma(u[row], w, fu);
         fv = xsimd::fma(v[row], w, fv);
       }
-      add_factor(at, factor, fu, fv, effects, ray_[g], c);
+      add_factor(at, factor, fu, fv, effects, shares_[g], ray_[g], c);
     }
   }
 
@@ -447,6 +519,7 @@ class Kernel : public Points {
   Sines azimuth_[kGroups], zenith_[kGroups];
   Ray ray_[kGroups];
   Batch range_[kGroups], cosine_[kGroups];
+  RangeShares shares_[kGroups];
   ReversePass<Batch, N, 2> pass_[kGroups];
   BeamPathAdjoint<Batch, N> origin_[kGroups][2];
 };

@@ -11,13 +11,19 @@
 namespace risley::cloud {
 
 /// Most common factors that a call can take.
-inline constexpr int kMostFactors = 64;
+inline constexpr int kMostFactors = 96;
 /// Most sizes of prisms that a call can take: those that all share, and the thickness of every
 /// prism and the spacing behind every one but the last.
 inline constexpr int kMostSizes = 2 + 2 * kMaxPrisms - 1;
 
 /// Quantities of a mount: trajectories::kMountQuantities, whose header is not for kernels.
 inline constexpr int kMountEffects = 7;
+
+/// Errors of ranges that depend on the shot: near range, incidence, intensity, then the emitters'.
+enum RangeShare { kNearShare, kIncidenceShare, kDecadeShare, kEmitterShares };
+/// Cosine of the angle of incidence (80 degrees) from which on the depth of a footprint grows no
+/// further: the plane of a surface is not known well enough.
+inline constexpr double kLeastCosine = 0.17364817766693033;
 
 /// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Every column
 /// has one entry per shot and room for whole groups: a multiple of kPointPadding.
@@ -35,6 +41,12 @@ struct PointArguments {
 
   double angle_noise_variance = 0;  ///< of reported angles before rounding, rad^2
   double range_offset = 0;          ///< m
+  /// Whether ranges have further errors than the offset or factors of such: see
+  /// sensors::RangeErrors.
+  bool range_errors = false;
+  double range_near = 0, range_incidence = 0, range_per_decade = 0;
+  const double* range_emitter = nullptr;                      ///< [emitters], m
+  double divergence_horizontal = 0, divergence_vertical = 0;  ///< full angles, rad
   /// Parts of the range's variance, m^2, see sensors::Sensor::range_variance.
   double range_variance = 0, range_variance_per_range2 = 0, range_variance_incidence = 0,
          range_variance_weak_return = 0;
@@ -51,6 +63,10 @@ struct PointArguments {
   const int* factor_row = nullptr;
   const double* factor_weight = nullptr;
   const double* range_factor = nullptr;  ///< [factors], m
+  /// The same of range_errors: rows are numbered as RangeShare says.
+  const int* range_begin = nullptr;  ///< [factors + 1]
+  const int* range_row = nullptr;
+  const double* range_weight = nullptr;
   /// Of a moving sensor, or nullptr, what one standard deviation does to the mount, in the same
   /// way: rows are rotations about the sensor's axes, rad, shifts along them, m, and clock, s.
   const int* mount_begin = nullptr;
@@ -70,7 +86,7 @@ struct PointArguments {
   const double* zenith_variance = nullptr;
   const double* range = nullptr;              ///< [shots], as reported, m
   const double* rounding_variance = nullptr;  ///< [shots], of the range, m^2
-  const double* intensity = nullptr;          ///< [shots]
+  const double* intensity = nullptr;          ///< [shots]; negative: not known
   /// Unit normal of the surface that a shot met, NaN where it is not known [3][shots].
   const double* const* surface_normal = nullptr;
 

@@ -11,6 +11,7 @@
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/estimation/parameter_agreement.hpp"
 #include "risley/sensors/prism_sizes.hpp"
+#include "risley/sensors/range_values.hpp"
 
 #include "cloud/common_factors.hpp"
 #include "cloud/pointing_kernel.hpp"
@@ -30,7 +31,7 @@ NamedCovariance calibrated(const sensors::Sensor& sensor, const PointingOptions&
     const std::string& name = sensor.covariance_names[i];
     if (sensors::find_prism_size(name, sensor.prisms())) {
       if (!options.beam_origin) continue;
-    } else if (name != kRangeOffset &&
+    } else if (!sensors::is_range_value(name) &&
                find_parameter(name, sensor.shape()).kind != ParameterKind::train) {
       continue;
     }
@@ -140,6 +141,7 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
   model.train = planes ? calibration.train : belief.sensor.train;
   if (options.beam_origin) model.geometry = calibration.geometry;
   model.range_offset = calibration.range_offset;
+  model.range_errors = calibration.range_errors;
   model.angle_noise = belief.angle_noise;
   model.sizes.clear();
   if (options.beam_origin) model.sizes = sensors::uncertain_prism_sizes(calibration);

@@ -165,7 +165,10 @@ double value_of(const Sensor& sensor, const std::string& name) {
 }
 
 FileUnit file_unit_of(const std::string& name, TrainShape shape) {
-  if (name == kRangeOffset || sensors::find_prism_size(name, shape.prisms)) return {"m", 1};
+  if (name == "range_incidence") return {"1", 1};
+  if (sensors::is_range_value(name) || sensors::find_prism_size(name, shape.prisms)) {
+    return {"m", 1};
+  }
   const ParameterInfo& parameter = find_parameter(name, shape);
   return {parameter.unit, parameter.si_per_unit};
 }

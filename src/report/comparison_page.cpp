@@ -3,6 +3,8 @@
 #include "risley/report/comparison_page.hpp"
 
 #include <cmath>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -13,6 +15,7 @@
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
 #include "risley/sensors/prism_sizes.hpp"
+#include "risley/sensors/range_values.hpp"
 
 namespace risley::report {
 namespace {
@@ -64,9 +67,19 @@ struct InUnits {
   double factor = 1;  ///< times the SI value
 };
 
+/// Words and symbol of a range error.
+std::pair<std::string, std::string> range_words(std::string_view name) {
+  if (name == jobs::kRangeOffset) return {"range offset", "r_0"};
+  if (name == "range_near_m") return {"range error near the sensor", "r_n"};
+  if (name == "range_incidence") return {"range error of tilted surfaces", "r_i"};
+  if (name == "range_per_decade_m") return {"range error of dark surfaces", "r_d"};
+  return {"range error of an emitter", "r_e"};
+}
+
 InUnits in_units(const ParameterDifference& one, TrainShape shape) {
-  if (one.name == jobs::kRangeOffset) {
-    return {parameter_head("range offset", "r_0", one.name), 1};
+  if (sensors::is_range_value(one.name)) {
+    const auto [words, symbol] = range_words(one.name);
+    return {parameter_head(words, symbol, one.name), 1};
   }
   if (const auto size = sensors::find_prism_size(one.name, shape.prisms)) {
     const bool thickness = !size->rate.thickness.empty();

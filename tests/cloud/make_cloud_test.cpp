@@ -244,6 +244,69 @@ TEST_F(MakeCloud, ReportedDirectionsFromTheOriginAreTheRecordsThemselves) {
   }
 }
 
+/// Mean and rms distance of the points of the CSV from a wall, along its normal, m.
+std::pair<double, double> distance_from(const Plane& wall,
+                                        std::map<std::string, std::vector<double>> points) {
+  double sum = 0, squares = 0;
+  const std::size_t n = points["X_m"].size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double distance =
+        signed_distance(wall, {points["X_m"][i], points["Y_m"][i], points["Z_m"][i]});
+    sum += distance;
+    squares += distance * distance;
+  }
+  const auto count = static_cast<double>(n);
+  return {sum / count, std::sqrt(squares / count)};
+}
+
+// A wall that stands at an angle, light on one side and dark on the other, scanned with range
+// errors that a calibration found.
+TEST_F(MakeCloud, PointsLieOnTheWallWhenRangesHaveErrors) {
+  auto settings = wall_settings(3.0, 20000.0);
+  settings.range_noise = 0.001;
+  settings.truth.range_offset = 0.02;
+  settings.truth.range_errors = {0.02, 0.3, 0.01, {0.004}};
+  scenes::ScenePlane& wall = settings.scene->planes.front();
+  const double turned = radians_from_degrees(50);
+  wall.plane = {{std::cos(turned), std::sin(turned), 0}, 2.0};
+  wall.horizontal_axis = {-std::sin(turned), std::cos(turned), 0};
+  wall.vertical_axis = {0, 0, 1};
+  scenes::Patch dark;
+  dark.center = {-1.5, 0.4};
+  dark.size = {1.5, 1.0};
+  dark.reflectivity = 0.05;
+  wall.patches.push_back(dark);
+  sensors::Sensor calibrated = type_;
+  calibrated.range_offset = settings.truth.range_offset;
+  const auto found = [&](const simulation::SimulationSettings& of) {
+    SimulatedReader reader(of);
+    make_cloud(reader, calibrated, path(), {});
+    return distance_from(wall.plane, columns());
+  };
+  const auto [off, scattered] = found(settings);
+  EXPECT_GT(std::abs(off), 0.005);
+  calibrated.range_errors = settings.truth.range_errors;
+  const auto [mean, rms] = found(settings);
+  // The angle of incidence, known to half a degree, leaves some hundredths of the depth.
+  EXPECT_LT(std::abs(mean), 0.0002);
+  EXPECT_LT(rms, 0.0012);
+  EXPECT_GT(scattered, 2 * rms);
+}
+
+TEST_F(MakeCloud, SaysThatRangesWithoutIntensitiesAreNotCorrectedByThem) {
+  type_.range_errors.per_decade = 0.01;
+  const auto made = [&](bool known) {
+    auto settings = wall_settings(1.0, 2000.0);
+    SimulatedReader reader(settings);
+    reader.header().has_intensity = known;
+    return make_cloud(reader, type_, path(), {}).warnings;
+  };
+  EXPECT_THAT(made(true), ::testing::Not(::testing::Contains(HasSubstr("intensities"))));
+  const double corrected = columns()["LidarRange_m"].front();
+  EXPECT_THAT(made(false), ::testing::Contains(HasSubstr("10.0 mm")));
+  EXPECT_GT(std::abs(columns()["LidarRange_m"].front() - corrected), 1e-4);
+}
+
 TEST_F(MakeCloud, SaysThatExtrinsicsAreNotApplied) {
   SimulatedReader reader(wall_settings(1.0, 2000.0));
   reader.header().devices.front().extrinsic_enabled = true;

@@ -22,7 +22,9 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
+#include "risley/sensors/footprint.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/sensors/range_values.hpp"
 
 #include "optics/trains.hpp"
 #include "parameter_name.hpp"
@@ -98,6 +100,50 @@ struct Expected {
   }
 };
 
+/// What a unit of each range error adds to the range of one shot, as the simulator has it.
+struct RangeShares {
+  double near = 0, incidence = 0, per_decade = 0;
+
+  RangeShares(const sensors::Sensor& sensor, const PointedShots& shots, std::size_t i,
+              const Vector3d& direction, double range)
+      : near(sensors::near_share(range)) {
+    const double intensity = shots.intensity[i];
+    if (!(intensity < 0)) per_decade = sensors::intensity_decades(intensity);
+    const Vector3<double> normal{shots.surface_normal[0][i], shots.surface_normal[1][i],
+                                 shots.surface_normal[2][i]};
+    if (std::isnan(normal.x)) return;
+    const Vector3<double> beam{direction.x(), direction.y(), direction.z()};
+    const sensors::FootprintAxes axes = sensors::footprint_axes(beam);
+    const double whole = sensors::footprint_depth(
+        range, sensors::footprint_slope(normal, beam, axes.horizontal),
+        sensors::footprint_slope(normal, beam, axes.vertical), sensor.beam_divergence_horizontal,
+        sensor.beam_divergence_vertical);
+    const double least = std::cos(radians_from_degrees(80));
+    const double cosine = std::abs(dot(normal, beam));
+    incidence = cosine < least ? whole * cosine / least : whole;
+  }
+
+  /// Of all errors of that emitter, the constant one included.
+  double sum(double range_offset, const sensors::RangeErrors& errors, std::size_t emitter) const {
+    return range_offset + errors.near * near + errors.incidence * incidence +
+           errors.per_decade * per_decade +
+           (errors.emitter.empty() ? 0.0 : errors.emitter[emitter]);
+  }
+};
+
+/// The range that is reported as it is in spite of these errors.
+double true_range(const sensors::Sensor& sensor, const PointedShots& shots, std::size_t i,
+                  const Vector3d& direction, double range_offset,
+                  const sensors::RangeErrors& errors) {
+  double range = shots.range[i];
+  for (int step = 0; step < 50; ++step) {
+    range =
+        shots.range[i] -
+        RangeShares(sensor, shots, i, direction, range).sum(range_offset, errors, shots.beam[i]);
+  }
+  return range;
+}
+
 Beam beam_of(const PointingModel& model, const PointedShots& shots, std::size_t i) {
   Beam beam{model.train, model.geometry, {}};
   for (const auto& column : shots.rotation_angle) beam.angles.push_back(column[i]);
@@ -113,7 +159,7 @@ Expected expected_point(const PointingModel& model, const PointedShots& shots, s
   const double azimuth = shots.azimuth[i], zenith = shots.zenith[i];
   e.direction = reported ? eigen(direction_from_angles(SphericalAngles<double>{azimuth, zenith}))
                          : eigen(ray.direction);
-  e.range = shots.range[i] - model.range_offset;
+  e.range = true_range(model.sensor, shots, i, e.direction, model.range_offset, model.range_errors);
   e.point = eigen(ray.origin) + e.range * e.direction;
   const Observation believed = observe(model.believed, beam.angles);
   e.azimuth_residual = wrap_to_pi(azimuth - believed.azimuth);
@@ -177,13 +223,16 @@ Expected expected_point(const PointingModel& model, const PointedShots& shots, s
   common.col(column++) = rate_of(beam, e.range, 1e-4,
                                  [](Beam& b, double step) { move_all(b.geometry.spacing, step); });
   const Matrix3d across = Matrix3d::Identity() - along;
+  const RangeShares shares(model.sensor, shots, i, e.direction, e.range);
   for (const CommonFactor& factor : model.factors) {
     const Vector3d whole = common * factor.weights;
-    const Vector3d moved = across * whole - factor.range_offset * e.direction;
+    const Vector3d along_beam =
+        shares.sum(factor.range_offset, factor.range_errors, shots.beam[i]) * e.direction;
+    const Vector3d moved = across * whole - along_beam;
     const double extra = std::abs(e.direction.dot(whole));
     e.loading.push_back(moved);
     e.covariance += moved * moved.transpose();
-    const Vector3d full = whole - factor.range_offset * e.direction;
+    const Vector3d full = whole - along_beam;
     e.full_covariance += full * full.transpose();
     e.left_out += extra * (2.0 * moved.norm() + extra);
   }
@@ -322,12 +371,18 @@ double relative_difference(const Matrix3d& found, const Matrix3d& stated) {
   return std::isfinite(worst) ? worst : std::numeric_limits<double>::infinity();
 }
 
-void expect_points(const PointingModel& model, const PointedShots& shots, const Points& points) {
+/// @param range_error  of what the corrections of ranges leave, m
+void expect_points(const PointingModel& model, const PointedShots& shots, const Points& points,
+                   double range_error = 0) {
   for (std::size_t i = 0; i < shots.size(); ++i) {
     SCOPED_TRACE(fmt::format("shot {} of {}", i, shots.size()));
     const Expected e = expected_point(model, shots, i);
-    EXPECT_LT((point_of(points, i) - e.point).norm(), 1e-14 * (10.0 + e.range));
-    EXPECT_DOUBLE_EQ(points.range[i], e.range);
+    EXPECT_LT((point_of(points, i) - e.point).norm(), 1e-14 * (10.0 + e.range) + range_error);
+    if (range_error == 0) {
+      EXPECT_DOUBLE_EQ(points.range[i], e.range);
+    } else {
+      EXPECT_NEAR(points.range[i], e.range, range_error);
+    }
     EXPECT_NEAR(points.azimuth_residual[i], e.azimuth_residual,
                 1e-15 + 1e-8 * std::abs(e.azimuth_residual));
     EXPECT_NEAR(points.zenith_residual[i], e.zenith_residual,
@@ -379,6 +434,86 @@ TEST_P(PointsOfEveryTrain, EqualPlainNumbersInEveryInstructionSet) {
       expect_points(model, shots, points_of(model, header_of(model), shots, set));
     }
   }
+}
+
+// Ranges with all errors: corrected, and their uncertainties along the beam.
+TEST_P(PointsOfEveryTrain, HaveRangesWithoutTheirErrors) {
+  PointingOptions options;
+  options.reported_directions = GetParam().reported;
+  options.beam_origin = GetParam().origin;
+  for (const InstructionSet set : available_instruction_sets()) {
+    SCOPED_TRACE(to_string(set));
+    for (unsigned count = 1; count <= 17; ++count) {
+      PointingModel model = imperfect_model(GetParam().order, count, options);
+      if (count % 5 != 0) model.range_errors = {0.02, 0.3, 0.01, {0.004}};
+      for (std::size_t j = 0; j < model.factors.size(); ++j) {
+        const double size = 1e-3 * static_cast<double>(j + 1);
+        sensors::RangeErrors& errors = model.factors[j].range_errors;
+        if (j != 1) errors.near = size;
+        if (j != 2) errors.incidence = -20 * size;
+        if (j > 2) errors.per_decade = size;
+        if (j == 4) errors.emitter = {size};
+      }
+      PointedShots shots = random_shots(model, count, count);
+      for (std::size_t i = 3; i < count; i += 6) shots.intensity[i] = -1;  // not known
+      for (std::size_t i = 0; i < count; i += 7) {                         // grazing
+        const Expected e = expected_point(model, shots, i);
+        const Vector3d across = e.direction.unitOrthogonal() + 0.01 * e.direction;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          shots.surface_normal[axis][i] = across.normalized()[static_cast<Index>(axis)];
+        }
+      }
+      expect_points(model, shots, points_of(model, header_of(model), shots, set), 1e-12);
+    }
+  }
+}
+
+// Straight up, where the footprint has no horizontal axis, and with an emitter's error of its own.
+TEST(ComputePoints, RangesOfReportedDirectionsLoseTheErrorsOfTheirEmitter) {
+  PointingModel model;
+  model.train = model.believed = testing::imperfect_train("PA-AP", 0.1, 3, 6);
+  model.options.reported_directions = true;
+  model.options.beam_origin = false;
+  model.sensor = sensors::load_sensor("avia");
+  model.range_offset = 0.02;
+  model.range_errors = {0.02, 0.3, 0.01, {0.001, 0.002, 0.003, 0.004, 0.005, 0.006}};
+  CommonFactor factor;
+  factor.weights = VectorXd::Zero(4);
+  factor.range_errors.emitter = {0, 0, 0, 0.5e-3, 0, 0};
+  model.factors = {factor};
+  PointedShots shots;
+  shots.resize(2, 9);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    shots.beam[i] = static_cast<std::uint8_t>((i + 3) % 6);
+    shots.zenith[i] = i == 0 ? 0.0 : 0.2 * static_cast<double>(i);
+    shots.azimuth[i] = i == 0 ? 0.0 : 0.3;
+    shots.range[i] = 1.5 + static_cast<double>(i);
+    shots.intensity[i] = 10;
+    shots.surface_normal[0][i] = 0.6;
+    shots.surface_normal[2][i] = 0.8;
+  }
+  CloudHeader header = header_of(model);
+  header.has_rotation_angles = false;
+  for (const InstructionSet set : available_instruction_sets()) {
+    const Points points = points_of(model, header, shots, set);
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      SCOPED_TRACE(fmt::format("{} shot {}", to_string(set), i));
+      const Vector3d direction =
+          eigen(direction_from_angles(SphericalAngles<double>{shots.azimuth[i], shots.zenith[i]}));
+      const double range =
+          true_range(model.sensor, shots, i, direction, model.range_offset, model.range_errors);
+      EXPECT_NEAR(points.range[i], range, 1e-12);
+      const double moved = shots.beam[i] == 3 ? -0.5e-3 : 0.0;
+      EXPECT_LT((loading_of(points, 0, i) - moved * direction).norm(), 1e-15);
+    }
+  }
+  // A footprint's depth is that of the simulator.
+  const RangeShares shares(model.sensor, shots, 0, Vector3d::UnitZ(), 1.0);
+  EXPECT_GT(shares.incidence, 0);
+  model.range_errors.near = kNaN;
+  EXPECT_THROW(points_of(model, header, shots), InvalidArgument);
+  model.range_errors = {0, 0, 0, {0.001}};
+  EXPECT_THROW(points_of(model, header, shots), InvalidArgument);
 }
 
 std::vector<PointCase> point_cases() {
@@ -953,6 +1088,110 @@ TEST(PointingModel, TakesSizesOfPrismsJointlyWithTheOthers) {
   EXPECT_EQ(names_of(thin).size(), expected.size() - 3);
 }
 
+/// The numbers of a factor along the beam: range_offset_m, range_near_m, range_incidence,
+/// range_per_decade_m, range_emitter_1_m.
+VectorXd range_numbers(const CommonFactor& factor) {
+  const sensors::RangeErrors& errors = factor.range_errors;
+  VectorXd numbers(5);
+  numbers << factor.range_offset, errors.near, errors.incidence, errors.per_decade,
+      errors.emitter.empty() ? 0.0 : errors.emitter.front();
+  return numbers;
+}
+
+TEST(PointingModel, TakesRangeErrorsJointlyWithTheOthers) {
+  Case one(CalibrationReference::planes);
+  auto& names = one.calibration.covariance_names;
+  const std::vector<std::string> more = {"range_near_m", "range_incidence", "range_per_decade_m",
+                                         "range_emitter_1_m"};
+  names.insert(names.end(), more.begin(), more.end());
+  VectorXd sigma = typical_sigmas(names);
+  sigma.tail(4) << 4e-3, 0.08, 6e-3, 1e-3;
+  const MatrixXd& c = one.calibration.covariance = correlated(sigma, 23);
+  one.calibration.range_errors = {0.015, 0.3, 0.01, {0.002}};
+  // What is in the covariance does not count again.
+  one.calibration.set_knowledge({"range_near_m", 0.01, "calibrated"});
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  EXPECT_EQ(model.range_errors, one.calibration.range_errors);
+  std::vector<std::string> expected = names;
+  for (const char* own :
+       {"rotation_angle_a_deg", "rotation_angle_b_deg", "prism_thickness_m", "prism_spacing_m"}) {
+    expected.emplace_back(own);
+  }
+  EXPECT_EQ(names_of(model), expected);
+  const int place = find_parameter("prism_tilt_b_vertical_deg", {2}).places.front();
+  const auto tilt = std::find(names.begin(), names.end(), "prism_tilt_b_vertical_deg");
+  const auto row =
+      std::find(model.places.begin(), model.places.end(), place) - model.places.begin();
+  MatrixXd found = MatrixXd::Zero(6, 6);
+  for (const CommonFactor& factor : model.factors) {
+    VectorXd numbers(6);
+    numbers << range_numbers(factor), factor.weights[row];
+    found += numbers * numbers.transpose();
+  }
+  const auto n = static_cast<Index>(names.size());
+  const std::vector<Index> rows{2, n - 4, n - 3, n - 2, n - 1, tilt - names.begin()};
+  expect_same_covariance(found, c(rows, rows));
+}
+
+TEST(PointingModel, ARangeErrorThatIsStatedCountsWhereTheCovarianceHasNone) {
+  Case one(CalibrationReference::planes);
+  one.calibration.set_knowledge({"range_per_decade_m", 0.001, "measured", 0.004});
+  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  ASSERT_EQ(model.factors.back().name, "range_per_decade_m");
+  EXPECT_EQ(range_numbers(model.factors.back())[3], 0.004);  // with what was held
+}
+
+// A number that a point could depend on is never left out without a word.
+TEST(PointingModel, RefusesNamesThatItDoesNotKnow) {
+  for (const char* name : {"range_nearr_m", "range_emitter_2_m", "prism_thickness_c_m"}) {
+    for (const bool reported : {false, true}) {
+      for (const auto reference :
+           {CalibrationReference::directions, CalibrationReference::planes}) {
+        SCOPED_TRACE(name);
+        Case one(reference);
+        one.calibration.covariance_names.emplace_back(name);
+        one.calibration.covariance =
+            correlated(typical_sigmas(one.calibration.covariance_names), 24);
+        PointingOptions options;
+        options.reported_directions = reported;
+        try {
+          pointing_model(one.calibration, one.belief, options);
+          ADD_FAILURE() << "points without it";
+        } catch (const InvalidArgument& error) {
+          EXPECT_THAT(error.what(), ::testing::HasSubstr(name));
+        }
+      }
+    }
+  }
+}
+
+// As many quantities as a calibration of the largest sensor finds.
+TEST(PointingModel, HasRoomForAllThatWallsTellOfAnAvia) {
+  sensors::Sensor avia = sensors::load_sensor("avia");
+  SensorBelief belief;
+  belief.sensor = avia;
+  const auto names = estimation::default_free_names(avia.shape());
+  belief.free = estimation::free_parameters(names, avia.shape());
+  belief.covariance = correlated(typical_sigmas(names), 25);
+  belief.angle_sensitivity.resize(avia.prisms(), static_cast<Index>(belief.free.size()));
+  Dice dice(27);
+  for (double& entry : belief.angle_sensitivity.reshaped()) entry = dice.normal();
+  belief.angle_noise = 6e-5;
+  avia.reference = CalibrationReference::planes;
+  for (const ParameterInfo& parameter : parameter_list(avia.shape())) {
+    if (parameter.kind == ParameterKind::train) avia.covariance_names.push_back(parameter.name);
+  }
+  for (const PrismSize& size : own_prism_sizes(avia.prisms())) {
+    avia.covariance_names.push_back(size.name);
+  }
+  for (const sensors::RangeValue& value : sensors::range_values(avia.train.emitters())) {
+    avia.covariance_names.push_back(value.name);
+  }
+  avia.covariance = correlated(typical_sigmas(avia.covariance_names), 26);
+  const PointingModel model = pointing_model(avia, belief, {});
+  EXPECT_EQ(model.factors.size(), avia.covariance_names.size() + 2);
+}
+
 TEST(PointingModel, ASizeThatIsStatedCountsWhereTheCovarianceHasNone) {
   Case one(CalibrationReference::planes);
   one.calibration.set_knowledge({"prism_thickness_m", 0.001, "measured", 0.004});
@@ -1035,7 +1274,7 @@ TEST(PointingModel, TakesACovarianceThatHasNoInverse) {
 
 TEST(PointingModel, RefusesMoreFactorsThanItCanHold) {
   Case one(CalibrationReference::planes);
-  const std::size_t many = 70;
+  const std::size_t many = 100;
   one.calibration.covariance_names.assign(many, "wedge_angle_a_deg");
   one.calibration.covariance =
       1e-8 * MatrixXd::Identity(static_cast<Index>(many), static_cast<Index>(many));
@@ -1150,11 +1389,13 @@ struct Draws {
       const VectorXd b = belief_root * normals(belief_root.cols());
       const VectorXd shift = one.belief.angle_sensitivity * b;
       PrismTrain train = model.train;
-      double offset = model.range_offset;
+      sensors::Sensor ranges = model.sensor;
+      ranges.range_offset = model.range_offset;
+      ranges.range_errors = model.range_errors;
       for (Index j = 0; j < p.size(); ++j) {
         const std::string& name = one.calibration.covariance_names[static_cast<std::size_t>(j)];
-        if (name == "range_offset_m") {
-          offset += p[j];
+        if (sensors::is_range_value(name)) {
+          sensors::set_range_value(ranges, name, sensors::get_range_value(ranges, name) + p[j]);
           continue;
         }
         for (const int place : find_parameter(name, {2}).places) {
@@ -1175,7 +1416,9 @@ struct Draws {
             own,
             geometry,
             {shots.rotation_angle[0][i] + noise[0], shots.rotation_angle[1][i] + noise[1]}};
-        const double range = shots.range[i] + range_sigma[i] * dice.normal() - offset;
+        const double range = true_range(model.sensor, shots, i, beam.direction(),
+                                        ranges.range_offset, ranges.range_errors) +
+                             range_sigma[i] * dice.normal();
         row.push_back(beam.point(range) - point_of(points, i));
       }
       moved.push_back(std::move(row));
@@ -1289,10 +1532,12 @@ PointedShots shots_over_the_field(const PointingModel& model) {
   return shots;
 }
 
-class PointMonteCarlo : public ::testing::TestWithParam<bool> {
+enum class Leading { noise, common_errors, range_errors };
+
+class PointMonteCarlo : public ::testing::TestWithParam<Leading> {
  protected:
   Case one_{CalibrationReference::planes, 41};
-  bool common_errors_lead_ = GetParam();
+  bool common_errors_lead_ = GetParam() != Leading::noise;
 
   void SetUp() override {
     if (common_errors_lead_) {
@@ -1303,6 +1548,16 @@ class PointMonteCarlo : public ::testing::TestWithParam<bool> {
       one_.calibration.range_noise_incidence = 0.005;
       one_.calibration.range_noise_weak_return = 0.02;
     }
+    if (GetParam() != Leading::range_errors) return;
+    one_.calibration.beam_divergence_vertical = radians_from_degrees(0.28);
+    one_.calibration.range_errors = {0.015, 0.3, 0.01, {}};
+    auto& names = one_.calibration.covariance_names;
+    for (const char* name : {"range_near_m", "range_incidence", "range_per_decade_m"}) {
+      names.emplace_back(name);
+    }
+    VectorXd sigma = typical_sigmas(names);
+    sigma.tail(3) << 4e-3, 0.08, 6e-3;
+    one_.calibration.covariance = correlated(sigma, 42);
   }
 };
 
@@ -1342,13 +1597,24 @@ TEST_P(PointMonteCarlo, ScatterIsWhatTheCovarianceSays) {
   if_independent.record("differences_if_independent_");
   EXPECT_TRUE(pairs.within());
   EXPECT_FALSE(if_independent.within());
-  if (common_errors_lead_) {
+  if (GetParam() == Leading::common_errors) {
     EXPECT_LT(Scatter::mean(if_independent.trace_ratio), 0.5);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Errors, PointMonteCarlo, ::testing::Bool(), [](const auto& common) {
-  return common.param ? "CommonOnesLead" : "OfAMid40";
-});
+INSTANTIATE_TEST_SUITE_P(Errors, PointMonteCarlo,
+                         ::testing::Values(Leading::noise, Leading::common_errors,
+                                           Leading::range_errors),
+                         [](const auto& leading) {
+                           switch (leading.param) {
+                             case Leading::noise:
+                               return "OfAMid40";
+                             case Leading::common_errors:
+                               return "CommonOnesLead";
+                             case Leading::range_errors:
+                               break;
+                           }
+                           return "OfRangesCount";
+                         });
 
 }  // namespace risley::cloud::pointing_test

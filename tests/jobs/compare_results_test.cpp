@@ -128,6 +128,8 @@ TEST_F(CompareResults, TellsSizesOfPrismsApart) {
   EXPECT_EQ(c.change.chi2, 0);
   EXPECT_EQ(c.beams.errors.total, 0);
   EXPECT_EQ(file_unit_of("prism_thickness_b_m", {2}).unit, "m");
+  EXPECT_EQ(file_unit_of("range_emitter_1_m", {2}).unit, "m");
+  EXPECT_EQ(file_unit_of("range_incidence", {2}).unit, "1");
 }
 
 // Of one parameter that is not held alike: a squared normal value, which is beyond 1.96 sigmas with

@@ -3,6 +3,7 @@
 // From a calibration in a hall to points of another recording: are their covariances true?
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <utility>
@@ -95,9 +96,22 @@ Ratios ratios_of(const cloud::Points& points, const std::vector<Plane>& walls) {
   return {sum.points / static_cast<double>(count), sum.patches / n, sum.differences / n};
 }
 
-/// Points of a recording of the same unit, as make_cloud() makes them.
+/// The wall that a beam from the origin meets first.
+const Plane& wall_at(const std::vector<Plane>& walls, double azimuth, double zenith) {
+  const auto direction = direction_from_angles(SphericalAngles<double>{azimuth, zenith});
+  const auto distance = [&](const Plane& wall) {
+    const double along = wall.distance / dot(wall.normal, direction);
+    return along > 0 ? along : std::numeric_limits<double>::infinity();
+  };
+  return *std::min_element(walls.begin(), walls.end(), [&](const Plane& a, const Plane& b) {
+    return distance(a) < distance(b);
+  });
+}
+
+/// Points of a recording of the same unit, as make_cloud() makes them, but for surfaces, which are
+/// the walls.
 cloud::Points points_of(const simulation::SimulationSettings& settings,
-                        const sensors::Sensor& calibration) {
+                        const sensors::Sensor& calibration, const std::vector<Plane>& walls) {
   const Simulated data = simulate(settings);
   estimation::ShotSelector selector({});
   selector.add(data.observations);
@@ -118,10 +132,14 @@ cloud::Points points_of(const simulation::SimulationSettings& settings,
   shots.azimuth = data.observations.azimuth;
   shots.zenith = data.observations.zenith;
   shots.range = data.observations.range;
+  shots.intensity.assign(data.observations.intensity.begin(), data.observations.intensity.end());
   cloud::Points points;
   header.resize(points, rows.size());
-  for (auto& column : shots.surface_normal) {
-    std::fill(column.begin(), column.end(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Vector3<double> normal = wall_at(walls, shots.azimuth[i], shots.zenith[i]).normal;
+    shots.surface_normal[0][i] = normal.x;
+    shots.surface_normal[1][i] = normal.y;
+    shots.surface_normal[2][i] = normal.z;
   }
   cloud::compute_points(model, header, shots, points);
   return points;
@@ -145,7 +163,7 @@ TEST(CloudStatistics, CovariancesOfPointsAndOfTheirDifferencesAreTrue) {
     sensor.range_noise = 0.02;
     sensor.serial.clear();
     const Ratios one =
-        ratios_of(points_of(wall_settings(hall, 1000 + number, 5000.0, 4.0), sensor), walls);
+        ratios_of(points_of(wall_settings(hall, 1000 + number, 5000.0, 4.0), sensor, walls), walls);
     mean.points += one.points / seeds;
     mean.patches += one.patches / seeds;
     mean.differences += one.differences / seeds;

@@ -22,7 +22,7 @@ struct PointedShots {
   /// Variance of the rounding, rad^2, rad^2 and m^2.
   std::vector<double> azimuth_rounding, zenith_rounding, range_rounding;
   std::vector<double> range;                          ///< as reported, m
-  std::vector<double> intensity;                      ///< as reported
+  std::vector<double> intensity;                      ///< as reported; negative: not known
   std::vector<std::uint8_t> beam;                     ///< emitter that fired, from 0
   std::array<std::vector<double>, 3> surface_normal;  ///< NaN where not known
 
@@ -39,7 +39,8 @@ struct PointedShots {
 /// factor name per factor of the model or none
 /// @param poses  of the shots of a model with a mount, whose errors then count
 /// @throws InvalidArgument for columns, factors or prisms that are not as model and header announce
-///         them, emitters that the model does not have, and as check_available()
+///         them, emitters that the model does not have, range errors that are not finite or of
+///         another number of emitters, and as check_available()
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points, const SensorPoses& poses = {},
                     InstructionSet set = best_instruction_set());

@@ -11,6 +11,7 @@
 
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/optics/beam_origin.hpp"
+#include "risley/sensors/range_errors.hpp"
 #include "risley/sensors/sensor.hpp"
 #include "risley/trajectories/mount.hpp"
 
@@ -32,6 +33,7 @@ struct CommonFactor {
   Eigen::VectorXd
       weights;  ///< [places + prisms + sizes]: flat vector, rotation angles, sizes of prisms
   double range_offset = 0;  ///< m
+  sensors::RangeErrors range_errors = {};
   /// Of the mount, in the order of trajectories::mount_names() but all of it along the axes of the
   /// sensor, rad, m and s.
   std::array<double, trajectories::kMountQuantities> mount{};
@@ -47,8 +49,10 @@ struct PointingModel {
   /// Sizes of the prisms that factors have a weight for.
   std::vector<PrismSize> sizes = shared_prism_sizes();
   double range_offset = 0;  ///< m
-  double angle_noise = 0;   ///< of reported directions, rad
-  sensors::Sensor sensor;   ///< range noise and rounding are taken from here
+  /// Taken off ranges too; that of the incidence only where the surface is known.
+  sensors::RangeErrors range_errors = {};
+  double angle_noise = 0;  ///< of reported directions, rad
+  sensors::Sensor sensor;  ///< range noise and rounding are taken from here
   PointingOptions options;
   std::vector<int> places;  ///< of the flat vector that have a common factor
   std::vector<CommonFactor> factors;
@@ -73,8 +77,9 @@ inline constexpr double kDivergenceSigma = 0.25;
 ///   with the parameters within their sigmas, otherwise as planes with these sigmas.
 /// @param mount  of a moving sensor; what its errors have in common with those of the calibration
 ///               counts where one adjustment found both, see trajectories::found_together
-/// @throws InvalidArgument for a calibration of another sensor (face order, emitters), matrices
-///         that do not belong to the free parameters, angle noise below 0, and as require_mount
+/// @throws InvalidArgument for a calibration of another sensor (face order, emitters), names in its
+///         covariance that mean nothing to a point, matrices that do not belong to the free
+///         parameters, angle noise below 0, and as require_mount
 PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBelief& belief,
                              const PointingOptions& options,
                              const std::optional<trajectories::Mount>& mount = {});
