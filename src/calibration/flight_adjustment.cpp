@@ -322,7 +322,7 @@ void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPrior
   hessian.bottomRightCorner(globals, globals) += prior;
   right.segment(g0, globals) += rates.transpose() * (priors.information * off);
   for (int c = 0; c < kCorrections; ++c) {
-    chain.push_back(knot_information(model.knots, priors.process, c));
+    chain.push_back(knot_information(model.knots, priors.process, c, priors.breaks));
     const KnotInformation& own = chain.back();
     for (Index k = 0; k < knots; ++k) {
       const Index at = kCorrections * k + c;
@@ -443,24 +443,31 @@ FlightSystem::Step FlightSystem::step() const {
   return step;
 }
 
-VectorXd FlightSystem::inverse_diagonal() const {
+FlightSystem::Band FlightSystem::inverse_band() const {
   const Parts& p = *parts_;
   const Index n = size(), blocks = (n + kInverseColumns - 1) / kInverseColumns;
-  VectorXd diagonal = VectorXd::Zero(n);
-  // Column j of L^-1 begins in row j; the diagonal sums up the squares of its columns.
+  const Index steps = kCorrections * std::max<Index>(p.knots - 1, 0);
+  Band band{VectorXd::Zero(n), VectorXd::Zero(steps)};
+  // Column j of L^-1 begins in row j; the inverse holds the products of its columns.
   parallel::for_each(static_cast<std::size_t>(blocks), [&](Index block) {
     const Index at = block * kInverseColumns, columns = std::min(kInverseColumns, n - at);
-    MatrixXd part = MatrixXd::Zero(n - at, columns);
-    part.topRows(columns).setIdentity();
+    const Index all = std::min(columns + kCorrections, n - at);
+    MatrixXd part = MatrixXd::Zero(n - at, all);
+    part.topRows(all).setIdentity();
     p.root.factor()
         .bottomRightCorner(n - at, n - at)
         .triangularView<Eigen::Lower>()
         .solveInPlace(part);
-    diagonal.segment(at, columns) = part.colwise().squaredNorm().transpose();
+    band.diagonal.segment(at, columns) = part.leftCols(columns).colwise().squaredNorm().transpose();
+    for (Index j = at; j < std::min(at + columns, steps); ++j) {
+      band.next[j] = part.col(j - at).dot(part.col(j - at + kCorrections));
+    }
   });
-  diagonal = diagonal.cwiseProduct(p.scale.cwiseAbs2());
-  for (const Index g : p.held) diagonal[p.first_global() + g] = 0;
-  return diagonal;
+  band.diagonal = band.diagonal.cwiseProduct(p.scale.cwiseAbs2());
+  band.next = band.next.cwiseProduct(
+      p.scale.head(steps).cwiseProduct(p.scale.segment(kCorrections, steps)).eval());
+  for (const Index g : p.held) band.diagonal[p.first_global() + g] = 0;
+  return band;
 }
 
 MatrixXd FlightSystem::inverse() const { return solve(MatrixXd::Identity(size(), size())); }

@@ -165,7 +165,8 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
   result.datum = datum_of(e, movement);
   const MatrixXd rates = value_rates(e.model);
   result.covariance = rates * movement * movement.transpose() * rates.transpose();
-  const VectorXd diagonal = e.system.inverse_diagonal();
+  const VectorXd diagonal =
+      e.inverse_diagonal != nullptr ? *e.inverse_diagonal : e.system.inverse_diagonal();
   result.correction_sigma = Eigen::Map<const MatrixXd>(diagonal.data(), kCorrections, knots);
   result.correction_sigma = result.correction_sigma.cwiseSqrt().eval();
 

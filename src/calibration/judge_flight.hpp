@@ -22,6 +22,7 @@ struct FlightEvidence {
   const Eigen::VectorXd& prior_sigma;  ///< [globals]
   std::size_t considered = 0;          ///< last so many free parameters: held, and may be off
   const FlightSystem& system;
+  const Eigen::VectorXd* inverse_diagonal = nullptr;  ///< of the system, where it is known already
 };
 
 /// What the evidence tells: of a calibration that was made, or of one that is planned.

@@ -31,6 +31,7 @@ struct FlightPriors {
   Eigen::MatrixXd information;       ///< [globals, globals], inverse of its covariance; 0: nothing
   std::vector<bool> held{};          ///< [globals]: not to be adjusted; empty: none
   std::vector<PlanePrior> planes{};  ///< of those that are known, at most one for each
+  std::vector<ProcessBreak> breaks{};  ///< of the process, at knots of the model
 };
 
 /// Values of the unknowns [globals], the boresight as a rotation vector of up to half a turn.
@@ -73,8 +74,15 @@ class FlightSystem {
   Eigen::MatrixXd planes_of(const Eigen::MatrixXd& solution) const;
   /// The inverse of the equations [size, size].
   Eigen::MatrixXd inverse() const;
+  /// The part of inverse() that neighbouring knots share, in less memory than the whole.
+  struct Band {
+    Eigen::VectorXd diagonal;  ///< [size]
+    /// [6 (knots - 1)]: between a correction at a knot and the same one at the next.
+    Eigen::VectorXd next;
+  };
+  Band inverse_band() const;
   /// Diagonal of inverse() [size], in less memory than the whole.
-  Eigen::VectorXd inverse_diagonal() const;
+  Eigen::VectorXd inverse_diagonal() const { return inverse_band().diagonal; }
   /// By how much the unknowns move where a held global is off by one unit [size, held].
   Eigen::MatrixXd held_changes() const;
   /// The priors' part of the equations times columns [size, columns].

@@ -1,0 +1,95 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "calibration/process_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+
+/// A jump counts from so many sigmas on: there are thousands of steps.
+constexpr double kJumpSigmas = 5;
+/// One jump also shows in the steps beside it, up to here.
+constexpr double kJumpsApart = 4;  // s
+/// Of a step's variance, the flight has to tell so much.
+constexpr double kLeastTold = 1e-3;
+/// The process counts as larger than stated from so many sigmas of chi2 on, if it is so many times
+/// as large.
+constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
+
+double largest_score(const ProcessCheck& check, Index step) {
+  return check.score.col(step).cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& corrections,
+                           const FlightPriors& priors, const FlightSystem::Band& band) {
+  const auto count = static_cast<Index>(knots.size());
+  ProcessCheck check;
+  check.score = Eigen::MatrixXd::Zero(kCorrections, std::max<Index>(count - 1, 0));
+  check.jump = check.score;
+  check.chi2 = check.expected = Eigen::VectorXd::Zero(kCorrections);
+  for (int c = 0; c < kCorrections; ++c) {
+    const KnotSteps steps = knot_steps(knots, priors.process, c, priors.breaks);
+    for (Index k = 0; k < count; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const Index at = kCorrections * k + c;
+      double off = corrections(c, k), variance = band.diagonal[at];
+      if (k > 0) {
+        const double decay = steps.decay[i];
+        off -= decay * corrections(c, k - 1);
+        variance += decay * (decay * band.diagonal[at - kCorrections] -
+                             2 * band.next[at - kCorrections]);
+      }
+      const double before = steps.sigma[i] * steps.sigma[i];
+      const double told = std::clamp(1 - variance / before, 0.0, 1.0);
+      check.chi2[c] += off * off / before;
+      check.expected[c] += told;
+      if (k == 0 || told < kLeastTold) continue;
+      check.score(c, k - 1) = off / std::sqrt(before * told);
+      check.jump(c, k - 1) = off / told;
+    }
+  }
+  return check;
+}
+
+std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessCheck& check) {
+  std::vector<Index> steps;
+  for (Index k = 0; k < check.score.cols(); ++k) {
+    if (largest_score(check, k) > kJumpSigmas) steps.push_back(k);
+  }
+  std::sort(steps.begin(), steps.end(), [&](Index a, Index b) {
+    return largest_score(check, a) > largest_score(check, b);
+  });
+  std::vector<std::size_t> jumps;
+  for (const Index k : steps) {
+    const auto knot = static_cast<std::size_t>(k);
+    const auto apart = [&](std::size_t from, std::size_t to) {
+      return 1e-9 * static_cast<double>(knots.time_ns[to] - knots.time_ns[from]);
+    };
+    const bool far = std::all_of(jumps.begin(), jumps.end(), [&](std::size_t other) {
+      return apart(std::min(other, knot) + 1, std::max(other, knot)) > kJumpsApart;
+    });
+    if (far) jumps.push_back(knot);
+  }
+  std::sort(jumps.begin(), jumps.end());
+  return jumps;
+}
+
+Eigen::VectorXd process_factors(const ProcessCheck& check) {
+  Eigen::VectorXd factors = Eigen::VectorXd::Ones(kCorrections);
+  for (Index c = 0; c < kCorrections; ++c) {
+    const double expected = check.expected[c], excess = check.chi2[c] - expected;
+    if (excess <= kProcessSigmas * std::sqrt(2 * expected)) continue;
+    const double ratio = check.chi2[c] / std::max(expected, 1e-6);
+    if (ratio > kLeastRatio) factors[c] = std::sqrt(ratio);
+  }
+  return factors;
+}
+
+}  // namespace risley::calibration
