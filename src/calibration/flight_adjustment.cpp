@@ -37,6 +37,8 @@ constexpr double kPlaneTiltSigma = 10, kPlaneOffsetSigma = 1000;  // rad, m
 constexpr int kIntervalParts = 8;
 /// A long flight has settled when its corrections move by no more than this, RMS, in their sigmas.
 constexpr double kSettledCorrection = 0.02;
+/// Of a shot's variance, so much stays its own, however rough the ground is.
+constexpr double kLeastOwnShare = 0.25;
 /// Columns of an inverse that are computed together.
 constexpr Index kInverseColumns = 96;
 
@@ -168,6 +170,22 @@ double promised_to_globals(const FlightSystem& system, const FlightSystem::Step&
   const MatrixXd covariance = system.solve(units).bottomRows(globals)(free, free);
   const VectorXd moved = step.unknowns.tail(globals)(free);
   return moved.dot(algebra::SymmetricSolver(covariance).inverse() * moved);
+}
+
+/// Adds what the shots of each plane in a piece have in common. Rows come plane by plane.
+void add_shared_ground(const FlightRows& rows, const PlaneOfShot& plane, const VectorXd& weight,
+                       const MatrixXd& moved, double variance, MatrixXd& noise) {
+  const auto plane_at = [&](Index i) { return plane[rows.shots[static_cast<std::size_t>(i)]]; };
+  const Index n = moved.rows();
+  for (Index first = 0; first < n;) {
+    VectorXd sum = VectorXd::Zero(moved.cols());
+    Index i = first;
+    for (; i < n && plane_at(i) == plane_at(first); ++i) {
+      if (weight[i] > 0) sum += weight[i] * moved.row(i).transpose();
+    }
+    noise += variance * sum * sum.transpose();
+    first = i;
+  }
 }
 
 }  // namespace
@@ -621,7 +639,14 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
         const VectorXd variance =
             (weight.array() > 0)
                 .select(weight.array().square() * values.col(globals + 10).array(), 0.0);
-        own.noise = moved.transpose() * variance.asDiagonal() * moved;
+        const double shared_ground = weights.roughness * weights.roughness;
+        own.noise = moved.transpose() *
+                    (variance.array() - shared_ground * weight.array().square())
+                        .max(kLeastOwnShare * variance.array())
+                        .matrix()
+                        .asDiagonal() *
+                    moved;
+        if (shared_ground > 0) add_shared_ground(rows, plane, weight, moved, shared_ground, own.noise);
         const std::int64_t first_ns = shots.time_ns[rows.begin];
         const auto samples =
             static_cast<Index>(static_cast<double>(shots.time_ns[rows.end - 1] - first_ns) /

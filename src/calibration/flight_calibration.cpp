@@ -49,6 +49,10 @@ constexpr double kSettled = 0.1;
 /// before to no better than these, s/s and SI.
 constexpr double kTestedSigmas = 5, kDriftPrior = 1e-3, kHeldPrior = 1e-2;
 constexpr double kDelayPrior = 1;  // s
+/// Attitudes count as late from so many sigmas on, since few flights tell a delay well; from the
+/// first number on, and where the clock offset is so far from what is stated, what a delay would do
+/// counts as an error of everything else.
+constexpr double kDelayConsidered = 2, kDelaySigmas = 3;
 /// The clock offset contradicts what is stated of it from so many sigmas on.
 constexpr double kClockSigmas = 4;
 /// More jumps than these are no jumps: the process is larger than stated. And so often the
@@ -57,6 +61,8 @@ constexpr std::size_t kMostJumps = 8;
 constexpr int kMendings = 8;
 /// A jump may be as large as this many sigmas of the process, and as many times what is seen of it.
 constexpr double kBreakSigmas = 3;
+/// Cells count as rough from so many sigmas of what their shots have in common on.
+constexpr double kRoughnessSigmas = 5;
 
 /// What of the globals a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
@@ -314,10 +320,25 @@ class FlightWork {
     return cells > 0 ? std::sqrt(squares / cells) : 0;
   }
 
+  /// Residuals of which any two are multiplied.
+  struct PairSums {
+    double sum = 0, squares = 0, count = 0;
+    void add(double residual) {
+      sum += residual;
+      squares += residual * residual;
+      ++count;
+    }
+    double products() const { return sum * sum - squares; }
+    double pairs() const { return count * count - count; }
+  };
+
   /// What a piece of the flight adds to what the residuals say of the ranges' noise.
   struct PieceScatter {
     double squares = 0;  ///< over the shots' own variance
     double metres2 = 0;  ///< of the residuals
+    /// Sums of products of two residuals of one plane, of different samples of the trajectory, and
+    /// how many these are.
+    double products = 0, pairs = 0;
     std::size_t count = 0;
     double time = 0;
   };
@@ -325,6 +346,7 @@ class FlightWork {
   std::vector<PieceScatter> scatter_of(const LabelledFlight& flight, const FlightWeights& weights) {
     std::vector<PieceScatter> pieces(flight_pieces(model_));
     const std::int64_t begin_ns = flight.shots.time_ns.front();
+    const std::int64_t sample_ns = std::max<std::int64_t>(1, std::llround(1e9 * weights.sample_interval));
     for_each_flight_piece(
         flight.shots, flight.poses, flight.cells.plane, model_, weights,
         [&](std::size_t piece, const FlightRows& rows) {
@@ -333,13 +355,40 @@ class FlightWork {
           own.time = 0.5 * (flight_seconds(flight.shots.time_ns[rows.begin] - begin_ns) +
                             flight_seconds(flight.shots.time_ns[rows.end - 1] - begin_ns));
           const auto columns = static_cast<std::size_t>(rows.columns);
+          // Rows come plane by plane, and in the order of time within each.
+          PairSums of_plane, of_sample;
+          std::int32_t plane = kNoPlane;
+          std::int64_t sample = 0;
+          const auto end_sample = [&] {
+            own.products -= of_sample.products();
+            own.pairs -= of_sample.pairs();
+            of_sample = {};
+          };
+          const auto end_plane = [&] {
+            end_sample();
+            own.products += of_plane.products();
+            own.pairs += of_plane.pairs();
+            of_plane = {};
+          };
           for (std::size_t i = 0; i < rows.shots.size(); ++i) {
             const double* row = rows.values.data() + (i + 1) * columns - 3;
             if (row[2] == 0) continue;
             own.squares += row[0] * row[0] / row[1];
             own.metres2 += row[0] * row[0];
             ++own.count;
+            const std::size_t shot = rows.shots[i];
+            const std::int64_t at = flight.shots.time_ns[shot] / sample_ns;
+            if (flight.cells.plane[shot] != plane) {
+              end_plane();
+            } else if (at != sample) {
+              end_sample();
+            }
+            plane = flight.cells.plane[shot];
+            sample = at;
+            of_plane.add(row[0]);
+            of_sample.add(row[0]);
           }
+          end_plane();
         });
     return pieces;
   }
@@ -387,19 +436,29 @@ class FlightWork {
     cell_noise_ = flight.cells.scatter;
     final_weights_ = weights();
     final_weights_.gate = kGateSigmas;
+    final_weights_.roughness = roughness_;
     last_ = adjust(flight, final_weights_, steps);
   }
 
   void update_range_variance(const LabelledFlight& flight) {
-    double squares = 0, count = 0;
+    double squares = 0, count = 0, products = 0, pairs = 0;
     for (const PieceScatter& piece : scatter_of(flight, final_weights_)) {
       squares += piece.squares;
       count += static_cast<double>(piece.count);
+      products += piece.products;
+      pairs += piece.pairs;
     }
     const double unknowns = 3 * static_cast<double>(model_.planes.size());
     if (count <= unknowns) return;
     range_variance_ = std::max(range_variance_ * squares / (count - unknowns) / kGatedVariance,
                                kLeastRange * kLeastRange);
+    // What shots of a cell have in common within an interval, where chance does not explain it.
+    const double shared = pairs > 0 ? products / pairs : 0;
+    const double chance = range_variance_ * std::sqrt(2 / std::max(pairs, 1.0));
+    roughness_ = shared > kRoughnessSigmas * chance
+                     ? std::sqrt(std::min(shared, range_variance_))
+                     : 0;
+    result_.roughness = roughness_;
   }
 
   void mend_trajectory();
@@ -432,8 +491,10 @@ class FlightWork {
   FlightPriors priors_;
   double range_variance_ = 0;  // m^2
   double cell_noise_ = 0;      // m
+  double roughness_ = 0;       // m, see FlightWeights
   trajectories::PoseErrorVector process_factor_ = trajectories::PoseErrorVector::Ones();
-  std::vector<double> break_score_;  ///< [breaks of priors_]
+  MatrixXd may_be_off_;                 ///< see FlightEvidence
+  std::vector<double> break_score_;     ///< [breaks of priors_]
   std::optional<FlightSystem> system_;  ///< of the last equations, over smooth ground
   FlightSystem::Band band_;             ///< of its inverse
   int grids_ = 0;
@@ -474,13 +535,15 @@ void FlightWork::fill_result() {
     result_.piece_time.push_back(piece.time);
     result_.piece_rms.push_back(std::sqrt(piece.metres2 / static_cast<double>(piece.count)));
   }
+  test_assumptions();
   static_cast<FlightJudgement&>(result_) =
       judge_flight({full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_, priors_,
-                    start_.prior_sigma, start_.considered, *system_, &band_.diagonal});
+                    start_.prior_sigma, start_.considered, *system_, &band_.diagonal,
+                    may_be_off_});
   fill_mount_and_sensor();
+  judge_clock_offset();
   fill_trajectory_fit();
   fill_control();
-  test_assumptions();
   fill_trajectory();
   result_.tangent = tangent_;
   result_.converged = last_.converged && result_.reason.empty();
@@ -647,7 +710,17 @@ void FlightWork::test_assumptions() {
   judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)));
   judge_attitude_delay(steps[considered + 1],
                        std::sqrt(covariance(considered + 1, considered + 1)));
-  judge_clock_offset();
+  const AttitudeDelay& late = result_.attitude_delay;
+  const auto clock = static_cast<Index>(FlightUnknowns::clock_offset());
+  const double clock_off = std::abs(model_.clock_offset - options_.mount.clock_offset.value);
+  if (std::abs(late.value) > kDelayConsidered * late.sigma ||
+      (!priors_.held[static_cast<std::size_t>(clock)] &&
+       clock_off > kDelayConsidered * start_.prior_sigma[clock])) {
+    // By how much everything else moves where the delay is free.
+    const VectorXd moves = system.solve(VectorXd::Unit(system.size(), system.size() - 1));
+    may_be_off_ = std::hypot(late.value, late.sigma) / moves[moves.size() - 1] *
+                  moves.segment(system.size() - size, model_.unknowns().size());
+  }
   const std::vector<std::string> names = unknown_names(model_);
   const VectorXd values = unknown_values(model_);
   for (Index i = 0; i < considered; ++i) {
@@ -680,7 +753,7 @@ void FlightWork::judge_attitude_delay(double value, double sigma) {
   AttitudeDelay& found = result_.attitude_delay;
   found.value = value;
   found.sigma = sigma;
-  found.significant = std::abs(found.value) > kTestedSigmas * found.sigma;
+  found.significant = std::abs(found.value) > kDelaySigmas * found.sigma;
   if (!found.significant) return;
   result_.warnings.push_back(
       in_words(found) +

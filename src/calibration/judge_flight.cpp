@@ -151,12 +151,14 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
   result.not_told = not_told_of(e, all);
   // What was held and may be off, one sigma each, moves everything else along.
   const MatrixXd changes = e.system.held_changes();
-  MatrixXd movement = MatrixXd::Zero(globals, globals + static_cast<Index>(e.considered));
+  const auto considered = static_cast<Index>(e.considered);
+  MatrixXd movement = MatrixXd::Zero(globals, globals + considered + e.further.cols());
+  if (e.further.cols() > 0) movement.rightCols(e.further.cols()) = e.further;
   movement.leftCols(globals) = root_of(all.topLeftCorner(globals, globals));
   Index column = 0, of_considered = globals;
   for (Index i = 0; i < globals; ++i) {
     if (!e.priors.held[static_cast<std::size_t>(i)]) continue;
-    if (i >= globals - static_cast<Index>(e.considered)) {
+    if (i >= globals - considered) {
       movement.col(of_considered) = e.prior_sigma[i] * changes.col(column).tail(globals);
       movement(i, of_considered++) = e.prior_sigma[i];
     }

@@ -23,6 +23,8 @@ struct FlightEvidence {
   std::size_t considered = 0;          ///< last so many free parameters: held, and may be off
   const FlightSystem& system;
   const Eigen::VectorXd* inverse_diagonal = nullptr;  ///< of the system, where it is known already
+  /// [globals, errors]: what errors that nobody stated, one sigma each, do to the globals; or none.
+  Eigen::MatrixXd further{};
 };
 
 /// What the evidence tells: of a calibration that was made, or of one that is planned.
