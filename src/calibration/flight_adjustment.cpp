@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -172,20 +173,27 @@ double promised_to_globals(const FlightSystem& system, const FlightSystem::Step&
   return moved.dot(algebra::SymmetricSolver(covariance).inverse() * moved);
 }
 
-/// Adds what the shots of each plane in a piece have in common. Rows come plane by plane.
-void add_shared_ground(const FlightRows& rows, const PlaneOfShot& plane, const VectorXd& weight,
-                       const MatrixXd& moved, double variance, MatrixXd& noise) {
-  const auto plane_at = [&](Index i) { return plane[rows.shots[static_cast<std::size_t>(i)]]; };
-  const Index n = moved.rows();
-  for (Index first = 0; first < n;) {
-    VectorXd sum = VectorXd::Zero(moved.cols());
-    Index i = first;
-    for (; i < n && plane_at(i) == plane_at(first); ++i) {
-      if (weight[i] > 0) sum += weight[i] * moved.row(i).transpose();
+/// What the shots of a cell that counts do to the functions, patch by patch, weighted.
+struct PatchSums {
+  std::int32_t plane = 0;
+  Eigen::Matrix<float, Eigen::Dynamic, RoughGround::kPatches> sums;  // [functions, patches]
+};
+
+/// Those of a piece. Its rows come plane by plane.
+std::vector<PatchSums> patch_sums(const FlightRows& rows, const PlaneOfShot& plane,
+                                  const RoughGround& ground, const VectorXd& weight,
+                                  const MatrixXd& moved) {
+  std::vector<PatchSums> all;
+  for (Index i = 0; i < moved.rows(); ++i) {
+    const std::size_t shot = rows.shots[static_cast<std::size_t>(i)];
+    if (ground.patch[shot] < 0 || !(weight[i] > 0)) continue;
+    if (all.empty() || all.back().plane != plane[shot]) {
+      all.push_back({plane[shot], {}});
+      all.back().sums.setZero(moved.cols(), RoughGround::kPatches);
     }
-    noise += variance * sum * sum.transpose();
-    first = i;
+    all.back().sums.col(ground.patch[shot]) += (weight[i] * moved.row(i)).cast<float>().transpose();
   }
+  return all;
 }
 
 }  // namespace
@@ -587,7 +595,9 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
                            const PlaneOfShot& plane, const FlightModel& model,
                            const FlightWeights& weights, const FlightPriors& priors,
                            const FlightSystem& system, const MatrixXd& functionals,
-                           InstructionSet set) {
+                           const RoughGround* ground, InstructionSet set) {
+  if (ground != nullptr) require_length("patches", ground->patch.size(), shots.size());
+  const double of_ground = ground == nullptr ? 0 : ground->covariance.diagonal().mean();
   const MatrixXd solved = system.solve(functionals);
   const MatrixXd planes = system.planes_of(solved);
   const Index count = solved.cols(), globals = system.globals();
@@ -595,6 +605,7 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
   const std::size_t pieces = flight_pieces(model);
   struct Sums {
     MatrixXd noise, parts;  // [count, count]; [count, 6 parts]
+    std::vector<PatchSums> patches;
     std::size_t interval = 0;
   };
   std::vector<Sums> sums(pieces);
@@ -639,14 +650,14 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
         const VectorXd variance =
             (weight.array() > 0)
                 .select(weight.array().square() * values.col(globals + 10).array(), 0.0);
-        const double shared_ground = weights.roughness * weights.roughness;
-        own.noise = moved.transpose() *
-                    (variance.array() - shared_ground * weight.array().square())
-                        .max(kLeastOwnShare * variance.array())
-                        .matrix()
-                        .asDiagonal() *
-                    moved;
-        if (shared_ground > 0) add_shared_ground(rows, plane, weight, moved, shared_ground, own.noise);
+        if (ground == nullptr) {
+          own.noise = moved.transpose() * variance.asDiagonal() * moved;
+        } else {
+          const VectorXd left = (variance.array() - of_ground * weight.array().square())
+                                    .max(kLeastOwnShare * variance.array());
+          own.noise = moved.transpose() * left.asDiagonal() * moved;
+          own.patches = patch_sums(rows, plane, *ground, weight, moved);
+        }
         const std::int64_t first_ns = shots.time_ns[rows.begin];
         const auto samples =
             static_cast<Index>(static_cast<double>(shots.time_ns[rows.end - 1] - first_ns) /
@@ -681,6 +692,19 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
     const auto own = planes.middleRows<3>(3 * static_cast<Index>(prior.plane));
     const PlaneKnowledge known = knowledge_of(prior, model.planes[prior.plane]);
     covariance += own.transpose() * known.information.asDiagonal() * own;
+  }
+  if (ground != nullptr) {
+    std::map<std::int32_t, MatrixXd> by_plane;
+    for (const Sums& own : sums) {
+      for (const PatchSums& one : own.patches) {
+        MatrixXd& all = by_plane[one.plane];
+        if (all.size() == 0) all = MatrixXd::Zero(count, RoughGround::kPatches);
+        all += one.sums.cast<double>();
+      }
+    }
+    for (const auto& [number, all] : by_plane) {
+      covariance += ground->cells_for_each * all * ground->covariance * all.transpose();
+    }
   }
   for (std::size_t first = 0; first < pieces;) {
     MatrixXd parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);

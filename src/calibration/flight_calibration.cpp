@@ -24,6 +24,7 @@
 #include "calibration/flight_words.hpp"
 #include "calibration/judge_flight.hpp"
 #include "calibration/process_check.hpp"
+#include "calibration/rough_ground.hpp"
 #include "calibration/smooth_ground.hpp"
 #include "calibration/verdict.hpp"
 
@@ -61,8 +62,6 @@ constexpr std::size_t kMostJumps = 8;
 constexpr int kMendings = 8;
 /// A jump may be as large as this many sigmas of the process, and as many times what is seen of it.
 constexpr double kBreakSigmas = 3;
-/// Cells count as rough from so many sigmas of what their shots have in common on.
-constexpr double kRoughnessSigmas = 5;
 
 /// What of the globals a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
@@ -218,6 +217,7 @@ class FlightWork {
     cells.noise = noise;
     flight.cells = ground_cells(flight.points, flight.shots.strip, cells);
     take_control(flight, cells);
+    grid_ = cells;
     leave_out_jumps(flight);
     if (flight.cells.planes.size() < kFewestCells) {
       throw EstimationError(fmt::format(
@@ -320,25 +320,10 @@ class FlightWork {
     return cells > 0 ? std::sqrt(squares / cells) : 0;
   }
 
-  /// Residuals of which any two are multiplied.
-  struct PairSums {
-    double sum = 0, squares = 0, count = 0;
-    void add(double residual) {
-      sum += residual;
-      squares += residual * residual;
-      ++count;
-    }
-    double products() const { return sum * sum - squares; }
-    double pairs() const { return count * count - count; }
-  };
-
   /// What a piece of the flight adds to what the residuals say of the ranges' noise.
   struct PieceScatter {
     double squares = 0;  ///< over the shots' own variance
     double metres2 = 0;  ///< of the residuals
-    /// Sums of products of two residuals of one plane, of different samples of the trajectory, and
-    /// how many these are.
-    double products = 0, pairs = 0;
     std::size_t count = 0;
     double time = 0;
   };
@@ -346,7 +331,6 @@ class FlightWork {
   std::vector<PieceScatter> scatter_of(const LabelledFlight& flight, const FlightWeights& weights) {
     std::vector<PieceScatter> pieces(flight_pieces(model_));
     const std::int64_t begin_ns = flight.shots.time_ns.front();
-    const std::int64_t sample_ns = std::max<std::int64_t>(1, std::llround(1e9 * weights.sample_interval));
     for_each_flight_piece(
         flight.shots, flight.poses, flight.cells.plane, model_, weights,
         [&](std::size_t piece, const FlightRows& rows) {
@@ -355,40 +339,13 @@ class FlightWork {
           own.time = 0.5 * (flight_seconds(flight.shots.time_ns[rows.begin] - begin_ns) +
                             flight_seconds(flight.shots.time_ns[rows.end - 1] - begin_ns));
           const auto columns = static_cast<std::size_t>(rows.columns);
-          // Rows come plane by plane, and in the order of time within each.
-          PairSums of_plane, of_sample;
-          std::int32_t plane = kNoPlane;
-          std::int64_t sample = 0;
-          const auto end_sample = [&] {
-            own.products -= of_sample.products();
-            own.pairs -= of_sample.pairs();
-            of_sample = {};
-          };
-          const auto end_plane = [&] {
-            end_sample();
-            own.products += of_plane.products();
-            own.pairs += of_plane.pairs();
-            of_plane = {};
-          };
           for (std::size_t i = 0; i < rows.shots.size(); ++i) {
             const double* row = rows.values.data() + (i + 1) * columns - 3;
             if (row[2] == 0) continue;
             own.squares += row[0] * row[0] / row[1];
             own.metres2 += row[0] * row[0];
             ++own.count;
-            const std::size_t shot = rows.shots[i];
-            const std::int64_t at = flight.shots.time_ns[shot] / sample_ns;
-            if (flight.cells.plane[shot] != plane) {
-              end_plane();
-            } else if (at != sample) {
-              end_sample();
-            }
-            plane = flight.cells.plane[shot];
-            sample = at;
-            of_plane.add(row[0]);
-            of_sample.add(row[0]);
           }
-          end_plane();
         });
     return pieces;
   }
@@ -436,29 +393,19 @@ class FlightWork {
     cell_noise_ = flight.cells.scatter;
     final_weights_ = weights();
     final_weights_.gate = kGateSigmas;
-    final_weights_.roughness = roughness_;
     last_ = adjust(flight, final_weights_, steps);
   }
 
   void update_range_variance(const LabelledFlight& flight) {
-    double squares = 0, count = 0, products = 0, pairs = 0;
+    double squares = 0, count = 0;
     for (const PieceScatter& piece : scatter_of(flight, final_weights_)) {
       squares += piece.squares;
       count += static_cast<double>(piece.count);
-      products += piece.products;
-      pairs += piece.pairs;
     }
     const double unknowns = 3 * static_cast<double>(model_.planes.size());
     if (count <= unknowns) return;
     range_variance_ = std::max(range_variance_ * squares / (count - unknowns) / kGatedVariance,
                                kLeastRange * kLeastRange);
-    // What shots of a cell have in common within an interval, where chance does not explain it.
-    const double shared = pairs > 0 ? products / pairs : 0;
-    const double chance = range_variance_ * std::sqrt(2 / std::max(pairs, 1.0));
-    roughness_ = shared > kRoughnessSigmas * chance
-                     ? std::sqrt(std::min(shared, range_variance_))
-                     : 0;
-    result_.roughness = roughness_;
   }
 
   void mend_trajectory();
@@ -491,7 +438,8 @@ class FlightWork {
   FlightPriors priors_;
   double range_variance_ = 0;  // m^2
   double cell_noise_ = 0;      // m
-  double roughness_ = 0;       // m, see FlightWeights
+  GroundCellOptions grid_;     ///< of the last labels
+  std::optional<RoughGround> rough_;
   trajectories::PoseErrorVector process_factor_ = trajectories::PoseErrorVector::Ones();
   MatrixXd may_be_off_;                 ///< see FlightEvidence
   std::vector<double> break_score_;     ///< [breaks of priors_]
@@ -535,11 +483,14 @@ void FlightWork::fill_result() {
     result_.piece_time.push_back(piece.time);
     result_.piece_rms.push_back(std::sqrt(piece.metres2 / static_cast<double>(piece.count)));
   }
+  rough_ = rough_ground(full_.shots, full_.poses, full_.cells.plane, full_.points, grid_, model_,
+                        final_weights_);
+  if (rough_) result_.roughness = std::sqrt(rough_->covariance.diagonal().mean());
   test_assumptions();
   static_cast<FlightJudgement&>(result_) =
       judge_flight({full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_, priors_,
                     start_.prior_sigma, start_.considered, *system_, &band_.diagonal,
-                    may_be_off_});
+                    may_be_off_, rough_ ? &*rough_ : nullptr});
   fill_mount_and_sensor();
   judge_clock_offset();
   fill_trajectory_fit();
@@ -706,7 +657,8 @@ void FlightWork::test_assumptions() {
   functionals.bottomRows(tested).setIdentity();
   const VectorXd steps = system.step().unknowns.segment(at, tested);
   const MatrixXd covariance = flight_covariance(full_.shots, full_.poses, full_.cells.plane, model,
-                                                final_weights_, priors, system, functionals);
+                                                final_weights_, priors, system, functionals,
+                                                rough_ ? &*rough_ : nullptr);
   judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)));
   judge_attitude_delay(steps[considered + 1],
                        std::sqrt(covariance(considered + 1, considered + 1)));

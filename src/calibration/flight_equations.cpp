@@ -120,7 +120,6 @@ void require_model(const FlightModel& model, const FlightWeights& weights, doubl
     require_not_below("white noise of the poses", weights.white[i], 0, i < 3 ? "m" : "rad");
   }
   require_above("sample interval", weights.sample_interval, 0, "s");
-  require_not_below("roughness of the ground", weights.roughness, 0, "m");
   require_not_below("scale of the weights", weights.cauchy_scale, 0, "m");
   require_not_below("gate", weights.gate, 0);
 }
@@ -254,10 +253,6 @@ class FlightCalls {
     for (std::size_t i = 0; i < weights_.white.size(); ++i) {
       a.white_variance[i] = together * weights_.white[i] * weights_.white[i];
     }
-    double squares = 0;
-    for (const FlightRun& run : runs) squares += std::pow(static_cast<double>(run.end - run.begin), 2);
-    const double in_cell = squares / std::max(1.0, static_cast<double>(sorter.order().size()));
-    a.ground_variance = std::max(0.0, in_cell - 1) * weights_.roughness * weights_.roughness;
     a.order = sorter.order().data();
     a.runs = runs.data();
     a.run_count = runs.size();

@@ -203,7 +203,7 @@ FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
   const Lanes met = (xsimd::abs(approach) > Batch(kLeastFlightApproach)) & (range > zero) &
                     (xsimd::abs(residual) <= Batch(kLargest)) & (variance > zero) &
                     (variance <= Batch(kLargest));
-  Batch weight = one / (variance + Batch(a.ground_variance));
+  Batch weight = one / variance;
   Lanes good = met;
   if (a.gate > 0) {
     good = good & (residual * residual <= Batch(a.gate * a.gate) * variance);

@@ -50,7 +50,6 @@ struct FlightArguments {
   double range_variance = 0;           ///< m^2
   double rotation_angle_variance = 0;  ///< of each, rad^2
   double white_variance[6] = {};  ///< of the pose, as if it were each shot's own, m^2 and rad^2
-  double ground_variance = 0;     ///< as if it were each shot's own, m^2; the gate knows it not
   double cauchy_scale = 0;        ///< m; 0: none
   double gate = 0;                ///< largest residual in its sigmas; 0: none
 

@@ -147,7 +147,7 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
         MatrixXd::Identity(kCorrections, kCorrections) / static_cast<double>(knots);
   }
   const MatrixXd all = flight_covariance(e.shots, e.poses, e.plane, e.model, e.weights, e.priors,
-                                         e.system, functionals);
+                                         e.system, functionals, e.ground);
   result.not_told = not_told_of(e, all);
   // What was held and may be off, one sigma each, moves everything else along.
   const MatrixXd changes = e.system.held_changes();

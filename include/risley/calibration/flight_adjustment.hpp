@@ -124,16 +124,29 @@ FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
                                const FlightAdjustmentOptions& options = {},
                                const Progress& progress = {});
 
+/// How ground departs from its planes, which all strips see alike: a covariance between the patches
+/// of a cell, of some cells that stand for all.
+struct RoughGround {
+  static constexpr int kSide = 3, kPatches = kSide * kSide;  ///< of a cell
+  /// Along the ranges, between the patches, m^2.
+  Eigen::Matrix<double, kPatches, kPatches> covariance =
+      Eigen::Matrix<double, kPatches, kPatches>::Zero();
+  std::vector<std::int8_t> patch;  ///< [shots]; -1: of a cell that does not count
+  double cells_for_each = 1;       ///< that counts
+};
+
 /// How far linear functions of the solution are off.
 /// @param functionals  [size, functions], of the unknowns of the system
 /// @return covariance of all [functions, functions]: of the ranges' own noise, of the white noise
 ///         of the attitude that the shots of a sample share, of what the trajectory's process does
 ///         between knots, and of the priors, whatever the weights were
+/// @param ground  rough ground, or nullptr: planes
 /// @throws as flight_equations
 Eigen::MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
                                   const PlaneOfShot& plane, const FlightModel& model,
                                   const FlightWeights& weights, const FlightPriors& priors,
                                   const FlightSystem& system, const Eigen::MatrixXd& functionals,
+                                  const RoughGround* ground = nullptr,
                                   InstructionSet set = best_instruction_set());
 
 }  // namespace risley::calibration

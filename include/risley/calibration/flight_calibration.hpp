@@ -133,8 +133,8 @@ struct FlightCalibration : FlightJudgement {
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m
   double sigma0 = 1;       ///< standard deviation of unit weight against the stated range noise
   double range_sigma = 0;  ///< of one range, as found, m
-  /// Of this, what shots of a cell share within an interval between knots, because the ground is
-  /// no plane, 1 sigma, m; 0 where chance explains it.
+  /// Of this, what shots close to each other share because the ground is no plane, 1 sigma, m; 0
+  /// where chance explains it.
   double roughness = 0;
   std::size_t shots = 0;   ///< given
   std::size_t without_pose = 0;  ///< of these: outside the trajectory or in a gap of it

@@ -93,9 +93,6 @@ struct FlightWeights {
   /// has shots, so that planes stay apart from each other.
   std::array<double, kCorrections> white{};
   double sample_interval = 0.005;  ///< s
-  /// Part of the ranges' noise that shots of one plane share within an interval between knots,
-  /// because the ground is no plane, 1 sigma, m. Weights treat it as the white noise above.
-  double roughness = 0;
   /// Residual at which a shot counts half, m; 0: all alike.
   double cauchy_scale = 0;
   double gate = 0;  ///< residual beyond which a shot does not count, in its sigmas; 0: none
