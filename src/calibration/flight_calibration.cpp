@@ -62,6 +62,8 @@ constexpr std::size_t kMostJumps = 8;
 constexpr int kMendings = 8;
 /// A jump may be as large as this many sigmas of the process, and as many times what is seen of it.
 constexpr double kBreakSigmas = 3;
+/// A process that grows counts as found when its corrections ask for no more than this.
+constexpr double kProcessRatio = 1.2;
 
 /// What of the globals a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
@@ -489,8 +491,8 @@ void FlightWork::fill_result() {
   test_assumptions();
   static_cast<FlightJudgement&>(result_) =
       judge_flight({full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_, priors_,
-                    start_.prior_sigma, start_.considered, *system_, &band_.diagonal,
-                    may_be_off_, rough_ ? &*rough_ : nullptr});
+                    start_.prior_sigma, start_.considered, *system_, &band_.diagonal, may_be_off_,
+                    rough_ ? &*rough_ : nullptr});
   fill_mount_and_sensor();
   judge_clock_offset();
   fill_trajectory_fit();
@@ -549,7 +551,14 @@ bool FlightWork::mend_as_needed(const ProcessCheck& check) {
     break_process(check, jumps);
     return true;
   }
-  const VectorXd factors = process_factors(check);
+  VectorXd factors = process_factors(check);
+  // A process that was larger than stated is followed to its size.
+  if (process_factor_ != trajectories::PoseErrorVector::Ones()) {
+    for (int c = 0; c < kCorrections; ++c) {
+      const double ratio = check.chi2[c] / check.expected[c];
+      if (ratio > kProcessRatio) factors[c] = std::sqrt(ratio);
+    }
+  }
   const bool fits = factors == VectorXd::Ones(kCorrections);
   const bool no_jumps = too_many && process_factor_ == trajectories::PoseErrorVector::Ones();
   if (no_jumps) {
@@ -569,8 +578,8 @@ void FlightWork::break_process(const ProcessCheck& check, const std::vector<std:
     const auto step = static_cast<Index>(knot);
     ProcessBreak one{.knot = knot};
     for (int c = 0; c < kCorrections; ++c) {
-      const double usual = priors_.process.sigmas(
-          model_.knots.time_ns[knot])[static_cast<Index>(error_of(c))];
+      const double usual =
+          priors_.process.sigmas(model_.knots.time_ns[knot])[static_cast<Index>(error_of(c))];
       one.sigma[static_cast<std::size_t>(c)] =
           kBreakSigmas * std::max(usual, std::abs(check.jump(c, step)));
     }
@@ -656,9 +665,9 @@ void FlightWork::test_assumptions() {
   MatrixXd functionals = MatrixXd::Zero(system.size(), tested);
   functionals.bottomRows(tested).setIdentity();
   const VectorXd steps = system.step().unknowns.segment(at, tested);
-  const MatrixXd covariance = flight_covariance(full_.shots, full_.poses, full_.cells.plane, model,
-                                                final_weights_, priors, system, functionals,
-                                                rough_ ? &*rough_ : nullptr);
+  const MatrixXd covariance =
+      flight_covariance(full_.shots, full_.poses, full_.cells.plane, model, final_weights_, priors,
+                        system, functionals, rough_ ? &*rough_ : nullptr);
   judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)));
   judge_attitude_delay(steps[considered + 1],
                        std::sqrt(covariance(considered + 1, considered + 1)));
@@ -749,12 +758,13 @@ void FlightWork::fill_trajectory_fit() {
                             model_.corrections(c, static_cast<Index>(knot));
       // Corrections turn about up, and headings about down.
       jump.size[own] = error_of(c) == trajectories::PoseError::heading ? change : -change;
-      jump.sigma[own] = std::sqrt(std::max(
-          0.0, band_.diagonal[at] + band_.diagonal[next] - 2 * band_.next[at]));
+      jump.sigma[own] =
+          std::sqrt(std::max(0.0, band_.diagonal[at] + band_.diagonal[next] - 2 * band_.next[at]));
     }
   }
-  std::sort(fit.jumps.begin(), fit.jumps.end(),
-            [](const TrajectoryJump& a, const TrajectoryJump& b) { return a.begin_ns < b.begin_ns; });
+  std::sort(
+      fit.jumps.begin(), fit.jumps.end(),
+      [](const TrajectoryJump& a, const TrajectoryJump& b) { return a.begin_ns < b.begin_ns; });
   for (const TrajectoryJump& jump : fit.jumps) {
     result_.warnings.push_back(in_words(jump, full_.shots.time_ns.front()) +
                                "; it has a step of its own in the adjustment. Is there a loss of "

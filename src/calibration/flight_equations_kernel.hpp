@@ -63,7 +63,9 @@ struct FlightArguments {
   std::size_t run_count = 0;
 
   /// Columns of the unknowns that the whole flight shares.
-  int global_count() const { return kMountColumns + free_count + (drift ? 1 : 0) + (delay ? 1 : 0); }
+  int global_count() const {
+    return kMountColumns + free_count + (drift ? 1 : 0) + (delay ? 1 : 0);
+  }
 
   /// Products of the columns [mount, train, drift, delay, first knot 6, second knot 6, residual]:
   /// upper triangle.
@@ -71,7 +73,8 @@ struct FlightArguments {
   /// [runs][3][columns of products + 3]: of the plane's columns with those and with its own.
   double* plane_products = nullptr;
   /// [shots of the runs][mount, train, drift, delay, knot 6, plane 3, residual, variance,
-  /// weight], not weighted, or nullptr. The variance is the shot's own, without that of the attitude.
+  /// weight], not weighted, or nullptr. The variance is the shot's own, without that of the
+  /// attitude.
   double* rows = nullptr;
 };
 

@@ -49,12 +49,12 @@ std::string in_words(const TrajectoryJump& jump, std::int64_t begin_ns) {
   const auto since = [&](std::int64_t time_ns) {
     return 1e-9 * static_cast<double>(time_ns - begin_ns);
   };
-  return fmt::format("the trajectory jumps{} {:.2f} to {:.2f} s after the first shot ({} {}), {:.0f} "
-                     "sigmas beyond what is stated of its errors",
-                     sizes.empty() ? std::string(", in a direction that the strips hardly tell,")
-                                   : " by " + sizes,
-                     since(jump.begin_ns), since(jump.end_ns),
-                     jump.between_strips ? "after strip" : "strip", jump.strip + 1, jump.score);
+  return fmt::format(
+      "the trajectory jumps{} {:.2f} to {:.2f} s after the first shot ({} {}), {:.0f} "
+      "sigmas beyond what is stated of its errors",
+      sizes.empty() ? std::string(", in a direction that the strips hardly tell,") : " by " + sizes,
+      since(jump.begin_ns), since(jump.end_ns), jump.between_strips ? "after strip" : "strip",
+      jump.strip + 1, jump.score);
 }
 
 std::string clock_in_words(const FlightCalibration& c) {

@@ -18,8 +18,9 @@ constexpr double kJumpsApart = 4;  // s
 /// Of a step's variance, the flight has to tell so much.
 constexpr double kLeastTold = 1e-3;
 /// The process counts as larger than stated from so many sigmas of chi2 on, if it is so many times
-/// as large.
+/// as large. Where one error is, nothing vouches for the others.
 constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
+constexpr double kOthersSigmas = 1, kOthersRatio = 1.1;
 
 double largest_score(const ProcessCheck& check, Index step) {
   return check.score.col(step).cwiseAbs().maxCoeff();
@@ -43,8 +44,8 @@ ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& 
       if (k > 0) {
         const double decay = steps.decay[i];
         off -= decay * corrections(c, k - 1);
-        variance += decay * (decay * band.diagonal[at - kCorrections] -
-                             2 * band.next[at - kCorrections]);
+        variance +=
+            decay * (decay * band.diagonal[at - kCorrections] - 2 * band.next[at - kCorrections]);
       }
       const double before = steps.sigma[i] * steps.sigma[i];
       const double told = std::clamp(1 - variance / before, 0.0, 1.0);
@@ -63,9 +64,8 @@ std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessChe
   for (Index k = 0; k < check.score.cols(); ++k) {
     if (largest_score(check, k) > kJumpSigmas) steps.push_back(k);
   }
-  std::sort(steps.begin(), steps.end(), [&](Index a, Index b) {
-    return largest_score(check, a) > largest_score(check, b);
-  });
+  std::sort(steps.begin(), steps.end(),
+            [&](Index a, Index b) { return largest_score(check, a) > largest_score(check, b); });
   std::vector<std::size_t> jumps;
   for (const Index k : steps) {
     const auto knot = static_cast<std::size_t>(k);
@@ -82,14 +82,18 @@ std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessChe
 }
 
 Eigen::VectorXd process_factors(const ProcessCheck& check) {
-  Eigen::VectorXd factors = Eigen::VectorXd::Ones(kCorrections);
-  for (Index c = 0; c < kCorrections; ++c) {
-    const double expected = check.expected[c], excess = check.chi2[c] - expected;
-    if (excess <= kProcessSigmas * std::sqrt(2 * expected)) continue;
-    const double ratio = check.chi2[c] / std::max(expected, 1e-6);
-    if (ratio > kLeastRatio) factors[c] = std::sqrt(ratio);
-  }
-  return factors;
+  const auto factors_beyond = [&](double sigmas, double least) {
+    Eigen::VectorXd factors = Eigen::VectorXd::Ones(kCorrections);
+    for (Index c = 0; c < kCorrections; ++c) {
+      const double expected = check.expected[c], excess = check.chi2[c] - expected;
+      const double ratio = check.chi2[c] / std::max(expected, 1e-6);
+      if (excess > sigmas * std::sqrt(2 * expected) && ratio > least) factors[c] = std::sqrt(ratio);
+    }
+    return factors;
+  };
+  const bool fits =
+      factors_beyond(kProcessSigmas, kLeastRatio) == Eigen::VectorXd::Ones(kCorrections);
+  return fits ? Eigen::VectorXd::Ones(kCorrections) : factors_beyond(kOthersSigmas, kOthersRatio);
 }
 
 }  // namespace risley::calibration

@@ -108,7 +108,8 @@ class Roughness {
     std::uniform_real_distribution<double> uniform(0, 2 * std::numbers::pi);
     constexpr int kWaves = 48;
     for (int i = 0; i < kWaves; ++i) {
-      waves_.push_back({normal(generator) / length, normal(generator) / length, uniform(generator)});
+      waves_.push_back(
+          {normal(generator) / length, normal(generator) / length, uniform(generator)});
     }
     amplitude_ = sigma * std::sqrt(2.0 / kWaves);
   }
@@ -137,7 +138,7 @@ struct FlightSettings {
   Eigen::Vector3d boresight_deg{2, -1.5, 1};
   Eigen::Vector3d lever_arm{0.10, 0.05, 0.12};
   double range_offset = 0.01, clock_offset = 0.001;
-  double clock_drift = 0;  ///< s/s that the trajectory's clock gains, about the flight's middle
+  double clock_drift = 0;     ///< s/s that the trajectory's clock gains, about the flight's middle
   double attitude_delay = 0;  ///< by which the attitudes of the trajectory are late, s
   std::vector<FlightJump> jumps;
   double roughness = 0, roughness_length = 1;  ///< of level ground: sigma and correlation, m

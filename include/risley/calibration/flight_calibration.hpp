@@ -136,7 +136,7 @@ struct FlightCalibration : FlightJudgement {
   /// Of this, what shots close to each other share because the ground is no plane, 1 sigma, m; 0
   /// where chance explains it.
   double roughness = 0;
-  std::size_t shots = 0;   ///< given
+  std::size_t shots = 0;         ///< given
   std::size_t without_pose = 0;  ///< of these: outside the trajectory or in a gap of it
   std::size_t used = 0, outliers = 0;
   std::size_t cells = 0, rough_cells = 0;
