@@ -555,7 +555,7 @@ bool FlightWork::mend_as_needed(const ProcessCheck& check) {
   // A process that was larger than stated is followed to its size.
   if (process_factor_ != trajectories::PoseErrorVector::Ones()) {
     for (int c = 0; c < kCorrections; ++c) {
-      const double ratio = check.chi2[c] / check.expected[c];
+      const double ratio = check.chi2[c] / std::max(check.expected[c], 1.0);
       if (ratio > kProcessRatio) factors[c] = std::sqrt(ratio);
     }
   }

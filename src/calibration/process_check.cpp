@@ -20,6 +20,8 @@ constexpr double kLeastTold = 1e-3;
 /// The process counts as larger than stated from so many sigmas of chi2 on, if it is so many times
 /// as large. Where one error is, nothing vouches for the others.
 constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
+/// Nothing is concluded from less.
+constexpr double kLeastExpected = 1;
 constexpr double kOthersSigmas = 1, kOthersRatio = 1.1;
 
 double largest_score(const ProcessCheck& check, Index step) {
@@ -86,7 +88,7 @@ Eigen::VectorXd process_factors(const ProcessCheck& check) {
     Eigen::VectorXd factors = Eigen::VectorXd::Ones(kCorrections);
     for (Index c = 0; c < kCorrections; ++c) {
       const double expected = check.expected[c], excess = check.chi2[c] - expected;
-      const double ratio = check.chi2[c] / std::max(expected, 1e-6);
+      const double ratio = check.chi2[c] / std::max(expected, kLeastExpected);
       if (excess > sigmas * std::sqrt(2 * expected) && ratio > least) factors[c] = std::sqrt(ratio);
     }
     return factors;

@@ -140,7 +140,7 @@ struct FlightSettings {
   double range_offset = 0.01, clock_offset = 0.001;
   double clock_drift = 0;     ///< s/s that the trajectory's clock gains, about the flight's middle
   double attitude_delay = 0;  ///< by which the attitudes of the trajectory are late, s
-  std::vector<FlightJump> jumps;
+  std::vector<FlightJump> jumps{};
   double roughness = 0, roughness_length = 1;  ///< of level ground: sigma and correlation, m
   std::uint64_t seed = 1;
 };
