@@ -56,14 +56,14 @@ constexpr double kDelayPrior = 1;  // s
 constexpr double kDelayConsidered = 2, kDelaySigmas = 3;
 /// The clock offset contradicts what is stated of it from so many sigmas on.
 constexpr double kClockSigmas = 4;
-/// More jumps than these are no jumps: the process is larger than stated. And so often the
-/// trajectory is mended before it counts as not fitting.
+/// A trajectory that jumps more often does not fit, nor does one that so many repetitions do not
+/// mend.
 constexpr std::size_t kMostJumps = 8;
 constexpr int kMendings = 8;
 /// A jump may be as large as this many sigmas of the process, and as many times what is seen of it.
 constexpr double kBreakSigmas = 3;
-/// A process that grows counts as found when its corrections ask for no more than this.
-constexpr double kProcessRatio = 1.2;
+/// A process that grows counts as found when its corrections ask for no more than this factor.
+constexpr double kProcessRatio = 1.1;
 
 /// What of the globals a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
@@ -536,7 +536,7 @@ void FlightWork::mend_trajectory() {
     }
     if (mended == kMendings || !mend_as_needed(check)) {
       fit.fits = jumps_of(model_.knots, check).empty() &&
-                 process_factors(check) == VectorXd::Ones(kCorrections);
+                 process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
       return;
     }
     fine_round(full_, kLastSteps);
@@ -546,26 +546,16 @@ void FlightWork::mend_trajectory() {
 /// @return whether anything has changed, so that the adjustment has to be repeated
 bool FlightWork::mend_as_needed(const ProcessCheck& check) {
   const std::vector<std::size_t> jumps = jumps_of(model_.knots, check);
-  const bool too_many = priors_.breaks.size() + jumps.size() > kMostJumps;
-  if (!jumps.empty() && !too_many) {
+  // A process that was larger than stated is followed to its size.
+  const bool alerted = process_factor_ != trajectories::PoseErrorVector::Ones();
+  const VectorXd factors = process_factors(model_.knots, check, alerted);
+  const bool large = factors.maxCoeff() > (alerted ? kProcessRatio : 1);
+  // Steps of a process that is larger than stated look like jumps.
+  if (!large && !jumps.empty() && priors_.breaks.size() + jumps.size() <= kMostJumps) {
     break_process(check, jumps);
     return true;
   }
-  VectorXd factors = process_factors(check);
-  // A process that was larger than stated is followed to its size.
-  if (process_factor_ != trajectories::PoseErrorVector::Ones()) {
-    for (int c = 0; c < kCorrections; ++c) {
-      const double ratio = check.chi2[c] / std::max(check.expected[c], 1.0);
-      if (ratio > kProcessRatio) factors[c] = std::sqrt(ratio);
-    }
-  }
-  const bool fits = factors == VectorXd::Ones(kCorrections);
-  const bool no_jumps = too_many && process_factor_ == trajectories::PoseErrorVector::Ones();
-  if (no_jumps) {
-    priors_.breaks.clear();
-    break_score_.clear();
-  }
-  if (fits) return no_jumps;
+  if (!large) return false;
   trajectories::PoseErrorVector on_process = trajectories::PoseErrorVector::Ones();
   for (int c = 0; c < kCorrections; ++c) on_process[static_cast<Index>(error_of(c))] = factors[c];
   process_factor_ = process_factor_.cwiseProduct(on_process);

@@ -20,9 +20,16 @@ constexpr double kLeastTold = 1e-3;
 /// The process counts as larger than stated from so many sigmas of chi2 on, if it is so many times
 /// as large. Where one error is, nothing vouches for the others.
 constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
-/// Nothing is concluded from less.
-constexpr double kLeastExpected = 1;
 constexpr double kOthersSigmas = 1, kOthersRatio = 1.1;
+/// Nothing is concluded from less, and little from less than the second number.
+constexpr double kLeastExpected = 1, kHardlyTold = 15;
+
+/// Between two steps, s; 0 for neighbours.
+double seconds_apart(const TrajectoryKnots& knots, std::size_t a, std::size_t b) {
+  const auto [first, last] = std::minmax(a, b);
+  if (first == last) return 0;
+  return 1e-9 * static_cast<double>(knots.time_ns[last] - knots.time_ns[first + 1]);
+}
 
 double largest_score(const ProcessCheck& check, Index step) {
   return check.score.col(step).cwiseAbs().maxCoeff();
@@ -35,7 +42,7 @@ ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& 
   const auto count = static_cast<Index>(knots.size());
   ProcessCheck check;
   check.score = Eigen::MatrixXd::Zero(kCorrections, std::max<Index>(count - 1, 0));
-  check.jump = check.score;
+  check.told = check.jump = check.score;
   check.chi2 = check.expected = Eigen::VectorXd::Zero(kCorrections);
   for (int c = 0; c < kCorrections; ++c) {
     const KnotSteps steps = knot_steps(knots, priors.process, c, priors.breaks);
@@ -54,6 +61,7 @@ ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& 
       check.chi2[c] += off * off / before;
       check.expected[c] += told;
       if (k == 0 || told < kLeastTold) continue;
+      check.told(c, k - 1) = told;
       check.score(c, k - 1) = off / std::sqrt(before * told);
       check.jump(c, k - 1) = off / told;
     }
@@ -71,11 +79,8 @@ std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessChe
   std::vector<std::size_t> jumps;
   for (const Index k : steps) {
     const auto knot = static_cast<std::size_t>(k);
-    const auto apart = [&](std::size_t from, std::size_t to) {
-      return 1e-9 * static_cast<double>(knots.time_ns[to] - knots.time_ns[from]);
-    };
     const bool far = std::all_of(jumps.begin(), jumps.end(), [&](std::size_t other) {
-      return apart(std::min(other, knot) + 1, std::max(other, knot)) > kJumpsApart;
+      return seconds_apart(knots, other, knot) > kJumpsApart;
     });
     if (far) jumps.push_back(knot);
   }
@@ -83,19 +88,43 @@ std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessChe
   return jumps;
 }
 
-Eigen::VectorXd process_factors(const ProcessCheck& check) {
+Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck& check,
+                                bool alerted) {
+  const std::vector<std::size_t> jumps = jumps_of(knots, check);
+  Eigen::VectorXd chi2 = Eigen::VectorXd::Zero(kCorrections), expected = chi2;
+  for (Index k = 0; k < check.score.cols(); ++k) {
+    const auto step = static_cast<std::size_t>(k);
+    if (std::any_of(jumps.begin(), jumps.end(), [&](std::size_t jump) {
+          return seconds_apart(knots, jump, step) <= kJumpsApart;
+        })) {
+      continue;
+    }
+    chi2 += check.score.col(k).cwiseAbs2().cwiseProduct(check.told.col(k));
+    expected += check.told.col(k);
+  }
   const auto factors_beyond = [&](double sigmas, double least) {
     Eigen::VectorXd factors = Eigen::VectorXd::Ones(kCorrections);
     for (Index c = 0; c < kCorrections; ++c) {
-      const double expected = check.expected[c], excess = check.chi2[c] - expected;
-      const double ratio = check.chi2[c] / std::max(expected, kLeastExpected);
-      if (excess > sigmas * std::sqrt(2 * expected) && ratio > least) factors[c] = std::sqrt(ratio);
+      const double ratio = chi2[c] / std::max(expected[c], kLeastExpected);
+      if (chi2[c] - expected[c] > sigmas * std::sqrt(2 * expected[c]) && ratio > least) {
+        factors[c] = std::sqrt(ratio);
+      }
     }
     return factors;
   };
-  const bool fits =
-      factors_beyond(kProcessSigmas, kLeastRatio) == Eigen::VectorXd::Ones(kCorrections);
-  return fits ? Eigen::VectorXd::Ones(kCorrections) : factors_beyond(kOthersSigmas, kOthersRatio);
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(kCorrections);
+  if (!alerted && factors_beyond(kProcessSigmas, kLeastRatio) == ones) return ones;
+  Eigen::VectorXd factors = factors_beyond(kOthersSigmas, kOthersRatio);
+  double sum = 0, count = 0;
+  for (Index c = 0; c < kCorrections; ++c) {
+    if (expected[c] < kHardlyTold) continue;
+    sum += factors[c];
+    ++count;
+  }
+  for (Index c = 0; c < kCorrections; ++c) {
+    if (expected[c] < kHardlyTold && count > 0) factors[c] = std::max(factors[c], sum / count);
+  }
+  return factors;
 }
 
 }  // namespace risley::calibration

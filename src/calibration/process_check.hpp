@@ -19,6 +19,7 @@ namespace risley::calibration {
 /// variance 1 - v, and a jump of the process between the knots is best told by e / (1 - v).
 struct ProcessCheck {
   Eigen::MatrixXd score;  ///< [6, knots - 1]: e / sqrt(1 - v); 0 where the flight tells nothing
+  Eigen::MatrixXd told;   ///< [6, knots - 1]: 1 - v
   Eigen::MatrixXd jump;   ///< [6, knots - 1]: a jump that explains it, m and rad
   /// [6]: sums of e^2 over all steps, the first value included, and what is expected of them.
   Eigen::VectorXd chi2, expected;
@@ -31,7 +32,11 @@ ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& 
 /// one jump does not count twice. @return knots before them, ascending
 std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessCheck& check);
 
-/// Factors [6] on the sigmas of the process that its corrections ask for; 1 where they fit.
-Eigen::VectorXd process_factors(const ProcessCheck& check);
+/// Factors [6] on the sigmas of the process that its corrections ask for, away from jumps; 1 where
+/// they fit. Where one error is larger than stated, those that the flight hardly tells count as
+/// larger, too.
+/// @param alerted  the process is known to be larger than stated: smaller misfits count
+Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck& check,
+                                bool alerted = false);
 
 }  // namespace risley::calibration

@@ -252,7 +252,7 @@ TEST(ProcessCheck, FindsTheStepThatJumps) {
   }
   const ProcessCheck sound = check_process(knots, truth, priors, band);
   EXPECT_TRUE(jumps_of(knots, sound).empty());
-  EXPECT_EQ(process_factors(sound), Eigen::VectorXd::Ones(kCorrections));
+  EXPECT_EQ(process_factors(knots, sound), Eigen::VectorXd::Ones(kCorrections));
   for (int c = 0; c < kCorrections; ++c) {
     EXPECT_NEAR(sound.expected[c], static_cast<double>(count), 0.01 * static_cast<double>(count));
     EXPECT_NEAR(sound.chi2[c] / sound.expected[c], 1,
@@ -267,7 +267,7 @@ TEST(ProcessCheck, FindsTheStepThatJumps) {
   priors.breaks = {{.knot = 10, .sigma = {0, 0, 0.1, 0, 0, 0}}};
   EXPECT_TRUE(jumps_of(knots, check_process(knots, jumping, priors, band)).empty());
   const ProcessCheck large = check_process(knots, 3 * truth, priors, band);
-  for (int c = 0; c < kCorrections; ++c) EXPECT_NEAR(process_factors(large)[c], 3, 0.9);
+  for (int c = 0; c < kCorrections; ++c) EXPECT_NEAR(process_factors(knots, large)[c], 3, 0.9);
 }
 
 }  // namespace risley::calibration::flight_faults_test
