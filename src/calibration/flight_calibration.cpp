@@ -411,6 +411,7 @@ class FlightWork {
   }
 
   void mend_trajectory();
+  bool known_ground_contradicts() const;
   bool mend_as_needed(const ProcessCheck& check);
   void break_process(const ProcessCheck& check, const std::vector<std::size_t>& jumps);
   void solve_last();
@@ -534,6 +535,8 @@ void FlightWork::mend_trajectory() {
       std::copy_n(check.chi2.data(), kCorrections, fit.chi2.begin());
       std::copy_n(check.expected.data(), kCorrections, fit.expected.begin());
     }
+    // Known ground that is wrong bends the trajectory: it is named, and nothing else is blamed.
+    if (known_ground_contradicts()) return;
     if (mended == kMendings || !mend_as_needed(check)) {
       fit.fits = jumps_of(model_.knots, check).empty() &&
                  process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
@@ -541,6 +544,16 @@ void FlightWork::mend_trajectory() {
     }
     fine_round(full_, kLastSteps);
   }
+}
+
+bool FlightWork::known_ground_contradicts() const {
+  for (const PlanePrior& known : priors_.planes) {
+    const GroundPlane& plane = model_.planes[known.plane];
+    if (std::abs(plane.normal.dot(plane.centre - known.place)) > kTestedSigmas * known.sigma) {
+      return true;
+    }
+  }
+  return false;
 }
 
 /// @return whether anything has changed, so that the adjustment has to be repeated

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "risley/core/median.hpp"
+
 namespace risley::calibration {
 namespace {
 
@@ -23,6 +25,10 @@ constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
 constexpr double kOthersSigmas = 1, kOthersRatio = 1.1;
 /// Nothing is concluded from less, and little from less than the second number.
 constexpr double kLeastExpected = 1, kHardlyTold = 15;
+
+/// Of what all steps tell, so much is to be left away from jumps. Median of chi2 with one degree of
+/// freedom.
+constexpr double kLeastLeft = 0.15, kMedianOfChi2 = 0.4549;
 
 /// Between two steps, s; 0 for neighbours.
 double seconds_apart(const TrajectoryKnots& knots, std::size_t a, std::size_t b) {
@@ -101,6 +107,18 @@ Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck
     }
     chi2 += check.score.col(k).cwiseAbs2().cwiseProduct(check.told.col(k));
     expected += check.told.col(k);
+  }
+  // Where jumps are everywhere, the middle of all steps tells more than what is left.
+  const Eigen::VectorXd of_all = check.told.rowwise().sum();
+  if (expected.sum() < kLeastLeft * of_all.sum()) {
+    expected = of_all;
+    for (Index c = 0; c < kCorrections; ++c) {
+      std::vector<double> squares;
+      for (Index k = 0; k < check.score.cols(); ++k) {
+        if (check.told(c, k) > 0) squares.push_back(std::pow(check.score(c, k), 2));
+      }
+      chi2[c] = squares.empty() ? 0 : expected[c] * median(squares) / kMedianOfChi2;
+    }
   }
   const auto factors_beyond = [&](double sigmas, double least) {
     Eigen::VectorXd factors = Eigen::VectorXd::Ones(kCorrections);
