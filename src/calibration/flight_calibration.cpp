@@ -410,6 +410,13 @@ class FlightWork {
                                kLeastRange * kLeastRange);
   }
 
+  struct TestedSystem {
+    FlightModel model;
+    FlightPriors priors;
+    FlightSystem system;
+  };
+  TestedSystem tested_system() const;
+  bool assumptions_explain() const;
   void mend_trajectory();
   bool known_ground_contradicts() const;
   bool mend_as_needed(const ProcessCheck& check);
@@ -537,9 +544,11 @@ void FlightWork::mend_trajectory() {
     }
     // Known ground that is wrong bends the trajectory: it is named, and nothing else is blamed.
     if (known_ground_contradicts()) return;
+    const bool fits = jumps_of(model_.knots, check).empty() &&
+                      process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
+    if (mended == 0 && (fits || assumptions_explain())) return;
     if (mended == kMendings || !mend_as_needed(check)) {
-      fit.fits = jumps_of(model_.knots, check).empty() &&
-                 process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
+      fit.fits = fits;
       return;
     }
     fine_round(full_, kLastSteps);
@@ -641,29 +650,50 @@ void FlightWork::fill_mount_and_sensor() {
   result_.mount.covariance = named(all_rows);
 }
 
-/// What one more step would do if the clock could drift and what is held, though it may be off,
-/// were free; and how well that is known.
-void FlightWork::test_assumptions() {
+/// Equations in which the clock may drift, attitudes may be late, and what is held, though it may
+/// be off, is free.
+FlightWork::TestedSystem FlightWork::tested_system() const {
   const std::vector<std::int64_t>& times = full_.shots.time_ns;
   FlightModel model = smooth_;
   model.drift_about_ns = times.front() + (times.back() - times.front()) / 2;
   model.attitude_delay = true;
-  const auto considered = static_cast<Index>(start_.considered);
   const Index drift = model.unknowns().clock_drift(), delay = model.unknowns().attitude_delay(),
-              first = drift - considered, size = model.unknowns().size();
+              size = model.unknowns().size();
   FlightPriors priors = priors_;
   priors.mean.conservativeResizeLike(VectorXd::Zero(size));
   priors.information.conservativeResizeLike(MatrixXd::Zero(size, size));
   priors.information(drift, drift) = 1 / (kDriftPrior * kDriftPrior);
   priors.information(delay, delay) = 1 / (kDelayPrior * kDelayPrior);
   priors.held.resize(static_cast<std::size_t>(size), false);
-  for (Index i = first; i < drift; ++i) {
+  for (Index i = drift - static_cast<Index>(start_.considered); i < drift; ++i) {
     priors.information(i, i) = 1 / (kHeldPrior * kHeldPrior);
     priors.held[static_cast<std::size_t>(i)] = false;
   }
-  const FlightSystem system(
+  FlightSystem system(
       flight_equations(full_.shots, full_.poses, full_.cells.plane, model, final_weights_), model,
       priors);
+  return {std::move(model), std::move(priors), std::move(system)};
+}
+
+/// Whether corrections fit their process once what is tested is free: then it is to blame, and the
+/// trajectory is not.
+bool FlightWork::assumptions_explain() const {
+  const TestedSystem tested = tested_system();
+  const VectorXd step = tested.system.step().unknowns;
+  const MatrixXd corrections =
+      model_.corrections + Eigen::Map<const MatrixXd>(step.data(), kCorrections,
+                                                      static_cast<Index>(model_.knots.size()));
+  const ProcessCheck check =
+      check_process(model_.knots, corrections, priors_, tested.system.inverse_band());
+  return jumps_of(model_.knots, check).empty() &&
+         process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
+}
+
+/// What one more step would do with those equations, and how well that is known.
+void FlightWork::test_assumptions() {
+  const auto [model, priors, system] = tested_system();
+  const auto considered = static_cast<Index>(start_.considered);
+  const Index size = model.unknowns().size(), first = model.unknowns().clock_drift() - considered;
   const Index tested = considered + 2, at = system.size() - tested;
   MatrixXd functionals = MatrixXd::Zero(system.size(), tested);
   functionals.bottomRows(tested).setIdentity();
