@@ -36,6 +36,15 @@ void print_control(const FlightCalibration& c) {
   table.print();
 }
 
+/// What the strips say of the trajectory and the ground; jumps and factors are warnings.
+void print_trajectory_fit(const FlightCalibration& c) {
+  const NumberText delay = number_text(1e3 * c.attitude_delay.value, 1e3 * c.attitude_delay.sigma);
+  say("\nattitudes late against positions by {} +- {} ms; jumps of the trajectory: {}", delay.value,
+      delay.sigma, c.trajectory_fit.jumps.size());
+  if (c.roughness > 0) say("; ground rough by {:.1f} mm", 1e3 * c.roughness);
+  say("\n");
+}
+
 }  // namespace
 
 void print_judgement(const calibration::FlightJudgement& judgement) {
@@ -105,6 +114,7 @@ void print_flight(const CalibratedFlight& outcome) {
     pairs.add(row);
   }
   pairs.print();
+  print_trajectory_fit(c);
   print_control(c);
   if (!outcome.truth) return;
   say("\n");

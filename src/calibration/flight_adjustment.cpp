@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -37,6 +38,8 @@ constexpr double kPlaneTiltSigma = 10, kPlaneOffsetSigma = 1000;  // rad, m
 constexpr int kIntervalParts = 8;
 /// A long flight has settled when its corrections move by no more than this, RMS, in their sigmas.
 constexpr double kSettledCorrection = 0.02;
+/// Of a shot's variance, so much stays its own, however rough the ground is.
+constexpr double kLeastOwnShare = 0.25;
 /// Columns of an inverse that are computed together.
 constexpr Index kInverseColumns = 96;
 
@@ -168,6 +171,29 @@ double promised_to_globals(const FlightSystem& system, const FlightSystem::Step&
   const MatrixXd covariance = system.solve(units).bottomRows(globals)(free, free);
   const VectorXd moved = step.unknowns.tail(globals)(free);
   return moved.dot(algebra::SymmetricSolver(covariance).inverse() * moved);
+}
+
+/// What the shots of a cell that counts do to the functions, patch by patch, weighted.
+struct PatchSums {
+  std::int32_t plane = 0;
+  Eigen::Matrix<float, Eigen::Dynamic, RoughGround::kPatches> sums;  // [functions, patches]
+};
+
+/// Those of a piece. Its rows come plane by plane.
+std::vector<PatchSums> patch_sums(const FlightRows& rows, const PlaneOfShot& plane,
+                                  const RoughGround& ground, const VectorXd& weight,
+                                  const MatrixXd& moved) {
+  std::vector<PatchSums> all;
+  for (Index i = 0; i < moved.rows(); ++i) {
+    const std::size_t shot = rows.shots[static_cast<std::size_t>(i)];
+    if (ground.patch[shot] < 0 || !(weight[i] > 0)) continue;
+    if (all.empty() || all.back().plane != plane[shot]) {
+      all.push_back({plane[shot], {}});
+      all.back().sums.setZero(moved.cols(), RoughGround::kPatches);
+    }
+    all.back().sums.col(ground.patch[shot]) += (weight[i] * moved.row(i)).cast<float>().transpose();
+  }
+  return all;
 }
 
 }  // namespace
@@ -322,7 +348,7 @@ void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPrior
   hessian.bottomRightCorner(globals, globals) += prior;
   right.segment(g0, globals) += rates.transpose() * (priors.information * off);
   for (int c = 0; c < kCorrections; ++c) {
-    chain.push_back(knot_information(model.knots, priors.process, c));
+    chain.push_back(knot_information(model.knots, priors.process, c, priors.breaks));
     const KnotInformation& own = chain.back();
     for (Index k = 0; k < knots; ++k) {
       const Index at = kCorrections * k + c;
@@ -443,24 +469,31 @@ FlightSystem::Step FlightSystem::step() const {
   return step;
 }
 
-VectorXd FlightSystem::inverse_diagonal() const {
+FlightSystem::Band FlightSystem::inverse_band() const {
   const Parts& p = *parts_;
   const Index n = size(), blocks = (n + kInverseColumns - 1) / kInverseColumns;
-  VectorXd diagonal = VectorXd::Zero(n);
-  // Column j of L^-1 begins in row j; the diagonal sums up the squares of its columns.
+  const Index steps = kCorrections * std::max<Index>(p.knots - 1, 0);
+  Band band{VectorXd::Zero(n), VectorXd::Zero(steps)};
+  // Column j of L^-1 begins in row j; the inverse holds the products of its columns.
   parallel::for_each(static_cast<std::size_t>(blocks), [&](Index block) {
     const Index at = block * kInverseColumns, columns = std::min(kInverseColumns, n - at);
-    MatrixXd part = MatrixXd::Zero(n - at, columns);
-    part.topRows(columns).setIdentity();
+    const Index all = std::min(columns + kCorrections, n - at);
+    MatrixXd part = MatrixXd::Zero(n - at, all);
+    part.topRows(all).setIdentity();
     p.root.factor()
         .bottomRightCorner(n - at, n - at)
         .triangularView<Eigen::Lower>()
         .solveInPlace(part);
-    diagonal.segment(at, columns) = part.colwise().squaredNorm().transpose();
+    band.diagonal.segment(at, columns) = part.leftCols(columns).colwise().squaredNorm().transpose();
+    for (Index j = at; j < std::min(at + columns, steps); ++j) {
+      band.next[j] = part.col(j - at).dot(part.col(j - at + kCorrections));
+    }
   });
-  diagonal = diagonal.cwiseProduct(p.scale.cwiseAbs2());
-  for (const Index g : p.held) diagonal[p.first_global() + g] = 0;
-  return diagonal;
+  band.diagonal = band.diagonal.cwiseProduct(p.scale.cwiseAbs2());
+  band.next = band.next.cwiseProduct(
+      p.scale.head(steps).cwiseProduct(p.scale.segment(kCorrections, steps)).eval());
+  for (const Index g : p.held) band.diagonal[p.first_global() + g] = 0;
+  return band;
 }
 
 MatrixXd FlightSystem::inverse() const { return solve(MatrixXd::Identity(size(), size())); }
@@ -562,7 +595,9 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
                            const PlaneOfShot& plane, const FlightModel& model,
                            const FlightWeights& weights, const FlightPriors& priors,
                            const FlightSystem& system, const MatrixXd& functionals,
-                           InstructionSet set) {
+                           const RoughGround* ground, InstructionSet set) {
+  if (ground != nullptr) require_length("patches", ground->patch.size(), shots.size());
+  const double of_ground = ground == nullptr ? 0 : ground->covariance.diagonal().mean();
   const MatrixXd solved = system.solve(functionals);
   const MatrixXd planes = system.planes_of(solved);
   const Index count = solved.cols(), globals = system.globals();
@@ -570,6 +605,7 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
   const std::size_t pieces = flight_pieces(model);
   struct Sums {
     MatrixXd noise, parts;  // [count, count]; [count, 6 parts]
+    std::vector<PatchSums> patches;
     std::size_t interval = 0;
   };
   std::vector<Sums> sums(pieces);
@@ -614,7 +650,14 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
         const VectorXd variance =
             (weight.array() > 0)
                 .select(weight.array().square() * values.col(globals + 10).array(), 0.0);
-        own.noise = moved.transpose() * variance.asDiagonal() * moved;
+        if (ground == nullptr) {
+          own.noise = moved.transpose() * variance.asDiagonal() * moved;
+        } else {
+          const VectorXd left = (variance.array() - of_ground * weight.array().square())
+                                    .max(kLeastOwnShare * variance.array());
+          own.noise = moved.transpose() * left.asDiagonal() * moved;
+          own.patches = patch_sums(rows, plane, *ground, weight, moved);
+        }
         const std::int64_t first_ns = shots.time_ns[rows.begin];
         const auto samples =
             static_cast<Index>(static_cast<double>(shots.time_ns[rows.end - 1] - first_ns) /
@@ -649,6 +692,19 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
     const auto own = planes.middleRows<3>(3 * static_cast<Index>(prior.plane));
     const PlaneKnowledge known = knowledge_of(prior, model.planes[prior.plane]);
     covariance += own.transpose() * known.information.asDiagonal() * own;
+  }
+  if (ground != nullptr) {
+    std::map<std::int32_t, MatrixXd> by_plane;
+    for (const Sums& own : sums) {
+      for (const PatchSums& one : own.patches) {
+        MatrixXd& all = by_plane[one.plane];
+        if (all.size() == 0) all = MatrixXd::Zero(count, RoughGround::kPatches);
+        all += one.sums.cast<double>();
+      }
+    }
+    for (const auto& [number, all] : by_plane) {
+      covariance += ground->cells_for_each * all * ground->covariance * all.transpose();
+    }
   }
   for (std::size_t first = 0; first < pieces;) {
     MatrixXd parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);

@@ -21,7 +21,10 @@
 
 #include "calibration/eigen_vectors.hpp"
 #include "calibration/flight_start.hpp"
+#include "calibration/flight_words.hpp"
 #include "calibration/judge_flight.hpp"
+#include "calibration/process_check.hpp"
+#include "calibration/rough_ground.hpp"
 #include "calibration/smooth_ground.hpp"
 #include "calibration/verdict.hpp"
 
@@ -46,6 +49,21 @@ constexpr double kSettled = 0.1;
 /// A drift of the clock, or a held parameter that is off, counts from so many sigmas on. Known
 /// before to no better than these, s/s and SI.
 constexpr double kTestedSigmas = 5, kDriftPrior = 1e-3, kHeldPrior = 1e-2;
+constexpr double kDelayPrior = 1;  // s
+/// Attitudes count as late from so many sigmas on, since few flights tell a delay well; from the
+/// first number on, and where the clock offset is so far from what is stated, what a delay would do
+/// counts as an error of everything else.
+constexpr double kDelayConsidered = 2, kDelaySigmas = 3;
+/// The clock offset contradicts what is stated of it from so many sigmas on.
+constexpr double kClockSigmas = 4;
+/// A trajectory that jumps more often does not fit, nor does one that so many repetitions do not
+/// mend.
+constexpr std::size_t kMostJumps = 8;
+constexpr int kMendings = 8;
+/// A jump may be as large as this many sigmas of the process, and as many times what is seen of it.
+constexpr double kBreakSigmas = 3;
+/// A process that grows counts as found when its corrections ask for no more than this factor.
+constexpr double kProcessRatio = 1.1;
 
 /// What of the globals a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
@@ -128,7 +146,9 @@ class FlightWork {
     find_coarsely();
     progress_.report(0.4);
     adjust_finely();
-    progress_.report(0.9);
+    progress_.report(0.8);
+    mend_trajectory();
+    progress_.report(0.93);
     fill_result();
     progress_.report(1);
     return std::move(result_);
@@ -199,6 +219,8 @@ class FlightWork {
     cells.noise = noise;
     flight.cells = ground_cells(flight.points, flight.shots.strip, cells);
     take_control(flight, cells);
+    grid_ = cells;
+    leave_out_jumps(flight);
     if (flight.cells.planes.size() < kFewestCells) {
       throw EstimationError(fmt::format(
           "only {} cells of {:g} m of ground were seen by several strips, at least {} are needed: "
@@ -206,6 +228,18 @@ class FlightWork {
           flight.cells.planes.size(), size, kFewestCells));
     }
     model_.planes = flight.cells.planes;
+  }
+
+  /// Shots between two knots that a jump is between tell nothing: corrections are linear there.
+  void leave_out_jumps(LabelledFlight& flight) const {
+    for (const ProcessBreak& one : priors_.breaks) {
+      for (const TrajectoryKnots::Interval& interval : model_.knots.intervals) {
+        if (interval.knot != one.knot) continue;
+        std::fill(flight.cells.plane.begin() + static_cast<std::ptrdiff_t>(interval.first_shot),
+                  flight.cells.plane.begin() + static_cast<std::ptrdiff_t>(interval.end_shot),
+                  kNoPlane);
+      }
+    }
   }
 
   /// Known ground has planes of its own, whose places are fixed on what is known.
@@ -340,27 +374,28 @@ class FlightWork {
     progress_.report(0.5);
     set_knots(full_.shots, spacing);
     // Then everything. What the residuals say of the ranges' noise counts in the last round.
-    double cell_noise = coarse_.cells.scatter;
-    const auto round = [&](LabelledFlight& flight, int steps) {
-      label(flight, options_.cell_size, false, cell_noise);
-      cell_noise = flight.cells.scatter;
-      final_weights_ = weights();
-      final_weights_.gate = kGateSigmas;
-      last_ = adjust(flight, final_weights_, steps);
-    };
+    cell_noise_ = coarse_.cells.scatter;
     if (full_.shots.size() <= options_.many_shots) {
-      round(full_, kManySteps);
+      fine_round(full_, kManySteps);
       update_range_variance(full_);
     } else {
       LabelledFlight many;
       many.shots = sample_of_all(options_.many_shots);
       set_knots(many.shots, spacing);
-      round(many, kManySteps);
+      fine_round(many, kManySteps);
       update_range_variance(many);
       set_knots(full_.shots, spacing);
     }
     progress_.report(0.6);
-    round(full_, kLastSteps);
+    fine_round(full_, kLastSteps);
+  }
+
+  void fine_round(LabelledFlight& flight, int steps) {
+    label(flight, options_.cell_size, false, cell_noise_);
+    cell_noise_ = flight.cells.scatter;
+    final_weights_ = weights();
+    final_weights_.gate = kGateSigmas;
+    last_ = adjust(flight, final_weights_, steps);
   }
 
   void update_range_variance(const LabelledFlight& flight) {
@@ -375,6 +410,21 @@ class FlightWork {
                                kLeastRange * kLeastRange);
   }
 
+  struct TestedSystem {
+    FlightModel model;
+    FlightPriors priors;
+    FlightSystem system;
+  };
+  TestedSystem tested_system() const;
+  bool assumptions_explain() const;
+  void mend_trajectory();
+  bool known_ground_contradicts() const;
+  bool mend_as_needed(const ProcessCheck& check);
+  void break_process(const ProcessCheck& check, const std::vector<std::size_t>& jumps);
+  void solve_last();
+  void fill_trajectory_fit();
+  void judge_attitude_delay(double value, double sigma);
+  void judge_clock_offset();
   void fill_result();
   void fill_mount_and_sensor();
   void test_assumptions();
@@ -397,6 +447,14 @@ class FlightWork {
   FlightModel smooth_;  ///< at the end, over smooth ground
   FlightPriors priors_;
   double range_variance_ = 0;  // m^2
+  double cell_noise_ = 0;      // m
+  GroundCellOptions grid_;     ///< of the last labels
+  std::optional<RoughGround> rough_;
+  trajectories::PoseErrorVector process_factor_ = trajectories::PoseErrorVector::Ones();
+  MatrixXd may_be_off_;                 ///< see FlightEvidence
+  std::vector<double> break_score_;     ///< [breaks of priors_]
+  std::optional<FlightSystem> system_;  ///< of the last equations, over smooth ground
+  FlightSystem::Band band_;             ///< of its inverse
   int grids_ = 0;
   FlightAdjustment last_;
   FlightWeights final_weights_;
@@ -435,21 +493,18 @@ void FlightWork::fill_result() {
     result_.piece_time.push_back(piece.time);
     result_.piece_rms.push_back(std::sqrt(piece.metres2 / static_cast<double>(piece.count)));
   }
-  smooth_ = model_;
-  smooth_.planes = smooth_ground(
-      model_.planes, tilt_information(model_.planes.size(),
-                                      flight_equations(full_.shots, full_.poses, full_.cells.plane,
-                                                       model_, final_weights_)));
-  const FlightSystem system(
-      flight_equations(full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_),
-      smooth_, priors_);
-  progress_.report(0.93);
+  rough_ = rough_ground(full_.shots, full_.poses, full_.cells.plane, full_.points, grid_, model_,
+                        final_weights_);
+  if (rough_) result_.roughness = std::sqrt(rough_->covariance.diagonal().mean());
+  test_assumptions();
   static_cast<FlightJudgement&>(result_) =
       judge_flight({full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_, priors_,
-                    start_.prior_sigma, start_.considered, system});
+                    start_.prior_sigma, start_.considered, *system_, &band_.diagonal, may_be_off_,
+                    rough_ ? &*rough_ : nullptr});
   fill_mount_and_sensor();
+  judge_clock_offset();
+  fill_trajectory_fit();
   fill_control();
-  test_assumptions();
   fill_trajectory();
   result_.tangent = tangent_;
   result_.converged = last_.converged && result_.reason.empty();
@@ -462,6 +517,89 @@ void FlightWork::fill_result() {
   result_.tolerance = options_.tolerance.value_or(options_.sensor.pointing_tolerance);
   if (result_.converged) result_.pointing_error = pointing_error_of(result_);
   result_.verdict = verdict_of(result_);
+}
+
+/// The last equations, and what neighbouring knots share of their inverse.
+void FlightWork::solve_last() {
+  progress_.check();
+  smooth_ = model_;
+  smooth_.planes = smooth_ground(
+      model_.planes, tilt_information(model_.planes.size(),
+                                      flight_equations(full_.shots, full_.poses, full_.cells.plane,
+                                                       model_, final_weights_)));
+  system_.emplace(
+      flight_equations(full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_),
+      smooth_, priors_);
+  band_ = system_->inverse_band();
+}
+
+/// Compares the corrections with the process that is stated of them, and adjusts again until they
+/// fit: jumps get steps of their own, and a process that is larger than stated its size.
+void FlightWork::mend_trajectory() {
+  TrajectoryFit& fit = result_.trajectory_fit;
+  for (int mended = 0;; ++mended) {
+    solve_last();
+    const ProcessCheck check = check_process(model_.knots, model_.corrections, priors_, band_);
+    if (mended == 0) {
+      std::copy_n(check.chi2.data(), kCorrections, fit.chi2.begin());
+      std::copy_n(check.expected.data(), kCorrections, fit.expected.begin());
+    }
+    // Known ground that is wrong bends the trajectory: it is named, and nothing else is blamed.
+    if (known_ground_contradicts()) return;
+    const bool fits = jumps_of(model_.knots, check).empty() &&
+                      process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
+    if (mended == 0 && (fits || assumptions_explain())) return;
+    if (mended == kMendings || !mend_as_needed(check)) {
+      fit.fits = fits;
+      return;
+    }
+    fine_round(full_, kLastSteps);
+  }
+}
+
+bool FlightWork::known_ground_contradicts() const {
+  for (const PlanePrior& known : priors_.planes) {
+    const GroundPlane& plane = model_.planes[known.plane];
+    if (std::abs(plane.normal.dot(plane.centre - known.place)) > kTestedSigmas * known.sigma) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// @return whether anything has changed, so that the adjustment has to be repeated
+bool FlightWork::mend_as_needed(const ProcessCheck& check) {
+  const std::vector<std::size_t> jumps = jumps_of(model_.knots, check);
+  // A process that was larger than stated is followed to its size.
+  const bool alerted = process_factor_ != trajectories::PoseErrorVector::Ones();
+  const VectorXd factors = process_factors(model_.knots, check, alerted);
+  const bool large = factors.maxCoeff() > (alerted ? kProcessRatio : 1);
+  // Steps of a process that is larger than stated look like jumps.
+  if (!large && !jumps.empty() && priors_.breaks.size() + jumps.size() <= kMostJumps) {
+    break_process(check, jumps);
+    return true;
+  }
+  if (!large) return false;
+  trajectories::PoseErrorVector on_process = trajectories::PoseErrorVector::Ones();
+  for (int c = 0; c < kCorrections; ++c) on_process[static_cast<Index>(error_of(c))] = factors[c];
+  process_factor_ = process_factor_.cwiseProduct(on_process);
+  priors_.process = priors_.process.scaled(on_process);
+  return true;
+}
+
+void FlightWork::break_process(const ProcessCheck& check, const std::vector<std::size_t>& jumps) {
+  for (const std::size_t knot : jumps) {
+    const auto step = static_cast<Index>(knot);
+    ProcessBreak one{.knot = knot};
+    for (int c = 0; c < kCorrections; ++c) {
+      const double usual =
+          priors_.process.sigmas(model_.knots.time_ns[knot])[static_cast<Index>(error_of(c))];
+      one.sigma[static_cast<std::size_t>(c)] =
+          kBreakSigmas * std::max(usual, std::abs(check.jump(c, step)));
+    }
+    priors_.breaks.push_back(one);
+    break_score_.push_back(check.score.col(step).cwiseAbs().maxCoeff());
+  }
 }
 
 /// Mount and sensor with what was found.
@@ -514,33 +652,71 @@ void FlightWork::fill_mount_and_sensor() {
   result_.mount.covariance = named(all_rows);
 }
 
-/// What one more step would do if the clock could drift and what is held, though it may be off,
-/// were free; and how well that is known.
-void FlightWork::test_assumptions() {
+/// Equations in which the clock may drift, attitudes may be late, and what is held, though it may
+/// be off, is free.
+FlightWork::TestedSystem FlightWork::tested_system() const {
   const std::vector<std::int64_t>& times = full_.shots.time_ns;
   FlightModel model = smooth_;
   model.drift_about_ns = times.front() + (times.back() - times.front()) / 2;
-  const auto considered = static_cast<Index>(start_.considered);
-  const Index drift = model.unknowns().clock_drift(), first = drift - considered;
+  model.attitude_delay = true;
+  const Index drift = model.unknowns().clock_drift(), delay = model.unknowns().attitude_delay(),
+              size = model.unknowns().size();
   FlightPriors priors = priors_;
-  priors.mean.conservativeResizeLike(VectorXd::Zero(drift + 1));
-  priors.information.conservativeResizeLike(MatrixXd::Zero(drift + 1, drift + 1));
+  priors.mean.conservativeResizeLike(VectorXd::Zero(size));
+  priors.information.conservativeResizeLike(MatrixXd::Zero(size, size));
   priors.information(drift, drift) = 1 / (kDriftPrior * kDriftPrior);
-  priors.held.push_back(false);
-  for (Index i = first; i < drift; ++i) {
+  priors.information(delay, delay) = 1 / (kDelayPrior * kDelayPrior);
+  priors.held.resize(static_cast<std::size_t>(size), false);
+  for (Index i = drift - static_cast<Index>(start_.considered); i < drift; ++i) {
     priors.information(i, i) = 1 / (kHeldPrior * kHeldPrior);
     priors.held[static_cast<std::size_t>(i)] = false;
   }
-  const FlightSystem system(
+  FlightSystem system(
       flight_equations(full_.shots, full_.poses, full_.cells.plane, model, final_weights_), model,
       priors);
-  const Index tested = considered + 1, at = system.size() - tested;
+  return {std::move(model), std::move(priors), std::move(system)};
+}
+
+/// Whether corrections fit their process once what is tested is free: then it is to blame, and the
+/// trajectory is not.
+bool FlightWork::assumptions_explain() const {
+  const TestedSystem tested = tested_system();
+  const VectorXd step = tested.system.step().unknowns;
+  const MatrixXd corrections =
+      model_.corrections + Eigen::Map<const MatrixXd>(step.data(), kCorrections,
+                                                      static_cast<Index>(model_.knots.size()));
+  const ProcessCheck check =
+      check_process(model_.knots, corrections, priors_, tested.system.inverse_band());
+  return jumps_of(model_.knots, check).empty() &&
+         process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
+}
+
+/// What one more step would do with those equations, and how well that is known.
+void FlightWork::test_assumptions() {
+  const auto [model, priors, system] = tested_system();
+  const auto considered = static_cast<Index>(start_.considered);
+  const Index size = model.unknowns().size(), first = model.unknowns().clock_drift() - considered;
+  const Index tested = considered + 2, at = system.size() - tested;
   MatrixXd functionals = MatrixXd::Zero(system.size(), tested);
   functionals.bottomRows(tested).setIdentity();
   const VectorXd steps = system.step().unknowns.segment(at, tested);
-  const MatrixXd covariance = flight_covariance(full_.shots, full_.poses, full_.cells.plane, model,
-                                                final_weights_, priors, system, functionals);
+  const MatrixXd covariance =
+      flight_covariance(full_.shots, full_.poses, full_.cells.plane, model, final_weights_, priors,
+                        system, functionals, rough_ ? &*rough_ : nullptr);
   judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)));
+  judge_attitude_delay(steps[considered + 1],
+                       std::sqrt(covariance(considered + 1, considered + 1)));
+  const AttitudeDelay& late = result_.attitude_delay;
+  const auto clock = static_cast<Index>(FlightUnknowns::clock_offset());
+  const double clock_off = std::abs(model_.clock_offset - options_.mount.clock_offset.value);
+  if (std::abs(late.value) > kDelayConsidered * late.sigma ||
+      (!priors_.held[static_cast<std::size_t>(clock)] &&
+       clock_off > kDelayConsidered * start_.prior_sigma[clock])) {
+    // By how much everything else moves where the delay is free.
+    const VectorXd moves = system.solve(VectorXd::Unit(system.size(), system.size() - 1));
+    may_be_off_ = std::hypot(late.value, late.sigma) / moves[moves.size() - 1] *
+                  moves.segment(system.size() - size, model_.unknowns().size());
+  }
   const std::vector<std::string> names = unknown_names(model_);
   const VectorXd values = unknown_values(model_);
   for (Index i = 0; i < considered; ++i) {
@@ -567,6 +743,77 @@ void FlightWork::judge_clock_drift(double value, double sigma) {
       "sigmas. Synchronise the sensor's clock by PPS or PTP, or calibrate shorter parts of the "
       "flight",
       1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds));
+}
+
+void FlightWork::judge_attitude_delay(double value, double sigma) {
+  AttitudeDelay& found = result_.attitude_delay;
+  found.value = value;
+  found.sigma = sigma;
+  found.significant = std::abs(found.value) > kDelaySigmas * found.sigma;
+  if (!found.significant) return;
+  result_.warnings.push_back(
+      in_words(found) +
+      "; a clock offset moves positions and attitudes together and cannot describe that, so clock "
+      "offset and lever arm are off by more than their sigmas. Correct the time stamps of the "
+      "attitudes, and calibrate again");
+}
+
+/// A clock offset that takes what it cannot be is an error of something else.
+void FlightWork::judge_clock_offset() {
+  const FlightUnknown& clock =
+      result_.unknowns[static_cast<std::size_t>(FlightUnknowns::clock_offset())];
+  if (clock.held) return;
+  result_.clock_contradicts = std::abs(clock.value - clock.start) >
+                              kClockSigmas * std::hypot(clock.prior_sigma, clock.sigma);
+  if (result_.clock_contradicts) {
+    result_.warnings.push_back(clock_in_words(result_) +
+                               "; correct the times or what the mount states of them");
+  }
+}
+
+/// What was mended of the trajectory, in numbers and words.
+void FlightWork::fill_trajectory_fit() {
+  TrajectoryFit& fit = result_.trajectory_fit;
+  for (int c = 0; c < kCorrections; ++c) {
+    fit.factor[static_cast<std::size_t>(c)] = process_factor_[static_cast<Index>(error_of(c))];
+  }
+  const TrajectoryKnots& knots = model_.knots;
+  for (std::size_t i = 0; i < priors_.breaks.size(); ++i) {
+    const std::size_t knot = priors_.breaks[i].knot;
+    TrajectoryJump& jump = fit.jumps.emplace_back();
+    jump.begin_ns = knots.time_ns[knot];
+    jump.end_ns = knots.time_ns[knot + 1];
+    jump.strip = knots.strip[knot];
+    jump.between_strips = knots.strip[knot] != knots.strip[knot + 1];
+    jump.score = break_score_[i];
+    for (int c = 0; c < kCorrections; ++c) {
+      const Index at = kCorrections * static_cast<Index>(knot) + c, next = at + kCorrections;
+      const auto own = static_cast<std::size_t>(c);
+      const double change = model_.corrections(c, static_cast<Index>(knot) + 1) -
+                            model_.corrections(c, static_cast<Index>(knot));
+      // Corrections turn about up, and headings about down.
+      jump.size[own] = error_of(c) == trajectories::PoseError::heading ? change : -change;
+      jump.sigma[own] =
+          std::sqrt(std::max(0.0, band_.diagonal[at] + band_.diagonal[next] - 2 * band_.next[at]));
+    }
+  }
+  std::sort(
+      fit.jumps.begin(), fit.jumps.end(),
+      [](const TrajectoryJump& a, const TrajectoryJump& b) { return a.begin_ns < b.begin_ns; });
+  for (const TrajectoryJump& jump : fit.jumps) {
+    result_.warnings.push_back(in_words(jump, full_.shots.time_ns.front()) +
+                               "; it has a step of its own in the adjustment. Is there a loss of "
+                               "the GNSS fix, or an alignment, in the trajectory's log?");
+  }
+  for (int c = 0; c < kCorrections; ++c) {
+    const auto own = static_cast<std::size_t>(c);
+    if (fit.factor[own] == 1) continue;
+    result_.warnings.push_back(fmt::format(
+        "the trajectory's error {} is {:.2g} times as large as stated (chi2 of its corrections "
+        "{:.3g}, {:.3g} expected); the adjustment counts it as that large, and the sigmas with it",
+        correction_name(c), fit.factor[own], fit.chi2[own], fit.expected[own]));
+  }
+  if (!fit.fits) result_.warnings.push_back(misfit_in_words(result_));
 }
 
 void FlightWork::judge_held(HeldParameter held) {

@@ -213,6 +213,7 @@ class FlightCalls {
     a.place_begin = place_begin_.data();
     a.free_count = static_cast<int>(model.free.size());
     a.drift = model.drift_about_ns.has_value();
+    a.delay = model.attitude_delay;
     const Eigen::Matrix3d mount = model.nominal * model.boresight;
     for (Index i = 0; i < 9; ++i) a.body_from_sensor[i] = mount(i % 3, i / 3);
     copy(model.lever_arm, a.lever_arm);
@@ -294,6 +295,7 @@ std::vector<std::string> unknown_names(const FlightModel& model) {
   names.insert(names.end(), {"range_offset_m", of_mount.back()});
   for (const estimation::FreeParameter& parameter : model.free) names.push_back(parameter.name);
   if (model.drift_about_ns) names.emplace_back("clock_drift");
+  if (model.attitude_delay) names.emplace_back("attitude_delay_s");
   return names;
 }
 

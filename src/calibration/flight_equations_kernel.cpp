@@ -108,7 +108,7 @@ struct FlightConstants {
 
 template <int N>
 constexpr std::size_t most_columns() {
-  return kMountColumns + EmitterLanes<Batch, N>::kPlaces + 1 + 2 * kKnot + 1;
+  return kMountColumns + EmitterLanes<Batch, N>::kPlaces + 2 + 2 * kKnot + 1;
 }
 
 /// Lane by lane, [shots][columns].
@@ -252,6 +252,11 @@ FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
     const Batch by_drift = by_clock * (shot.knot_weight * Batch(1e-9 / a.per_ns) + Batch(a.since));
     put(column, by_drift);
     out.add(by_drift);
+  }
+  if (a.delay) {
+    const Batch by_delay = dot(by_turn, shot.angular_velocity);
+    put(column, by_delay);
+    out.add(by_delay);
   }
   out.add(by_point);
   out.add(by_turn);

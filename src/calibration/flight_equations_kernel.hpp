@@ -38,6 +38,7 @@ struct FlightArguments {
   const int* place_begin = nullptr;
   int free_count = 0;
   bool drift = false;               ///< one more column behind those: the drift of the clock
+  bool delay = false;               ///< and one behind it: a delay of the attitudes
   double since = 0;                 ///< begin_ns after the time about which the clock drifts, s
   double body_from_sensor[9] = {};  ///< column by column
   double lever_arm[3] = {};
@@ -62,15 +63,18 @@ struct FlightArguments {
   std::size_t run_count = 0;
 
   /// Columns of the unknowns that the whole flight shares.
-  int global_count() const { return kMountColumns + free_count + (drift ? 1 : 0); }
+  int global_count() const {
+    return kMountColumns + free_count + (drift ? 1 : 0) + (delay ? 1 : 0);
+  }
 
-  /// Products of the columns [mount, train, drift, first knot 6, second knot 6, residual]: upper
-  /// triangle.
+  /// Products of the columns [mount, train, drift, delay, first knot 6, second knot 6, residual]:
+  /// upper triangle.
   double* products = nullptr;
   /// [runs][3][columns of products + 3]: of the plane's columns with those and with its own.
   double* plane_products = nullptr;
-  /// [shots of the runs][mount, train, drift, knot 6, plane 3, residual, variance, weight], not
-  /// weighted, or nullptr. The variance is the shot's own, without that of the attitude.
+  /// [shots of the runs][mount, train, drift, delay, knot 6, plane 3, residual, variance,
+  /// weight], not weighted, or nullptr. The variance is the shot's own, without that of the
+  /// attitude.
   double* rows = nullptr;
 };
 

@@ -147,16 +147,18 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
         MatrixXd::Identity(kCorrections, kCorrections) / static_cast<double>(knots);
   }
   const MatrixXd all = flight_covariance(e.shots, e.poses, e.plane, e.model, e.weights, e.priors,
-                                         e.system, functionals);
+                                         e.system, functionals, e.ground);
   result.not_told = not_told_of(e, all);
   // What was held and may be off, one sigma each, moves everything else along.
   const MatrixXd changes = e.system.held_changes();
-  MatrixXd movement = MatrixXd::Zero(globals, globals + static_cast<Index>(e.considered));
+  const auto considered = static_cast<Index>(e.considered);
+  MatrixXd movement = MatrixXd::Zero(globals, globals + considered + e.further.cols());
+  if (e.further.cols() > 0) movement.rightCols(e.further.cols()) = e.further;
   movement.leftCols(globals) = root_of(all.topLeftCorner(globals, globals));
   Index column = 0, of_considered = globals;
   for (Index i = 0; i < globals; ++i) {
     if (!e.priors.held[static_cast<std::size_t>(i)]) continue;
-    if (i >= globals - static_cast<Index>(e.considered)) {
+    if (i >= globals - considered) {
       movement.col(of_considered) = e.prior_sigma[i] * changes.col(column).tail(globals);
       movement(i, of_considered++) = e.prior_sigma[i];
     }
@@ -165,7 +167,8 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
   result.datum = datum_of(e, movement);
   const MatrixXd rates = value_rates(e.model);
   result.covariance = rates * movement * movement.transpose() * rates.transpose();
-  const VectorXd diagonal = e.system.inverse_diagonal();
+  const VectorXd diagonal =
+      e.inverse_diagonal != nullptr ? *e.inverse_diagonal : e.system.inverse_diagonal();
   result.correction_sigma = Eigen::Map<const MatrixXd>(diagonal.data(), kCorrections, knots);
   result.correction_sigma = result.correction_sigma.cwiseSqrt().eval();
 

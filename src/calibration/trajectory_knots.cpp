@@ -157,31 +157,43 @@ Eigen::MatrixXd resampled(const TrajectoryKnots& from, const Eigen::MatrixXd& co
   return result;
 }
 
-KnotInformation knot_information(const TrajectoryKnots& knots,
-                                 const trajectories::ErrorProcess& process, int correction) {
+KnotSteps knot_steps(const TrajectoryKnots& knots, const trajectories::ErrorProcess& process,
+                     int correction, const std::vector<ProcessBreak>& breaks) {
   const double time = correlation_time(process, correction);
+  KnotSteps steps{std::vector<double>(knots.size()), std::vector<double>(knots.size())};
+  double before = 0;
+  for (std::size_t k = 0; k < knots.size(); ++k) {
+    const double sigma = sigma_at(process, correction, knots.time_ns[k]);
+    steps.sigma[k] = sigma;
+    if (k > 0) {
+      const double apart = seconds(knots.time_ns[k] - knots.time_ns[k - 1]);
+      // In sigmas of the process, whose variance is 1 everywhere.
+      steps.decay[k] = std::exp(-apart / time) * sigma / before;
+      // Both knots of two strips may have one time: what they have in common is then known well.
+      steps.sigma[k] *= std::sqrt(std::max(-std::expm1(-2 * apart / time), 1e-12));
+    }
+    before = sigma;
+  }
+  for (const ProcessBreak& one : breaks) {
+    require_place("knot before a break", one.knot + 1, knots.size());
+    double& sigma = steps.sigma[one.knot + 1];
+    sigma = std::hypot(sigma, one.sigma[static_cast<std::size_t>(correction)]);
+  }
+  return steps;
+}
+
+KnotInformation knot_information(const TrajectoryKnots& knots,
+                                 const trajectories::ErrorProcess& process, int correction,
+                                 const std::vector<ProcessBreak>& breaks) {
+  const KnotSteps steps = knot_steps(knots, process, correction, breaks);
   KnotInformation result{std::vector<double>(knots.size()),
                          std::vector<double>(knots.size() > 0 ? knots.size() - 1 : 0)};
-  if (knots.size() == 0) return result;
-  // Of the corrections in their sigmas, whose process has a variance of 1 everywhere.
-  result.diagonal[0] = 1;
-  for (std::size_t k = 1; k < knots.size(); ++k) {
-    const double step = seconds(knots.time_ns[k] - knots.time_ns[k - 1]);
-    // Of the later value given the earlier one, decay times which it is expected.
-    const double decay = std::exp(-step / time);
-    // Both knots of two strips may have one time: what they have in common is then known well.
-    const double known = std::min(-1 / std::expm1(-2 * step / time), 1e12);
-    result.diagonal[k] += known;
-    result.diagonal[k - 1] += decay * decay * known;
-    result.next[k - 1] = -decay * known;
-  }
-  double sigma = sigma_at(process, correction, knots.time_ns[0]);
   for (std::size_t k = 0; k < knots.size(); ++k) {
-    result.diagonal[k] /= sigma * sigma;
-    if (k + 1 == knots.size()) break;
-    const double behind = sigma_at(process, correction, knots.time_ns[k + 1]);
-    result.next[k] /= sigma * behind;
-    sigma = behind;
+    const double known = 1 / (steps.sigma[k] * steps.sigma[k]);
+    result.diagonal[k] += known;
+    if (k == 0) continue;
+    result.diagonal[k - 1] += steps.decay[k] * steps.decay[k] * known;
+    result.next[k - 1] = -steps.decay[k] * known;
   }
   return result;
 }

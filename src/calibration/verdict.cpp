@@ -15,6 +15,8 @@
 #include "risley/core/number_text.hpp"
 #include "risley/core/random.hpp"
 
+#include "calibration/flight_words.hpp"
+
 namespace risley::calibration {
 namespace {
 
@@ -241,6 +243,7 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
     return {CalibrationCode::undecided, in_words(held, c.sensor),
             "estimate " + held.name + " as well (option additional)"};
   }
+  if (auto contradiction = contradiction_of(c)) return *contradiction;
   // Of the change of some unknowns, and how many these are.
   const auto significance = [&](std::size_t from) {
     std::vector<Eigen::Index> rows;

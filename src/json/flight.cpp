@@ -113,6 +113,44 @@ Json held_json(const FlightCalibration& c) {
   return object;
 }
 
+/// One value for each of the six errors of a trajectory, lengths in m, angles in degrees.
+template <class Value>
+Json errors_json(const Value& value) {
+  static constexpr const char* kNames[calibration::kCorrections] = {
+      "east", "north", "up", "tilt_east", "tilt_north", "heading"};
+  Json object = Json::object();
+  for (int c = 0; c < calibration::kCorrections; ++c) object[kNames[c]] = value(c);
+  return object;
+}
+
+Json trajectory_fit_json(const FlightCalibration& c) {
+  const calibration::TrajectoryFit& fit = c.trajectory_fit;
+  const std::int64_t begin_ns = c.model.knots.time_ns.front();
+  Json jumps = Json::array();
+  for (const calibration::TrajectoryJump& jump : fit.jumps) {
+    const auto since = [&](std::int64_t time_ns) { return 1e-9 * double(time_ns - begin_ns); };
+    const auto in_unit = [](int error, double value) { return error < 3 ? value : deg(value); };
+    jumps.push_back({{"begin_s", since(jump.begin_ns)},
+                     {"end_s", since(jump.end_ns)},
+                     {"strip", jump.strip + 1},
+                     {"between_strips", jump.between_strips},
+                     {"sigmas", jump.score},
+                     {"size", errors_json([&](int e) {
+                        const auto at = static_cast<std::size_t>(e);
+                        return Json{{"value", in_unit(e, jump.size[at])},
+                                    {"sigma", in_unit(e, jump.sigma[at])}};
+                      })}});
+  }
+  return {{"fits", fit.fits},
+          {"errors", errors_json([&](int e) {
+             const auto at = static_cast<std::size_t>(e);
+             return Json{{"chi2", fit.chi2[at]},
+                         {"expected", fit.expected[at]},
+                         {"factor", fit.factor[at]}};
+           })},
+          {"jumps", jumps}};
+}
+
 Json lengths_json(const Eigen::Vector3d& v) {
   return {{"east", number_or_null(v.x())},
           {"north", number_or_null(v.y())},
@@ -153,6 +191,12 @@ Json of(const jobs::CalibratedFlight& found) {
                   {{"value", 1e6 * c.clock_drift.value},
                    {"sigma", 1e6 * c.clock_drift.sigma},
                    {"significant", c.clock_drift.significant}}},
+                 {"clock_contradicts", c.clock_contradicts},
+                 {"attitude_delay_s",
+                  {{"value", c.attitude_delay.value},
+                   {"sigma", c.attitude_delay.sigma},
+                   {"significant", c.attitude_delay.significant}}},
+                 {"trajectory", trajectory_fit_json(c)},
                  {"range_offset_m", stated(FlightUnknowns::range_offset())},
                  {"held", held_json(c)},
                  {"parameters", parameters},
@@ -168,7 +212,8 @@ Json of(const jobs::CalibratedFlight& found) {
                  {"rough_cells", c.rough_cells},
                  {"knots", c.model.knots.size()},
                  {"sigma0", c.sigma0},
-                 {"range_sigma_m", c.range_sigma}};
+                 {"range_sigma_m", c.range_sigma},
+                 {"roughness_m", c.roughness}};
   add_end(found, object);
   return object;
 }

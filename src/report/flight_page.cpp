@@ -422,20 +422,35 @@ std::string shots_html(const FlightReport& r) {
                           : fmt::format(", and {} because the trajectory has no pose for them",
                                         count_text(r.without_pose)),
       count_text(r.rough_cells));
-  return html + fmt::format(
-                    "<p>The residuals scatter {} times as much as the stated noise of the ranges "
-                    "predicts: the noise of one range is {} mm.</p>\n",
-                    finite_text("{:.3g}", r.sigma0), millimetres(r.range_sigma));
+  html += fmt::format(
+      "<p>The residuals scatter {} times as much as the stated noise of the ranges predicts: the "
+      "noise of one range is {} mm.</p>\n",
+      finite_text("{:.3g}", r.sigma0), millimetres(r.range_sigma));
+  if (r.roughness.value_or(0) > 0) {
+    html += fmt::format(
+        "<p>Of that, {} mm are the ground itself, which departs from a plane within each cell; all "
+        "strips see the same, and the uncertainties account for it.</p>\n",
+        millimetres(*r.roughness));
+  }
+  return html;
 }
 
 std::string corrections_html(const FlightReport& r, Figures& figures) {
+  std::string delay;
+  if (r.attitude_delay && r.attitude_delay_sigma) {
+    const NumberText text =
+        number_text(1e3 * *r.attitude_delay, 1e3 * r.attitude_delay_sigma.value());
+    delay = fmt::format(
+        "<p>According to the strips, attitudes are late against positions by {} ± {} ms.</p>\n",
+        text.value, text.sigma);
+  }
   return fmt::format(
              "<p>Position and attitude are corrected at {} knots, points in time {} s apart, and "
              "linearly between. σ is their remaining uncertainty. Corrections should be about as "
-             "large as the errors stated for the trajectory; much larger ones mean that these "
-             "were stated too small, or that axes or times are wrong.</p>\n",
+             "large as the errors stated for the trajectory; where they jump or are larger, a "
+             "warning says so, and the uncertainties account for it.</p>\n",
              count_text(r.knots), finite_text("{:.3g}", r.knot_spacing)) +
-         charts_html(r.correction_charts, figures);
+         delay + charts_html(r.correction_charts, figures);
 }
 
 std::string correlations_html(const FlightReport& r) {

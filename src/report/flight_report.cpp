@@ -408,6 +408,9 @@ FlightReport flight_report(const FlightReportInput& input) {
   report.rms_after = c.rms_after;
   report.sigma0 = c.sigma0;
   report.range_sigma = c.range_sigma;
+  report.roughness = c.roughness;
+  report.attitude_delay = c.attitude_delay.value;
+  report.attitude_delay_sigma = c.attitude_delay.sigma;
   report.strip_count = input.details.strip_count;
   for (const FlightStrip& strip : input.details.strips) {
     report.strips.push_back({strip.strip, strip.begin, strip.duration, strip.course, strip.sway,

@@ -465,6 +465,9 @@ void fields(Archive& archive, T& report) {
   archive("rms_after_m", report.rms_after);
   archive("sigma0", report.sigma0);
   archive("range_sigma_m", report.range_sigma);
+  archive("roughness_m", report.roughness);
+  archive("attitude_delay_s", report.attitude_delay);
+  archive("attitude_delay_sigma_s", report.attitude_delay_sigma);
   archive("strip_count", report.strip_count);
   archive("strips", report.strips);
   archive("knots", report.knots);

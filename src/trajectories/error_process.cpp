@@ -193,6 +193,15 @@ ErrorProcess::ErrorProcess(const ErrorModel& model, const Trajectory& trajectory
   }
 }
 
+ErrorProcess ErrorProcess::scaled(const PoseErrorVector& factors) const {
+  for (Eigen::Index i = 0; i < factors.size(); ++i) {
+    require_above("factor of a process", factors[i], 0);
+  }
+  ErrorProcess result = *this;
+  for (PoseErrorVector& sigmas : result.sigmas_) sigmas = sigmas.cwiseProduct(factors);
+  return result;
+}
+
 PoseErrorVector ErrorProcess::sigmas(std::int64_t time_ns) const {
   if (time_ns_.empty() || time_ns <= time_ns_.front()) return sigmas_.front();
   if (time_ns >= time_ns_.back()) return sigmas_.back();

@@ -196,6 +196,13 @@ struct Flight {
           row[FlightUnknowns::clock_offset()] * 1e-9 *
           static_cast<double>(shots.time_ns[i] - *model.drift_about_ns);
     }
+    if (model.attitude_delay) {
+      const auto& rate = poses.pose[i].angular_velocity;
+      Eigen::Matrix<double, 6, 1> late = Eigen::Matrix<double, 6, 1>::Zero();
+      late.tail<3>() = Vector3d(rate[0], rate[1], rate[2]);
+      row[model.unknowns().attitude_delay()] =
+          slope(1e-4, [&](double h) { return predicted(model, i, h * late, model.train); });
+    }
     for (int k = 0; k < 6; ++k) {
       row[globals + k] = slope(k < 3 ? 1e-3 : 1e-5, [&](double h) {
         return predicted(model, i, h * Eigen::Matrix<double, 6, 1>::Unit(k));
@@ -239,6 +246,7 @@ TEST_P(EveryTrain, DerivativesAreThoseOfThePredictedRange) {
   for (const InstructionSet set : available_instruction_sets()) {
     if (set == available_instruction_sets().back()) {
       flight.model.drift_about_ns = flight.shots.time_ns[flight.shots.size() / 3];
+      flight.model.attitude_delay = true;
     }
     const Eigen::MatrixXd rows = flight.rows(set);
     const int globals = flight.model.unknowns().size();
@@ -280,6 +288,7 @@ INSTANTIATE_TEST_SUITE_P(Trains, EveryTrain,
 TEST(FlightEquations, AreTheSumsOfTheRows) {
   Flight flight("PA-AP");
   flight.model.drift_about_ns = flight.shots.time_ns[flight.shots.size() / 3];
+  flight.model.attitude_delay = true;
   flight.weights.white = {1e-3, 2e-3, 3e-3, 1e-4, 2e-4, 3e-4};
   flight.weights.sample_interval = 0.02;
   std::vector<double> together(flight.model.knots.intervals.size());  // in a sample, on average

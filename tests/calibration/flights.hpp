@@ -91,6 +91,39 @@ struct Roof {
 
 enum class Ground { flat, relief, village };
 
+/// A jump of the trajectory's errors.
+struct FlightJump {
+  std::size_t strip = 0;
+  double begin = 0;              ///< s of the strip at which it comes
+  double end = 1e9;              ///< s of the same strip at which it goes again
+  std::array<double, 6> size{};  ///< true less measured, in the order of the corrections, m, deg
+};
+
+/// Heights of rough ground: a Gaussian process with a squared exponential covariance, as waves.
+class Roughness {
+ public:
+  Roughness() = default;
+  Roughness(std::mt19937_64& generator, double sigma, double length) {
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> uniform(0, 2 * std::numbers::pi);
+    constexpr int kWaves = 48;
+    for (int i = 0; i < kWaves; ++i) {
+      waves_.push_back(
+          {normal(generator) / length, normal(generator) / length, uniform(generator)});
+    }
+    amplitude_ = sigma * std::sqrt(2.0 / kWaves);
+  }
+  double at(double x, double y) const {
+    double sum = 0;
+    for (const auto& [east, north, phase] : waves_) sum += std::cos(east * x + north * y + phase);
+    return amplitude_ * sum;
+  }
+
+ private:
+  double amplitude_ = 0;
+  std::vector<std::array<double, 3>> waves_;
+};
+
 struct FlightSettings {
   Ground ground = Ground::village;
   double strip_length = 80, height = 80, speed = 5;  // m, m/s
@@ -105,7 +138,10 @@ struct FlightSettings {
   Eigen::Vector3d boresight_deg{2, -1.5, 1};
   Eigen::Vector3d lever_arm{0.10, 0.05, 0.12};
   double range_offset = 0.01, clock_offset = 0.001;
-  double clock_drift = 0;  ///< s/s that the trajectory's clock gains, about the flight's middle
+  double clock_drift = 0;     ///< s/s that the trajectory's clock gains, about the flight's middle
+  double attitude_delay = 0;  ///< by which the attitudes of the trajectory are late, s
+  std::vector<FlightJump> jumps{};
+  double roughness = 0, roughness_length = 1;  ///< of level ground: sigma and correlation, m
   std::uint64_t seed = 1;
 };
 
@@ -118,6 +154,8 @@ class SimulatedFlight {
     nominal << 0, 0, 1, 0, -1, 0, 1, 0, 0;
     boresight = flight_rotation(settings.boresight_deg * std::numbers::pi / 180);
     if (settings.ground == Ground::village) build();
+    std::mt19937_64 of_ground(settings.seed + 990);
+    rough_ = Roughness(of_ground, settings.roughness, settings.roughness_length);
     fly();
     shoot();
   }
@@ -126,6 +164,12 @@ class SimulatedFlight {
   void pose(double time, Eigen::Vector3d& position, Eigen::Matrix3d& attitude) const {
     const auto strip = std::min<std::size_t>(static_cast<std::size_t>(time / period()),
                                              settings_.headings_deg.size() - 1);
+    pose_of_strip(strip, time, position, attitude);
+  }
+
+  /// The same of a strip, a little before it begins or after it ends, too.
+  void pose_of_strip(std::size_t strip, double time, Eigen::Vector3d& position,
+                     Eigen::Matrix3d& attitude) const {
     const double begin = static_cast<double>(strip) * period();
     const double heading = settings_.headings_deg[strip] * std::numbers::pi / 180;
     const double along = settings_.speed * (time - begin - 0.5 * duration() - kLead);
@@ -145,14 +189,17 @@ class SimulatedFlight {
                   std::size_t& surface) const {
     surface = 0;
     double range = -start.z() / direction.z();
-    if (settings_.ground == Ground::relief) {
+    const bool hills = settings_.ground == Ground::relief;
+    if (hills || settings_.roughness > 0) {
       for (int i = 0; i < 50; ++i) {
         const Eigen::Vector3d point = start + range * direction;
-        const double change = (relief(point.x(), point.y()) - point.z()) / direction.z();
+        const double hill = hills ? relief(point.x(), point.y()) : 0;
+        const double rough = settings_.roughness > 0 ? rough_.at(point.x(), point.y()) : 0;
+        const double change = (hill + rough - point.z()) / direction.z();
         range += change;
-        if (std::abs(change) < 1e-12) break;
+        if (std::abs(change) < (hills ? 1e-12 : 1e-5)) break;
       }
-      return range;
+      if (hills) return range;
     }
     const Eigen::Vector2d ground = (start + range * direction).head<2>();
     for (std::size_t i = 0; i < roofs.size(); ++i) {
@@ -306,9 +353,22 @@ class SimulatedFlight {
             off[c] += term_of(c).white * normal(generator_);
           }
         }
-        Eigen::Vector3d position;
-        Eigen::Matrix3d attitude;
+        for (const FlightJump& jump : settings_.jumps) {
+          const double since = time - begin - kLead;
+          if (s < jump.strip || (s == jump.strip && since < jump.begin)) continue;
+          if (jump.end < duration() && (s > jump.strip || since >= jump.end)) continue;
+          for (int c = 0; c < 6; ++c) {
+            const double size = jump.size[static_cast<std::size_t>(c)];
+            off[c] += c < 3 ? size : radians_from_degrees(size);
+          }
+        }
+        Eigen::Vector3d position, elsewhere;
+        Eigen::Matrix3d attitude, late;
         pose(time, position, attitude);
+        if (settings_.attitude_delay != 0) {
+          pose_of_strip(s, time - settings_.attitude_delay, elsewhere, late);
+          attitude = late;
+        }
         error.push_back(off);
         trajectory.time_ns.push_back(std::llround(time * 1e9) + kEpoch);
         trajectory.position.push_back(position - off.head<3>());
@@ -381,6 +441,7 @@ class SimulatedFlight {
   FlightSettings settings_;
   std::mt19937_64 generator_;
   std::array<Sway, 3> angle_, velocity_;
+  Roughness rough_;
 };
 
 /// What a calibration is off by.

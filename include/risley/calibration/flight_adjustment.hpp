@@ -31,6 +31,7 @@ struct FlightPriors {
   Eigen::MatrixXd information;       ///< [globals, globals], inverse of its covariance; 0: nothing
   std::vector<bool> held{};          ///< [globals]: not to be adjusted; empty: none
   std::vector<PlanePrior> planes{};  ///< of those that are known, at most one for each
+  std::vector<ProcessBreak> breaks{};  ///< of the process, at knots of the model
 };
 
 /// Values of the unknowns [globals], the boresight as a rotation vector of up to half a turn.
@@ -73,8 +74,15 @@ class FlightSystem {
   Eigen::MatrixXd planes_of(const Eigen::MatrixXd& solution) const;
   /// The inverse of the equations [size, size].
   Eigen::MatrixXd inverse() const;
+  /// The part of inverse() that neighbouring knots share, in less memory than the whole.
+  struct Band {
+    Eigen::VectorXd diagonal;  ///< [size]
+    /// [6 (knots - 1)]: between a correction at a knot and the same one at the next.
+    Eigen::VectorXd next;
+  };
+  Band inverse_band() const;
   /// Diagonal of inverse() [size], in less memory than the whole.
-  Eigen::VectorXd inverse_diagonal() const;
+  Eigen::VectorXd inverse_diagonal() const { return inverse_band().diagonal; }
   /// By how much the unknowns move where a held global is off by one unit [size, held].
   Eigen::MatrixXd held_changes() const;
   /// The priors' part of the equations times columns [size, columns].
@@ -116,16 +124,29 @@ FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
                                const FlightAdjustmentOptions& options = {},
                                const Progress& progress = {});
 
+/// How ground departs from its planes, which all strips see alike: a covariance between the patches
+/// of a cell, of some cells that stand for all.
+struct RoughGround {
+  static constexpr int kSide = 3, kPatches = kSide * kSide;  ///< of a cell
+  /// Along the ranges, between the patches, m^2.
+  Eigen::Matrix<double, kPatches, kPatches> covariance =
+      Eigen::Matrix<double, kPatches, kPatches>::Zero();
+  std::vector<std::int8_t> patch;  ///< [shots]; -1: of a cell that does not count
+  double cells_for_each = 1;       ///< that counts
+};
+
 /// How far linear functions of the solution are off.
 /// @param functionals  [size, functions], of the unknowns of the system
 /// @return covariance of all [functions, functions]: of the ranges' own noise, of the white noise
 ///         of the attitude that the shots of a sample share, of what the trajectory's process does
 ///         between knots, and of the priors, whatever the weights were
+/// @param ground  rough ground, or nullptr: planes
 /// @throws as flight_equations
 Eigen::MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
                                   const PlaneOfShot& plane, const FlightModel& model,
                                   const FlightWeights& weights, const FlightPriors& priors,
                                   const FlightSystem& system, const Eigen::MatrixXd& functionals,
+                                  const RoughGround* ground = nullptr,
                                   InstructionSet set = best_instruction_set());
 
 }  // namespace risley::calibration

@@ -68,6 +68,35 @@ struct ClockDrift {
   bool significant = false;
 };
 
+/// Attitudes of the trajectory that lag behind its positions, as the flight shows it.
+struct AttitudeDelay {
+  double value = 0, sigma = 0;  ///< s; above 0: attitudes are late
+  /// Beyond chance: what was found holds for attitudes that are on time, and they are not.
+  bool significant = false;
+};
+
+/// Where the errors of the trajectory jump, beyond what is stated of them.
+struct TrajectoryJump {
+  std::int64_t begin_ns = 0, end_ns = 0;  ///< between which, by the recording's clock
+  std::size_t strip = 0;                  ///< from 0; of a jump between strips the one before it
+  bool between_strips = false;
+  double score = 0;  ///< how far it is beyond the stated process, in sigmas
+  /// By which what the trajectory states jumps against the truth, in the order of the corrections,
+  /// m and rad; the heading clockwise.
+  std::array<double, kCorrections> size{}, sigma{};
+};
+
+/// How the corrections of the trajectory fit what is stated of its errors.
+struct TrajectoryFit {
+  /// [6] in the order of the corrections: squared sigmas by which they move from knot to knot, and
+  /// what was expected of them; both as stated, before anything was mended.
+  std::array<double, kCorrections> chi2{}, expected{};
+  /// On the stated sigmas: 1 where they fit.
+  std::array<double, kCorrections> factor{1, 1, 1, 1, 1, 1};
+  std::vector<TrajectoryJump> jumps;  ///< by time; each has a step of its own in the adjustment
+  bool fits = true;                   ///< after that
+};
+
 /// A parameter that the adjustment holds and that may be off, as the flight itself tells it.
 struct HeldParameter {
   std::string name;
@@ -100,13 +129,20 @@ struct FlightCalibration : FlightJudgement {
   double tolerance = 0;          ///< that it was judged by, rad; 0: none
   FlightModel model;             ///< with corrections at the knots and planes, in the tangent frame
   ClockDrift clock_drift;
+  AttitudeDelay attitude_delay;
+  /// Beyond chance: the clock offset contradicts what is stated of it.
+  bool clock_contradicts = false;
+  TrajectoryFit trajectory_fit;
   std::vector<HeldParameter> held;   ///< indices that recordings told, above all
   std::vector<SeenControl> control;  ///< in the order of the options
   std::vector<StripPair> pairs_before, pairs_after;
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m
   double sigma0 = 1;       ///< standard deviation of unit weight against the stated range noise
   double range_sigma = 0;  ///< of one range, as found, m
-  std::size_t shots = 0;   ///< given
+  /// Of this, what shots close to each other share because the ground is no plane, 1 sigma, m; 0
+  /// where chance explains it.
+  double roughness = 0;
+  std::size_t shots = 0;         ///< given
   std::size_t without_pose = 0;  ///< of these: outside the trajectory or in a gap of it
   std::size_t used = 0, outliers = 0;
   std::size_t cells = 0, rough_cells = 0;

@@ -34,17 +34,18 @@ struct GroundPlane {
 ///   6        range offset, m
 ///   7        clock offset, s
 ///   8 ..     free parameters of the train
-///   last     drift of the clock, s/s, where it is tested
+///   behind   drift of the clock, s/s, and delay of the attitudes, s, where these are tested
 struct FlightUnknowns {
   int free = 0;
-  bool drift = false;
+  bool drift = false, delay = false;
   static constexpr int boresight(int axis) { return axis; }          ///< about X, Y, Z: 0 to 2
   static constexpr int lever_arm(int axis) { return 3 + axis; }      ///< along X, Y, Z: 0 to 2
   static constexpr int range_offset() { return 6; }                  ///< m
   static constexpr int clock_offset() { return 7; }                  ///< s
   static constexpr int parameter(int number) { return 8 + number; }  ///< of the free ones, from 0
   int clock_drift() const { return 8 + free; }                       ///< only where drift is set
-  int size() const { return 8 + free + (drift ? 1 : 0); }
+  int attitude_delay() const { return 8 + free + (drift ? 1 : 0); }  ///< only where delay is set
+  int size() const { return attitude_delay() + (delay ? 1 : 0); }
 };
 
 /// Everything that the range of a shot is predicted from. A point p of the sensor's frame is at
@@ -69,10 +70,13 @@ struct FlightModel {
   /// Where given, a drift of the clock of 0 about this time, ns, is one more unknown: its
   /// derivatives tell how much of one there is.
   std::optional<std::int64_t> drift_about_ns;
+  /// One more unknown: by how much the attitudes of the trajectory are late, now by 0 s. A record
+  /// then has the attitude that the body had so long before the record's time.
+  bool attitude_delay = false;
 
   /// The unknowns of this model beside the knots and the planes.
   FlightUnknowns unknowns() const {
-    return {static_cast<int>(free.size()), drift_about_ns.has_value()};
+    return {static_cast<int>(free.size()), drift_about_ns.has_value(), attitude_delay};
   }
 };
 

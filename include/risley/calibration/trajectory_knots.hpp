@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -47,6 +48,22 @@ TrajectoryKnots make_knots(const FlightShots& shots, double spacing);
 Eigen::MatrixXd resampled(const TrajectoryKnots& from, const Eigen::MatrixXd& corrections,
                           const TrajectoryKnots& to);
 
+/// A place where the errors of a trajectory may jump, beyond what the process says of them.
+struct ProcessBreak {
+  std::size_t knot = 0;                      ///< before it
+  std::array<double, kCorrections> sigma{};  ///< of the jump, m and rad
+};
+
+/// The process of one correction from knot to knot: it is expected to be `decay` times the value at
+/// the knot before, and is off from that by `sigma`. The first knot has a decay of 0.
+struct KnotSteps {
+  std::vector<double> decay, sigma;  ///< [knots]
+};
+/// Steps of a correction from knot to knot. A sigma of the process below 1e-7 (m, rad) counts as
+/// that. @param correction  from 0, see kCorrections
+KnotSteps knot_steps(const TrajectoryKnots& knots, const trajectories::ErrorProcess& process,
+                     int correction, const std::vector<ProcessBreak>& breaks = {});
+
 /// What a process says of one correction at all knots: the inverse of its covariance, which is
 /// tridiagonal. A sigma below 1e-7 (m, rad) counts as that.
 /// @param process  at the knots' times
@@ -56,7 +73,8 @@ struct KnotInformation {
 };
 /// What a process says of one correction. @param correction  from 0, see kCorrections
 KnotInformation knot_information(const TrajectoryKnots& knots,
-                                 const trajectories::ErrorProcess& process, int correction);
+                                 const trajectories::ErrorProcess& process, int correction,
+                                 const std::vector<ProcessBreak>& breaks = {});
 
 /// Covariance of what a correction does within an interval beside the straight line through its
 /// values at the ends, at the middles of equal parts [parts, parts]; with the sigma that the

@@ -51,6 +51,9 @@ struct FlightReport {
   std::vector<calibration::StripPair> pairs_before, pairs_after;  ///< with the most cells
   double rms_before = kUnknown, rms_after = kUnknown;             ///< of all, m
   double sigma0 = 0, range_sigma = kUnknown;                      ///< m
+  /// Of the ground within its cells, m; delay of the attitudes and its sigma, s. Not in files of
+  /// older versions.
+  std::optional<double> roughness, attitude_delay, attitude_delay_sigma;
 
   /// A strip as it was flown, without its places.
   struct Strip {

@@ -87,6 +87,10 @@ class ErrorProcess {
   ///         neither stated nor in the trajectory
   ErrorProcess(const ErrorModel& model, const Trajectory& trajectory);
 
+  /// The same process with its Gauss-Markov parts as many times as large.
+  /// @param factors  [6], above 0 @throws InvalidArgument for others
+  ErrorProcess scaled(const PoseErrorVector& factors) const;
+
   /// Standard deviations of the Gauss-Markov parts at a time [6].
   PoseErrorVector sigmas(std::int64_t time_ns) const;
   /// Standard deviations of the white parts [6].

@@ -1,0 +1,148 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "calibration/process_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "risley/core/median.hpp"
+
+namespace risley::calibration {
+namespace {
+
+using Eigen::Index;
+
+/// A jump counts from so many sigmas on: there are thousands of steps.
+constexpr double kJumpSigmas = 5;
+/// One jump also shows in the steps beside it, up to here.
+constexpr double kJumpsApart = 4;  // s
+/// Of a step's variance, the flight has to tell so much.
+constexpr double kLeastTold = 1e-3;
+/// The process counts as larger than stated from so many sigmas of chi2 on, if it is so many times
+/// as large. Where one error is, nothing vouches for the others.
+constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
+constexpr double kOthersSigmas = 1, kOthersRatio = 1.1;
+/// Nothing is concluded from less, and little from less than the second number.
+constexpr double kLeastExpected = 1, kHardlyTold = 15;
+
+/// Of what all steps tell, so much is to be left away from jumps. Median of chi2 with one degree of
+/// freedom.
+constexpr double kLeastLeft = 0.15, kMedianOfChi2 = 0.4549;
+
+/// Between two steps, s; 0 for neighbours.
+double seconds_apart(const TrajectoryKnots& knots, std::size_t a, std::size_t b) {
+  const auto [first, last] = std::minmax(a, b);
+  if (first == last) return 0;
+  return 1e-9 * static_cast<double>(knots.time_ns[last] - knots.time_ns[first + 1]);
+}
+
+double largest_score(const ProcessCheck& check, Index step) {
+  return check.score.col(step).cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& corrections,
+                           const FlightPriors& priors, const FlightSystem::Band& band) {
+  const auto count = static_cast<Index>(knots.size());
+  ProcessCheck check;
+  check.score = Eigen::MatrixXd::Zero(kCorrections, std::max<Index>(count - 1, 0));
+  check.told = check.jump = check.score;
+  check.chi2 = check.expected = Eigen::VectorXd::Zero(kCorrections);
+  for (int c = 0; c < kCorrections; ++c) {
+    const KnotSteps steps = knot_steps(knots, priors.process, c, priors.breaks);
+    for (Index k = 0; k < count; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const Index at = kCorrections * k + c;
+      double off = corrections(c, k), variance = band.diagonal[at];
+      if (k > 0) {
+        const double decay = steps.decay[i];
+        off -= decay * corrections(c, k - 1);
+        variance +=
+            decay * (decay * band.diagonal[at - kCorrections] - 2 * band.next[at - kCorrections]);
+      }
+      const double before = steps.sigma[i] * steps.sigma[i];
+      const double told = std::clamp(1 - variance / before, 0.0, 1.0);
+      check.chi2[c] += off * off / before;
+      check.expected[c] += told;
+      if (k == 0 || told < kLeastTold) continue;
+      check.told(c, k - 1) = told;
+      check.score(c, k - 1) = off / std::sqrt(before * told);
+      check.jump(c, k - 1) = off / told;
+    }
+  }
+  return check;
+}
+
+std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessCheck& check) {
+  std::vector<Index> steps;
+  for (Index k = 0; k < check.score.cols(); ++k) {
+    if (largest_score(check, k) > kJumpSigmas) steps.push_back(k);
+  }
+  std::sort(steps.begin(), steps.end(),
+            [&](Index a, Index b) { return largest_score(check, a) > largest_score(check, b); });
+  std::vector<std::size_t> jumps;
+  for (const Index k : steps) {
+    const auto knot = static_cast<std::size_t>(k);
+    const bool far = std::all_of(jumps.begin(), jumps.end(), [&](std::size_t other) {
+      return seconds_apart(knots, other, knot) > kJumpsApart;
+    });
+    if (far) jumps.push_back(knot);
+  }
+  std::sort(jumps.begin(), jumps.end());
+  return jumps;
+}
+
+Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck& check,
+                                bool alerted) {
+  const std::vector<std::size_t> jumps = jumps_of(knots, check);
+  Eigen::VectorXd chi2 = Eigen::VectorXd::Zero(kCorrections), expected = chi2;
+  for (Index k = 0; k < check.score.cols(); ++k) {
+    const auto step = static_cast<std::size_t>(k);
+    if (std::any_of(jumps.begin(), jumps.end(), [&](std::size_t jump) {
+          return seconds_apart(knots, jump, step) <= kJumpsApart;
+        })) {
+      continue;
+    }
+    chi2 += check.score.col(k).cwiseAbs2().cwiseProduct(check.told.col(k));
+    expected += check.told.col(k);
+  }
+  // Where jumps are everywhere, the middle of all steps tells more than what is left.
+  const Eigen::VectorXd of_all = check.told.rowwise().sum();
+  if (expected.sum() < kLeastLeft * of_all.sum()) {
+    expected = of_all;
+    for (Index c = 0; c < kCorrections; ++c) {
+      std::vector<double> squares;
+      for (Index k = 0; k < check.score.cols(); ++k) {
+        if (check.told(c, k) > 0) squares.push_back(std::pow(check.score(c, k), 2));
+      }
+      chi2[c] = squares.empty() ? 0 : expected[c] * median(squares) / kMedianOfChi2;
+    }
+  }
+  const auto factors_beyond = [&](double sigmas, double least) {
+    Eigen::VectorXd factors = Eigen::VectorXd::Ones(kCorrections);
+    for (Index c = 0; c < kCorrections; ++c) {
+      const double ratio = chi2[c] / std::max(expected[c], kLeastExpected);
+      if (chi2[c] - expected[c] > sigmas * std::sqrt(2 * expected[c]) && ratio > least) {
+        factors[c] = std::sqrt(ratio);
+      }
+    }
+    return factors;
+  };
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(kCorrections);
+  if (!alerted && factors_beyond(kProcessSigmas, kLeastRatio) == ones) return ones;
+  Eigen::VectorXd factors = factors_beyond(kOthersSigmas, kOthersRatio);
+  double sum = 0, count = 0;
+  for (Index c = 0; c < kCorrections; ++c) {
+    if (expected[c] < kHardlyTold) continue;
+    sum += factors[c];
+    ++count;
+  }
+  for (Index c = 0; c < kCorrections; ++c) {
+    if (expected[c] < kHardlyTold && count > 0) factors[c] = std::max(factors[c], sum / count);
+  }
+  return factors;
+}
+
+}  // namespace risley::calibration
