@@ -390,7 +390,7 @@ Run declare_calibrate(CLI::App& verb) {
                   "there (default: 0.05, for a flight 0.02)");
   verb.add_option("--patch-thickness-m", o.patch_thickness_m,
                   "1 sigma of how far dark or light patches stand off their wall, m: 0 for paint, "
-                  "which makes the range error that depends on intensity exact (default: 0.005)")
+                  "which makes the range error that depends on intensity exact (default: 0.01)")
       ->excludes("--plan");
   verb.add_flag(
           "--same-walls", o.same_walls,

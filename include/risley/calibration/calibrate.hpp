@@ -59,7 +59,7 @@ struct CalibrationOptions {
   bool beam_origin = true;  ///< beams start where they leave the last prism
   /// How far patches of another reflectivity may stand off their wall, m: as much of the error that
   /// depends on intensity cannot be told from it. 0 for painted patches and boards let into a wall.
-  double patch_thickness = 0.005;
+  double patch_thickness = 0.01;
   std::optional<scenes::Scene> planes;  ///< known normals, as seen from the scene's origin
   /// The station of each recording [recordings]; empty: unknown poses, or the origin of the scene
   /// where planes are given.
