@@ -153,7 +153,7 @@ struct SparseRows {
   }
 };
 
-/// In the order of RangeShare; not those of emitters where all are 0.
+/// In the order of RangeShare; those of emitters where there are any.
 std::vector<double> range_row(const sensors::RangeErrors& errors) {
   std::vector<double> row{errors.near, errors.incidence, errors.per_decade};
   row.insert(row.end(), errors.emitter.begin(), errors.emitter.end());

@@ -90,8 +90,7 @@ std::vector<ParameterDifference> differences(const Pair& pair) {
     result.push_back(difference_of(one.name, pair, a.get(one.name), b.get(one.name)));
   }
   for (const sensors::RangeValue& value : sensors::range_values(b.train.emitters())) {
-    const bool known =
-        pair.known_a.find(value.name) >= 0 || pair.known_b.find(value.name) >= 0;
+    const bool known = pair.known_a.find(value.name) >= 0 || pair.known_b.find(value.name) >= 0;
     if (value.name != kRangeOffset && !known) continue;
     result.push_back(difference_of(value.name, pair, sensors::get_range_value(a, value.name),
                                    sensors::get_range_value(b, value.name)));

@@ -40,7 +40,7 @@ struct CalibrationReport {
   /// Sizes of the prisms and range errors; not in files of older versions.
   std::optional<std::vector<calibration::CalibratedNumber>> numbers;
   std::vector<std::string> free;  ///< what the covariance is of
-  Eigen::MatrixXd covariance;                       ///< [free, free]
+  Eigen::MatrixXd covariance;     ///< [free, free]
   std::vector<estimation::WeakDirection> unobservable;
 
   calibration::DatumKind datum_kind = calibration::DatumKind::none;
