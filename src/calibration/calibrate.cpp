@@ -354,8 +354,8 @@ class Work {
       settled = std::max(before, left_out) - std::min(before, left_out) <= left_out / kSettledPart;
     }
     if (paper()) return solution;
-    problem_.shape = building_walls();
-    for (int round = 0; round < 2; ++round) {
+    problem_.shape = options_.shape;
+    for (int round = 0; round < 2 && !options_.shape.parameters.empty(); ++round) {
       lay_grids(problem_);
       solution = solve(problem_);
       update_range_variances(solution);

@@ -265,13 +265,13 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
     }
   }
   result.datum_kind = datum_kind(known_normals, tied && !poses_found && stations.size() > 1);
-  problem.shape = typical_walls();
+  problem.shape = plan.shape;
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
     auto shots = std::make_shared<RangedShots>(*problem.views[v].shots);
     fill_range_terms(problem, v, *shots);
     problem.views[v].shots = std::move(shots);
   }
-  lay_grids(problem);
+  if (!plan.shape.parameters.empty()) lay_grids(problem);
   std::erase_if(problem.views, [](const WallView& view) { return view.shots->size() == 0; });
 
   AdjustmentOptions options;

@@ -30,13 +30,22 @@ using ::testing::Not;
 using testing::station;
 using testing::wall;
 
-/// 10 s at 1 kHz without a range offset.
+/// Ranges without errors but for the offset.
+void hold_range_errors(sensors::Sensor& sensor) {
+  for (const char* name : {"range_near_m", "range_incidence", "range_per_decade_m"}) {
+    sensor.set_knowledge({name, 0, "exact"});
+  }
+}
+
+/// 10 s at 1 kHz before flat walls, ranges without errors.
 CalibrationPlan plan_of(scenes::Scene scene) {
   CalibrationPlan plan;
   plan.sensor = sensors::load_sensor("mid-40-table3");
   plan.scene = std::move(scene);
   plan.rate = 1000.0;
   plan.range_offset_sigma = 0;
+  plan.shape = {};
+  hold_range_errors(plan.sensor);
   return plan;
 }
 
@@ -87,8 +96,8 @@ void expect_adjustment(const CalibrationPlan& plan) {
     calibration::fill_range_terms(p, v, *own);
     p.views[v].shots = std::move(own);
   }
-  p.shape = calibration::typical_walls();
-  calibration::lay_grids(p);
+  p.shape = plan.shape;
+  if (!p.shape.parameters.empty()) calibration::lay_grids(p);
   const PlanarSolution expected = adjust(p, {0});
   const CalibrationForecast found = forecast(plan);
   ASSERT_EQ(found.free.size(), p.free.size());
@@ -108,6 +117,14 @@ void expect_adjustment(const CalibrationPlan& plan) {
 TEST(Forecast, IsTheCovarianceOfTheAdjustment) {
   CalibrationPlan plan = plan_of(corner());
   plan.duration = 40;
+  expect_adjustment(plan);
+}
+
+TEST(Forecast, IsItWithWallsThatHaveShapeAndRangesThatHaveErrors) {
+  CalibrationPlan plan = plan_of(corner());
+  plan.duration = 40;
+  plan.shape = calibration::typical_walls();
+  plan.sensor = sensors::load_sensor("mid-40-table3");
   expect_adjustment(plan);
 }
 
@@ -287,6 +304,8 @@ TEST(Forecast, AdvisesWhereSomethingIsPoor) {
 
   CalibrationPlan small = plan_of({{wall("tilted", 60, 90, 15)}, {}});
   small.duration = 1000;
+  EXPECT_THAT(advice_of(small), ElementsAre());
+  small.shape = calibration::typical_walls();
   // Nothing to say but that the walls' shape would cancel.
   EXPECT_THAT(advice_of(small), ElementsAre(HasSubstr("roll the sensor by 180 degrees")));
   scenes::ScenePlane& plane = small.scene.planes[0];

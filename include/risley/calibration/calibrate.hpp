@@ -56,7 +56,8 @@ struct CalibrationOptions {
   /// Root mean square error of directions up to which a unit counts as sound, rad; default the
   /// sensor's specification. 0: every significant error is too large.
   std::optional<double> tolerance;
-  bool beam_origin = true;  ///< beams start where they leave the last prism
+  bool beam_origin = true;              ///< beams start where they leave the last prism
+  ShapePrior shape = building_walls();  ///< of the walls; without parameters they are flat
   /// How far patches of another reflectivity may stand off their wall, m: as much of the error that
   /// depends on intensity cannot be told from it. 0 for painted patches and boards let into a wall.
   double patch_thickness = 0.01;

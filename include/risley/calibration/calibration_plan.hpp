@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "risley/calibration/datum.hpp"
+#include "risley/calibration/wall_shape.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/estimation/weak_directions.hpp"
 #include "risley/scenes/scene.hpp"
@@ -30,6 +31,7 @@ struct CalibrationPlan {
   std::optional<double> prior_sigma;  ///< of every free angle, rad
   double range_offset_sigma = 0.05;   ///< m
   bool beam_origin = true;
+  ShapePrior shape = typical_walls();          ///< without parameters: walls are flat
   std::vector<std::string> fixed, additional;  ///< parameters
 };
 
@@ -58,7 +60,7 @@ struct CalibrationForecast {
 };
 
 /// Cramer-Rao bound of the calibration: the normal equations of the default method at the sensor's
-/// parameters for shots that meet the scene, with walls that have shape as typical_walls() says,
+/// parameters for shots that meet the scene, with walls of the plan's shape,
 /// whatever the scene's are. Wrong indices come on top. A sample of the shots stands for all.
 /// @throws EstimationError when no shot meets a wall; Cancelled; InvalidArgument for a duration,
 ///         rate, noise or sigma out of its range, and as calibration_parameters()
