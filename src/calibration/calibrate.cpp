@@ -256,7 +256,7 @@ class Work {
     }
   }
 
-  /// The poses of recordings of which nobody stated any, where they saw the same walls.
+  /// How recordings from unknown poses stood to each other, where they saw the same walls.
   FoundPoses found_poses(const std::vector<FoundPlane>& found,
                          const std::vector<std::string>& names) const {
     const bool stated = options_.planes || !options_.stations.empty();
@@ -274,8 +274,8 @@ class Work {
     return paper() ? adjust_as_paper(problem) : adjust(problem);
   }
 
-  /// Views that lost their shots when labels changed are no views any more, and walls that nobody
-  /// sees are no unknowns.
+  /// Views that lost their shots when labels changed are no views any more, and walls
+  /// without a view are no unknowns.
   void drop_empty_views(PlanarProblem& problem) const {
     std::erase_if(problem.views,
                   [](const WallView& view) { return view.shots->size() < kLeastViewShots; });

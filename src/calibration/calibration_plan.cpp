@@ -146,7 +146,7 @@ AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
 namespace {
 
 /// What the plan is good for with the poses of its stations.
-/// @param poses_found  nobody states how the stations stood to each other, and their walls tell it
+/// @param poses_found  how the stations stood to each other is not known beforehand
 CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
                                   const Progress& progress) {
   const sensors::Sensor& sensor = plan.sensor;

@@ -10,7 +10,7 @@
 
 namespace risley::calibration {
 
-/// The range errors beside the constant one that walls can tell of a sensor, with what is known of
+/// The range errors beside the constant one that walls can determine, with what is known of
 /// them before: by the preset, or else 20 mm near the sensor, 0.3 of a footprint's depth, 10 mm per
 /// decade of intensity and 10 mm between emitters.
 /// @param intensities  whether shots have them

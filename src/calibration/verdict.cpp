@@ -148,13 +148,13 @@ CalibrationVerdict verdict_of(const Calibration& c) {
         freedom);
     if (c.tolerance > 0 && !(c.datum.total <= c.tolerance)) {
       return {CalibrationCode::undecided,
-              fmt::format("{}, which does not tell whether it is within the tolerance of {:.3g} "
+              fmt::format("{}, which leaves open whether it is within the tolerance of {:.3g} "
                           "degree",
                           confirmed, degrees_from_radians(c.tolerance)),
               kBetterScan};
     }
     return {CalibrationCode::as_believed, confirmed,
-            "keep what the sensor believes: these walls do not tell whether the calibration is "
+            "keep what the sensor believes: these walls leave open whether the calibration is "
             "better"};
   }
   const std::string moved = in_words(c.pointing_error);

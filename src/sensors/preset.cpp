@@ -255,8 +255,9 @@ void read_specifications(const YamlMap& root, Sensor& sensor) {
   }
 }
 
-/// Largest thickness and spacing of prisms, m.
-constexpr long double kThickest = 1, kWidest = 10;
+/// Largest thickness and spacing of prisms, m, and the smallest of either: walls determine only
+/// combinations of sizes, so that a single one may be found below 0.
+constexpr long double kThickest = 1, kWidest = 10, kThinnest = -0.1L;
 
 /// Sizes of the prisms, each kind under its shared name or under the prisms' own.
 void read_geometry(const YamlMap& root, Sensor& sensor) {
@@ -270,10 +271,10 @@ void read_geometry(const YamlMap& root, Sensor& sensor) {
     const auto take = [&](const std::string& name) {
       const Quantity quantity = read_quantity(map, name, "m", sensor);
       const long double upper = is_thickness ? kThickest : kWidest;
-      if (!(quantity.value >= 0 && quantity.value <= upper)) {
-        fail_at(
-            map.path(), quantity.line,
-            fmt::format("{} = {:g} m, allowed 0 to {:g}", map.field(name), quantity.value, upper));
+      if (!(quantity.value >= kThinnest && quantity.value <= upper)) {
+        fail_at(map.path(), quantity.line,
+                fmt::format("{} = {:g} m, allowed {:g} to {:g}", map.field(name), quantity.value,
+                            kThinnest, upper));
       }
       values.push_back(static_cast<double>(quantity.value));
       read.push_back(name);

@@ -164,7 +164,12 @@ calibration::FormalDatum datum_of_file(const sensors::Sensor& sensor, const Wall
   std::vector<std::string> names;
   std::vector<Eigen::Index> rows;
   for (std::size_t i = 0; i < sensor.covariance_names.size(); ++i) {
-    if (sensor.covariance_names[i] == "range_offset_m") continue;
+    // Sizes of the prisms and range errors bend no beam.
+    const std::string& name = sensor.covariance_names[i];
+    if (name.starts_with("range_") || name.starts_with("prism_thickness_") ||
+        name.starts_with("prism_spacing_")) {
+      continue;
+    }
     names.push_back(sensor.covariance_names[i]);
     rows.push_back(static_cast<Eigen::Index>(i));
   }

@@ -59,7 +59,7 @@ struct CalibrationOptions {
   bool beam_origin = true;              ///< beams start where they leave the last prism
   ShapePrior shape = building_walls();  ///< of the walls; without parameters they are flat
   /// How far patches of another reflectivity may stand off their wall, m: as much of the error that
-  /// depends on intensity cannot be told from it. 0 for painted patches and boards let into a wall.
+  /// depends on intensity cannot be separated from it. 0 for painted patches and boards let into a wall.
   double patch_thickness = 0.01;
   std::optional<scenes::Scene> planes;  ///< known normals, as seen from the scene's origin
   /// The station of each recording [recordings]; empty: unknown poses, or the origin of the scene
@@ -141,7 +141,7 @@ struct Calibration {
   const CalibratedNumber* number(std::string_view name) const;
   std::vector<CalibratedPlane> planes;
   std::vector<SurfaceStep> steps;
-  /// Whether recordings from poses that nobody stated saw the same walls.
+  /// Whether recordings from unknown poses saw the same walls.
   bool same_walls = false;
   DatumKind datum_kind = DatumKind::none;
   FormalDatum datum;                 ///< after, everything included

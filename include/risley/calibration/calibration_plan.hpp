@@ -51,7 +51,7 @@ struct CalibrationForecast {
   DatumKind datum_kind = DatumKind::none;
   FormalDatum datum;
   /// Of a plan with one pose: if half of the time went to a second one before the same walls,
-  /// rolled by 180 degrees on the spot, and nobody knew the turn.
+  /// rolled by 180 degrees on the spot by an unknown turn.
   std::optional<FormalDatum> rolled;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PlannedWall> walls;
