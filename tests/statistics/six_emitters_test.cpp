@@ -114,6 +114,7 @@ TEST_P(SixEmitters, FromAFileToACloudEveryParameterIsAsGoodAsItsSigma) {
     calibration.recordings = {recording};
     calibration.truths = {recording + ".truth.yaml"};
     calibration.files.folder = (folder / "calibration").string();
+    calibration.force = true;  // whether it is better or not
     const jobs::CalibratedRecordings result = jobs::calibrate_recordings(calibration);
     ASSERT_TRUE(result.calibration.converged) << result.calibration.reason;
     calibrated.add(settings.truth, result.calibration.free, result.calibration.parameters,
