@@ -40,7 +40,8 @@ struct CalibrateCommandOptions {
   ManyWishes many;
   jobs::PlatformFiles platform;
   std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, control, stations,
-                      beam_origin = "yes", states = "knots", mirror = "auto", plan, scene, page;
+                      beam_origin = "yes", walls = "uneven", states = "knots", mirror = "auto",
+                      plan, scene, page;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg, tolerance_deg;
   std::optional<double> range_offset_sigma_m, patch_thickness_m, knot_spacing_s, cell_size_m;
   double duration_s = 10.0, empty_circle_m = cloud::PointDistributionOptions{}.empty_circle;
@@ -109,6 +110,7 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
     check_not_negative(*options.patch_thickness_m, "--patch-thickness-m", "m");
     job.patch_thickness = *options.patch_thickness_m;
   }
+  job.flat_walls = options.walls == "flat";
   if (options.same_walls) job.same_walls = calibration::SameWalls::yes;
   if (options.method == "paper") job.method = calibration::CalibrationMethod::paper;
   if (!options.planes.empty()) job.planes = scenes::load_scene(options.planes);
@@ -257,6 +259,7 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
   }
   check_positive(options.duration_s, "--duration-s", "s");
   jobs::PlanCalibrationOptions job;
+  job.flat_walls = options.walls == "flat";
   take_common(options, job);
   job.beam_origin = options.beam_origin == "yes";
   job.scene = scenes::load_scene(options.plan);
@@ -388,16 +391,19 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
                   "Prior: 1 sigma of the range offset about what the sensor states, m; 0 holds it "
                   "there (default: 0.05, for a flight 0.02)");
+  verb.add_option(
+          "--walls", o.walls,
+          "'uneven': walls wave by millimetres, and ranges have errors near the sensor, on tilted "
+          "and on dark surfaces; 'flat': exact planes and a constant error, as in the paper")
+      ->check(CLI::IsMember({"uneven", "flat"}))
+      ->capture_default_str();
   verb.add_option("--patch-thickness-m", o.patch_thickness_m,
                   "1 sigma of how far dark or light patches stand off their wall, m: 0 for paint, "
-                  "which makes the range error that depends on intensity exact (default: 0.01)")
-      ->excludes("--plan");
-  verb.add_flag(
-          "--same-walls", o.same_walls,
-          "The recordings are of the same walls from poses that differ by a turn, best a roll "
-          "of 180 degrees on the spot: the walls' shape then cancels (default: if their planes "
-          "fit in one way only)")
-      ->excludes("--plan");
+                  "which makes the range error that depends on intensity exact (default: 0.01)");
+  verb.add_flag("--same-walls", o.same_walls,
+                "The recordings are of the same walls from poses that differ by a turn, best a "
+                "roll of 180 degrees on the spot: the walls' shape then cancels (default: if their "
+                "planes fit in one way only)");
   verb.add_option("--tolerance-deg", o.tolerance_deg,
                   "Root mean square error of directions up to which a unit counts as sound, deg "
                   "(default: the manufacturer's specification, as in the preset)")

@@ -99,8 +99,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
               prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
               tolerance: Optional[float] = None, tolerance_deg: Optional[float] = None,
               beam_origin: bool = True, same_walls: Optional[bool] = None,
-              patch_thickness: Optional[float] = None, fixed: Fixed = (),
-              free: Iterable[str] = (), mirrored: Optional[bool] = None,
+              flat_walls: bool = False, patch_thickness: Optional[float] = None,
+              fixed: Fixed = (), free: Iterable[str] = (), mirrored: Optional[bool] = None,
               truth: Union[Path, Sequence[Path]] = (), force: bool = False,
               states: str = "knots", shot_rate: Optional[float] = None,
               extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None, seed: int = 0,
@@ -155,6 +155,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     same_walls : bool, optional
         Whether the recordings are of the same walls from poses that differ by a turn, so that the
         walls' shape cancels; by default where their planes fit in one way only.
+    flat_walls : bool, default False
+        Take walls as exact planes, and ranges as free of errors but for a constant one.
     patch_thickness : float, optional
         How far dark or light patches stand off their wall, one standard deviation, m; 0 for paint.
     fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, threads, progress
@@ -193,7 +195,7 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
     on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),
                 "station": list(station), "beam_origin": beam_origin, "same_walls": same_walls,
-                "patch_thickness": patch_thickness,
+                "flat_walls": flat_walls, "patch_thickness": patch_thickness,
                 "states": states}
     in_flight = {"trajectory": os.fspath(trajectory), "trajectory_topic": trajectory_topic,
                  "mount": os.fspath(mount), "accuracy": os.fspath(accuracy),
@@ -223,7 +225,8 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
          empty_circle: Optional[float] = None, rate: Optional[float] = None,
          range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
          prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
-         beam_origin: bool = True, fixed: Fixed = (), free: Iterable[str] = (), seed: int = 0,
+         beam_origin: bool = True, flat_walls: bool = False, fixed: Fixed = (),
+         free: Iterable[str] = (), seed: int = 0,
          progress: Progress = None) -> Plan:
     """Predict the accuracy of a calibration on planned walls or in a planned flight.
 
@@ -244,7 +247,8 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
         m; diameter of the circles that are searched for points, m.
     rate : float, optional
         Shots per second, Hz; by default the sensor's, for a flight 5000.
-    range_noise, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, fixed, free, seed
+    range_noise, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, flat_walls, fixed,
+    free, seed
         As in `risley.calibrate`.
     progress : bool or callable, optional
         As in `risley.read`.
@@ -274,7 +278,8 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
                      "scene": os.fspath(scene)}
             return Plan(_risley.plan_flight({**options, **of_flight, **paths, "seed": seed}, tell))
         _refuse(of_flight, f"goes with a flight, and {scene_or_flight} is a scene")
-        return Plan(_risley.plan({**options, "duration": duration, "beam_origin": beam_origin},
+        return Plan(_risley.plan({**options, "duration": duration, "beam_origin": beam_origin,
+                                  "flat_walls": flat_walls},
                                  tell))
 
 

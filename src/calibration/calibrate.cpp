@@ -137,6 +137,7 @@ class Work {
   }
 
   bool paper() const { return options_.method == CalibrationMethod::paper; }
+  bool flat() const { return options_.shape.parameters.empty(); }
 
   void set_up() {
     PlanarProblem& p = problem_;
@@ -161,17 +162,17 @@ class Work {
     }
     p.prior = p.train;
     p.range_offset_sigma = options_.range_offset_sigma;
-    if (!paper()) {
+    if (!paper() && !flat()) {
       const bool intensities =
           std::all_of(recordings_.begin(), recordings_.end(),
                       [](const RangedRecording& one) { return !one.shots.intensity.empty(); });
       p.range_terms = range_terms_of(options_.sensor, intensities);
       p.divergence = {options_.sensor.beam_divergence_horizontal,
                       options_.sensor.beam_divergence_vertical};
-      if (options_.beam_origin) {
-        p.geometry = one_size_each(p.geometry, p.train.prisms());
-        p.sizes = size_priors(options_.sensor);
-      }
+    }
+    if (!paper() && options_.beam_origin) {
+      p.geometry = one_size_each(p.geometry, p.train.prisms());
+      p.sizes = size_priors(options_.sensor);
     }
     p.considered = belief_.free;
     p.considered_covariance = belief_.covariance;
@@ -355,7 +356,7 @@ class Work {
     }
     if (paper()) return solution;
     problem_.shape = options_.shape;
-    for (int round = 0; round < 2 && !options_.shape.parameters.empty(); ++round) {
+    for (int round = 0; round < 2 && !flat(); ++round) {
       lay_grids(problem_);
       solution = solve(problem_);
       update_range_variances(solution);

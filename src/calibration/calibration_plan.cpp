@@ -166,7 +166,7 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
   problem.free = std::move(adjusted.free);
   problem.prior_sigma = std::move(adjusted.prior_sigma);
   problem.range_offset_sigma = plan.range_offset_sigma;
-  problem.range_terms = range_terms_of(sensor, true);
+  if (!plan.shape.parameters.empty()) problem.range_terms = range_terms_of(sensor, true);
   problem.divergence = {sensor.beam_divergence_horizontal, sensor.beam_divergence_vertical};
   if (plan.beam_origin) {
     problem.geometry = one_size_each(problem.geometry, sensor.prisms());

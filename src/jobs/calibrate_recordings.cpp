@@ -47,6 +47,7 @@ calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOption
   result.range_offset_sigma = options.range_offset_sigma;
   result.tolerance = options.tolerance;
   result.same_walls = options.same_walls;
+  if (options.flat_walls) result.shape = {};
   result.patch_thickness = options.patch_thickness;
   result.beam_origin = options.beam_origin;
   result.planes = options.planes;

@@ -25,6 +25,7 @@ PlannedCalibration plan_calibration(const PlanCalibrationOptions& options,
   plan.range_noise = options.range_noise;
   plan.prior_sigma = options.prior_sigma;
   plan.range_offset_sigma = options.range_offset_sigma;
+  if (options.flat_walls) plan.shape = {};
   plan.beam_origin = options.beam_origin;
   return {plan.sensor.name, plan.sensor.shape(), calibration::forecast(plan, progress)};
 }

@@ -202,6 +202,7 @@ std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int thre
                                    calibration::CalibrationMethod::paper};
   job.method = kMethods.at(options.choice("method", {"adjustment", "paper"}));
   options.take("beam_origin", job.beam_origin);
+  options.take("flat_walls", job.flat_walls);
   options.take("patch_thickness", job.patch_thickness);
   if (std::optional<bool> same; options.take("same_walls", same), same) {
     job.same_walls = *same ? calibration::SameWalls::yes : calibration::SameWalls::no;
@@ -240,6 +241,7 @@ std::shared_ptr<jobs::PlannedCalibration> plan(const py::dict& values, const py:
   options.take("plan", scene);
   job.scene = scenes::load_scene(scene);
   options.take("duration", job.duration);
+  options.take("flat_walls", job.flat_walls);
   options.take("beam_origin", job.beam_origin);
   return found_by(tell, 0,
                   [&](const Progress& progress) { return jobs::plan_calibration(job, progress); });

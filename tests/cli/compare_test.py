@@ -63,6 +63,7 @@ class CompareTest(CommandTest):
         (fleet / "9-cut.lvx").write_text("no recording")
         for table in ("fleet.csv", "fleet.nc", "fleet.sqlite"):
             self.expect(3, "calibrate", "fleet", "-o", "checked", "--force", "--no-report", "--states", "none",
+                        "--walls", "flat",
                         "--resume", "--table", table, "--rate-hz", "20000")
         found = self.expect_json(0, "compare", "fleet.csv", "-o", "fleet.html")
         self.assertEqual([len(unit["results"]) for unit in found["units"]], [1, 1, 2, 1, 1, 1, 1, 1])

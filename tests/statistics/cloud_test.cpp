@@ -156,25 +156,17 @@ TEST(CloudStatistics, CovariancesOfPointsAndOfTheirDifferencesAreTrue) {
   Ratios mean;
   for (int seed = 0; seed < seeds; ++seed) {
     const auto number = static_cast<std::uint64_t>(seed);
-    // Range errors as large as a calibration expects them, and walls as flat as it takes them for.
-    const RandomStream errors(number, 96);
-    const auto with_errors = [&errors](simulation::SimulationSettings settings) {
-      settings.truth.range_errors = {
-          0.02 * errors.normal(0), 0.3 * errors.normal(1), 0.01 * errors.normal(2), {}};
-      return settings;
-    };
-    const WallRecording recording = record_walls(with_errors(wall_settings(hall, number)));
+    const WallRecording recording = record_walls(wall_settings(hall, number));
+    // The walls are as flat, and the ranges as good, as it takes them for.
     auto options = wall_options();
     options.shape = {};
-    options.patch_thickness = 0;
     const auto calibration = calibration::calibrate({recording.recording}, options);
     ASSERT_TRUE(calibration.converged) << "seed " << seed << ": " << calibration.reason;
     sensors::Sensor sensor = calibration.sensor;
     sensor.range_noise = 0.02;
     sensor.serial.clear();
-    const Ratios one = ratios_of(
-        points_of(with_errors(wall_settings(hall, 1000 + number, 5000.0, 4.0)), sensor, walls),
-        walls);
+    const Ratios one =
+        ratios_of(points_of(wall_settings(hall, 1000 + number, 5000.0, 4.0), sensor, walls), walls);
     mean.points += one.points / seeds;
     mean.patches += one.patches / seeds;
     mean.differences += one.differences / seeds;

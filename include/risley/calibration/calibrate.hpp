@@ -56,10 +56,13 @@ struct CalibrationOptions {
   /// Root mean square error of directions up to which a unit counts as sound, rad; default the
   /// sensor's specification. 0: every significant error is too large.
   std::optional<double> tolerance;
-  bool beam_origin = true;              ///< beams start where they leave the last prism
-  ShapePrior shape = building_walls();  ///< of the walls; without parameters they are flat
+  bool beam_origin = true;  ///< beams start where they leave the last prism
+  /// Of the walls. Without parameters they are exact planes, and ranges have a constant error
+  /// alone: what the paper assumes.
+  ShapePrior shape = building_walls();
   /// How far patches of another reflectivity may stand off their wall, m: as much of the error that
-  /// depends on intensity cannot be separated from it. 0 for painted patches and boards let into a wall.
+  /// depends on intensity cannot be separated from it. 0 for painted patches and boards let into a
+  /// wall.
   double patch_thickness = 0.01;
   std::optional<scenes::Scene> planes;  ///< known normals, as seen from the scene's origin
   /// The station of each recording [recordings]; empty: unknown poses, or the origin of the scene

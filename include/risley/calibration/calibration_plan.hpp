@@ -31,7 +31,8 @@ struct CalibrationPlan {
   std::optional<double> prior_sigma;  ///< of every free angle, rad
   double range_offset_sigma = 0.05;   ///< m
   bool beam_origin = true;
-  ShapePrior shape = typical_walls();          ///< without parameters: walls are flat
+  /// Without parameters walls are exact planes, and ranges have a constant error alone.
+  ShapePrior shape = typical_walls();
   std::vector<std::string> fixed, additional;  ///< parameters
 };
 

@@ -30,6 +30,7 @@ struct CalibrateRecordingsOptions : RangedInputOptions {  ///< recordings of pla
   std::optional<double> range_noise, prior_sigma;
   double range_offset_sigma = calibration::CalibrationOptions{}.range_offset_sigma;
   std::optional<double> tolerance;  ///< of directions, rad
+  bool flat_walls = false;          ///< exact planes, and no range errors but a constant one
   double patch_thickness = calibration::CalibrationOptions{}.patch_thickness;
   calibration::SameWalls same_walls = calibration::SameWalls::if_found;
   bool beam_origin = true;
