@@ -158,7 +158,8 @@ CalibrationVerdict verdict_of(const Calibration& c) {
             "better"};
   }
   const std::string moved = in_words(c.pointing_error);
-  if (c.rms_after >= c.rms_before) {
+  // Walls that wave can be thicker about the right plane than about one that was fitted to them.
+  if (c.rms_after >= std::hypot(c.rms_before, c.shape.sigma)) {
     return {CalibrationCode::not_better,
             fmt::format("{}; but the walls are {:.4g} mm thick before and {:.4g} mm after", moved,
                         1e3 * c.rms_before, 1e3 * c.rms_after),

@@ -126,9 +126,11 @@ Json of(const jobs::CalibratedRecordings& found) {
       {"observations", found.observations},
       {"points", c.points},
       {"parameters", parameters},
-      {"range_offset_m",
-       offset ? number_json(*offset)
-              : Json{{"value", c.sensor.range_offset}, {"sigma", 0}, {"sigma_given_held", 0}}},
+      {"range_offset_m", offset ? number_json(*offset)
+                                : Json{{"value", c.sensor.range_offset},
+                                       {"sigma", 0},
+                                       {"sigma_given_held", 0},
+                                       {"prior_sigma", 0}}},
       {"ranges", ranges_json(c)},
       {"sizes", sizes_json(c)},
       {"same_walls", c.same_walls},

@@ -495,7 +495,11 @@ std::string geometry_text(const Sensor& sensor) {
     const bool is_thickness = !shared.rate.thickness.empty();
     const std::vector<double>& values =
         is_thickness ? sensor.geometry.thickness : sensor.geometry.spacing;
-    if (values.size() <= 1) {
+    const bool own_known = std::any_of(own.begin(), own.end(), [&](const PrismSize& size) {
+      return size.rate.thickness.empty() != is_thickness &&
+             sensor.find_knowledge(size.name) != nullptr;
+    });
+    if (values.empty() || (values.size() == 1 && !own_known)) {
       text +=
           quantity_text(sensor, shared.name, values.empty() ? 0.0 : values.front(), "m", nullptr);
       continue;

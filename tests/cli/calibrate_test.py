@@ -271,7 +271,8 @@ class CalibrateTest(CommandTest):
                 self.assertLess(abs(found["value"] - true), 4 * found["sigma_given_held"])
         held = self.expect_json(0, "calibrate", "hall.nc", "--range-offset-sigma-m", "0", "-o",
                                 "held")
-        self.assertEqual(held["range_offset_m"], {"value": 0, "sigma": 0, "sigma_given_held": 0})
+        self.assertEqual(held["range_offset_m"],
+                         {"value": 0, "sigma": 0, "sigma_given_held": 0, "prior_sigma": 0})
         self.assertNotIn("range_offset_m", self.calibration_of("held"))
 
     def test_prior(self):

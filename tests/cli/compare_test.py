@@ -56,7 +56,7 @@ class CompareTest(CommandTest):
             unit = self.folder / f"unit-{number}.yaml"
             unit.write_text(preset.replace("\nmodel:", f'\nserial: "3GGDH5B0010001{number}"\nmodel:'))
             for day in ("may", "june") if number == 2 else ("may",):
-                tilt = 0.2 if number == 5 else 0.1 if day == "june" else 0.02
+                tilt = 0.3 if number == 5 else 0.1 if day == "june" else 0.02
                 self.expect(0, "simulate", "-o", fleet / f"{number}-{day}.lvx", "--scene", HALL, "--sensor", unit,
                             "--reported", "nominal", "--set", f"prism_tilt_b_vertical_deg={tilt}", "--duration-s", "1",
                             "--seed", str(number + 100 * len(day)))

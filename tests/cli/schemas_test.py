@@ -31,7 +31,7 @@ WALL = """planes:
   - {name: wall, distance_m: 20, normal_azimuth_deg: 0, normal_zenith_deg: 90, sigma_deg: 0.01}
 """
 # What the runs below do not meet, because it takes minutes or a fault of the machine.
-RARE = re.compile(r"^reproduce|^common#slip\.|^estimate#result(_of_many)?\.shot_clock\.|^calibrate#(walls|result_of_many)\.steps\[\]\."
+RARE = re.compile(r"^reproduce|^common#slip\.|^estimate#result(_of_many)?\.shot_clock\.|^calibrate#(walls|result_of_many)\.steps\[\]\.|^calibrate#flight\.trajectory\.jumps\[\]\."
                   r"|^info#accuracies(_of_many)?\.warnings\[\]|^common#failed_file\.line|^calibrate#flight\.control\[\]\."
                   r"|^calibrate#flight\.held\.\*\.")
 UNKNOWN = ("No such name", [["x"]])
