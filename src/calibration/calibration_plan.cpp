@@ -292,7 +292,7 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
 
 CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress) {
   CalibrationForecast result = forecast_once(plan, false, progress);
-  if (plan.scene.stations.size() < 2) {
+  if (plan.scene.stations.size() < 2 && !plan.shape.parameters.empty()) {
     // The same time in two poses, of which the second is the first rolled on the spot.
     CalibrationPlan rolled = plan;
     rolled.duration = 0.5 * plan.duration;

@@ -30,9 +30,10 @@ using ::testing::Not;
 using testing::station;
 using testing::wall;
 
-/// Ranges without errors but for the offset.
-void hold_range_errors(sensors::Sensor& sensor) {
-  for (const char* name : {"range_near_m", "range_incidence", "range_per_decade_m"}) {
+/// Ranges without errors but for the offset, from prisms of known size.
+void hold_numbers(sensors::Sensor& sensor) {
+  for (const char* name : {"range_near_m", "range_incidence", "range_per_decade_m",
+                           "prism_thickness_m", "prism_spacing_m"}) {
     sensor.set_knowledge({name, 0, "exact"});
   }
 }
@@ -45,7 +46,7 @@ CalibrationPlan plan_of(scenes::Scene scene) {
   plan.rate = 1000.0;
   plan.range_offset_sigma = 0;
   plan.shape = {};
-  hold_range_errors(plan.sensor);
+  hold_numbers(plan.sensor);
   return plan;
 }
 

@@ -298,7 +298,7 @@ TEST(CalibrationPage, HasEverySection) {
         "Against the truth", "against the data", "<h2>Walls</h2>", "Steps on the walls",
         "<h2>Thickness of the walls</h2>", "<h2>What was taken for a wall</h2>",
         "<h2>Correlations of the parameters</h2>", "<h2>Times of the recording</h2>",
-        "<h2>How to make it again</h2>", "range offset"}) {
+        "<h2>How to make it again</h2>", "every range is longer by", "The walls wave by 1.4 mm"}) {
     EXPECT_THAT(shown, HasSubstr(text));
   }
   EXPECT_THAT(
@@ -417,9 +417,9 @@ TEST(CalibrationPage, ParametersStandBesideWhatWasBelievedAndTrue) {
   EXPECT_THAT(shown, HasSubstr("<td>0.300</td><td>0.020</td><td>deg</td><td>0</td><td>0.110</td>"
                                "<td>0.190</td><td>0.220</td><td>0.080</td>"
                                "<td class=\"far\">4.00</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>-12.3</td><td>2.1</td><td>mm</td>"));
+  EXPECT_THAT(shown, HasSubstr("<td>-12.3</td><td>2.1</td><td>50</td><td>mm</td>"));
   c.numbers.clear();  // it was held
-  EXPECT_THAT(visible(page.html()), Not(HasSubstr("range offset")));
+  EXPECT_THAT(visible(page.html()), Not(HasSubstr("every range is longer by")));
 }
 
 TEST(CalibrationPage, WithoutTruthThereAreNoTruthColumns) {

@@ -152,7 +152,7 @@ TEST(PrismSizes, MayBeThePrismsOwnInAPreset) {
   };
   EXPECT_THROW(parse_preset(with("prism_thickness_c_m", "prism_thickness_m"), "x"), FileError);
   EXPECT_THROW(parse_preset(with("prism_spacing_b_m", "prism_spacing_c_m"), "x"), FileError);
-  EXPECT_THROW(parse_preset(with("value: 0.008", "value: -0.008"), "x"), FileError);
+  EXPECT_THROW(parse_preset(with("value: 0.008", "value: -0.2"), "x"), FileError);
   sensor.geometry.thickness.pop_back();
   EXPECT_THROW(preset_text(sensor), InvalidArgument);
 }

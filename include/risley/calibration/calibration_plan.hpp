@@ -51,8 +51,8 @@ struct CalibrationForecast {
   double range_offset_sigma = 0;  ///< m
   DatumKind datum_kind = DatumKind::none;
   FormalDatum datum;
-  /// Of a plan with one pose: if half of the time went to a second one before the same walls,
-  /// rolled by 180 degrees on the spot by an unknown turn.
+  /// Of a plan with one pose before walls that have shape: if half of the time went to a second one
+  /// before the same walls, rolled by 180 degrees on the spot by an unknown turn.
   std::optional<FormalDatum> rolled;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PlannedWall> walls;
