@@ -406,8 +406,7 @@ Run declare_calibrate(CLI::App& verb) {
                 "planes fit in one way only)");
   verb.add_option("--tolerance-deg", o.tolerance_deg,
                   "Root mean square error of directions up to which a unit counts as sound, deg "
-                  "(default: the manufacturer's specification, as in the preset)")
-      ->excludes("--plan");
+                  "(default: the manufacturer's specification, as in the preset)");
   verb.add_option("--beam-origin", o.beam_origin,
                   "Let beams start where they leave the last prism; 'no': at the sensor's origin")
       ->check(CLI::IsMember({"yes", "no"}))

@@ -130,7 +130,7 @@ Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck
     }
     return factors;
   };
-  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(kCorrections);
+  Eigen::VectorXd ones = Eigen::VectorXd::Ones(kCorrections);
   if (!alerted && factors_beyond(kProcessSigmas, kLeastRatio) == ones) return ones;
   Eigen::VectorXd factors = factors_beyond(kOthersSigmas, kOthersRatio);
   double sum = 0, count = 0;

@@ -33,7 +33,8 @@ WallPlaces places_of(const PlanarProblem& problem, std::size_t view) {
   const WallView& seen = problem.views[view];
   const RangedShots& shots = *seen.shots;
   const StationPose& station = problem.stations[seen.recording];
-  const auto [u1, u2] = tangents_of(problem.walls[seen.wall].normal);
+  const auto tangents = tangents_of(problem.walls[seen.wall].normal);
+  const Eigen::Vector3d u1 = eigen(tangents.first), u2 = eigen(tangents.second);
   const Plane plane = plane_view(problem, view).plane;
   WallPlaces places{std::vector<double>(shots.size()), std::vector<double>(shots.size())};
   for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
@@ -43,8 +44,8 @@ WallPlaces places_of(const PlanarProblem& problem, std::size_t view) {
       const double range = hit_distance(plane, origin, direction);
       const Eigen::Vector3d point =
           station.scene_from_sensor * eigen(origin + range * direction) + station.position;
-      places.u[i] = eigen(u1).dot(point);
-      places.v[i] = eigen(u2).dot(point);
+      places.u[i] = u1.dot(point);
+      places.v[i] = u2.dot(point);
     }
   });
   return places;

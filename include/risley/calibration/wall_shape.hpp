@@ -27,7 +27,8 @@ struct WallGrid {
     return first_u + spacing * (0.5 + static_cast<double>(cells[cell] % row()));
   }
   double middle_v(std::size_t cell) const {
-    return first_v + spacing * (0.5 + static_cast<double>(cells[cell] / row()));
+    const std::uint32_t from_first = cells[cell] / row();
+    return first_v + spacing * (0.5 + static_cast<double>(from_first));
   }
   std::uint32_t row() const { return static_cast<std::uint32_t>(cells_u); }  ///< cells of one row
 };
