@@ -39,7 +39,7 @@ Round round_of(const Identification& identification) {
   return round;
 }
 
-/// Sizes of the prisms that presets assume where nobody knows them, m.
+/// Sizes of the prisms that presets assume where they are not known, m.
 constexpr double kThickness = 0.007, kThicknessSigma = 0.005;
 constexpr double kSpacing = 0.030, kSpacingSigma = 0.020;
 
