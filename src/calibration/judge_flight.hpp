@@ -23,7 +23,7 @@ struct FlightEvidence {
   std::size_t considered = 0;          ///< last so many free parameters: held, and may be off
   const FlightSystem& system;
   const Eigen::VectorXd* inverse_diagonal = nullptr;  ///< of the system, where it is known already
-  /// [globals, errors]: what errors that were not stated, one sigma each, do to the globals; or none.
+  /// [globals, errors]: what unstated errors, one sigma each, do to the globals; or none.
   Eigen::MatrixXd further{};
   const RoughGround* ground = nullptr;  ///< or none: planes
 };
