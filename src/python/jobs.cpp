@@ -89,8 +89,7 @@ py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const 
   type.def_property_readonly("table", [](const Found& found) { return table_of(found); });
   type.def_property_readonly("html", [](const Found& found) {
     const auto& solution = solution_of(found);
-    return html_of(to_string(solution.verdict.code), solution.verdict.words, table_of(found),
-                   solution.sensor.shape());
+    return html_of(to_string(solution.verdict.code), solution.verdict.words, table_of(found));
   });
   type.def("to_dict", [](const Found& found) { return dict_of(json::of(found)); });
   type.def(

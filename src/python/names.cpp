@@ -4,6 +4,8 @@
 
 #include <array>
 
+#include "risley/core/angle.hpp"
+
 namespace risley::python {
 namespace {
 
@@ -48,6 +50,11 @@ NamedParameter parameter_of_any_train(const std::string& name) {
 std::string si_unit(const std::string& file_unit) {
   if (file_unit == "deg") return "rad";
   return file_unit == "deg/s" ? "rad/s" : file_unit;
+}
+
+FileUnit file_unit(const std::string& si_unit) {
+  if (si_unit == "rad") return {"deg", kRadiansPerDegree};
+  return si_unit == "rad/s" ? FileUnit{"deg/s", kRadiansPerDegree} : FileUnit{si_unit, 1};
 }
 
 }  // namespace risley::python

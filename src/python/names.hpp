@@ -26,5 +26,11 @@ NamedParameter parameter_of_any_train(const std::string& name);
 /// The SI unit of what files have in a unit: "rad" for "deg", "rad/s" for "deg/s", others as they
 /// are.
 std::string si_unit(const std::string& file_unit);
+/// The unit of files for an SI unit, as si_unit() gives it.
+struct FileUnit {
+  std::string name;
+  double si_per_unit = 1;
+};
+FileUnit file_unit(const std::string& si_unit);
 
 }  // namespace risley::python

@@ -95,19 +95,17 @@ ValueTable table_of(const jobs::PlannedFlightResult& planned) {
   return table;
 }
 
-std::string html_of(const std::string& code, const std::string& words, const ValueTable& table,
-                    TrainShape shape) {
+std::string html_of(const std::string& code, const std::string& words, const ValueTable& table) {
   std::string html = fmt::format(
       "<p><b>{}</b>: {}</p><table><tr><th>parameter</th><th>value</th><th>&plusmn; sigma</th>"
       "<th>unit</th></tr>",
       code, report::escape_html(words));
   for (std::size_t i = 0; i < table.names.size(); ++i) {
-    calibration::FlightUnknown one;
-    one.name = table.file_names[i];
-    const NumberText text = number_text(calibration::in_file_unit(one, table.values[i], shape),
-                                        calibration::in_file_unit(one, table.sigmas[i], shape));
-    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>", one.name,
-                        text.value, text.sigma, calibration::file_unit(one, shape));
+    const FileUnit unit = file_unit(table.units[i]);
+    const NumberText text =
+        number_text(table.values[i] / unit.si_per_unit, table.sigmas[i] / unit.si_per_unit);
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+                        table.file_names[i], text.value, text.sigma, unit.name);
   }
   return html + "</table>";
 }

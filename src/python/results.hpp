@@ -35,7 +35,6 @@ ValueTable table_of(const jobs::PlannedCalibration& planned);
 ValueTable table_of(const jobs::PlannedFlightResult& planned);
 
 /// The verdict and a table of what was found, in the units of files.
-std::string html_of(const std::string& code, const std::string& words, const ValueTable& table,
-                    TrainShape shape);
+std::string html_of(const std::string& code, const std::string& words, const ValueTable& table);
 
 }  // namespace risley::python

@@ -80,6 +80,7 @@ class FlightSystem {
     /// [6 (knots - 1)]: between a correction at a knot and the same one at the next.
     Eigen::VectorXd next;
   };
+  /// Zero where a global is held.
   Band inverse_band() const;
   /// Diagonal of inverse() [size], in less memory than the whole.
   Eigen::VectorXd inverse_diagonal() const { return inverse_band().diagonal; }
@@ -127,7 +128,8 @@ FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
 /// How ground departs from its planes, which all strips see alike: a covariance between the patches
 /// of a cell, of some cells that stand for all.
 struct RoughGround {
-  static constexpr int kSide = 3, kPatches = kSide * kSide;  ///< of a cell
+  static constexpr int kSide = 3;                 ///< patches along a side of a cell
+  static constexpr int kPatches = kSide * kSide;  ///< of a cell
   /// Along the ranges, between the patches, m^2.
   Eigen::Matrix<double, kPatches, kPatches> covariance =
       Eigen::Matrix<double, kPatches, kPatches>::Zero();

@@ -51,6 +51,7 @@ struct PlaneColumns {
 
   int rotation_angle(int rotor) const { return places + rotor; }         ///< a shift at all shots
   int prism_size(int number) const { return places + prisms + number; }  ///< m
+  /// A number that its term is multiplied by: m, or for the incidence without a unit.
   int range_term(int number) const { return places + prisms + sizes + number; }
   int range_offset() const { return range_term(terms); }  ///< of the sensor, m
   /// Towards tangent 1, which has the number 0, or tangent 2.

@@ -19,6 +19,7 @@ struct WallGrid {
   std::vector<std::uint32_t> cells;  ///< those with shots, ascending: v * cells_u + u
 
   bool empty() const { return cells.empty(); }
+  /// Corners of all its cells.
   Eigen::Index nodes() const {
     return empty() ? 0 : static_cast<Eigen::Index>(cells_u + 1) * (cells_v + 1);
   }
@@ -26,6 +27,7 @@ struct WallGrid {
   double middle_u(std::size_t cell) const {
     return first_u + spacing * (0.5 + static_cast<double>(cells[cell] % row()));
   }
+  /// As middle_u(), m.
   double middle_v(std::size_t cell) const {
     const std::uint32_t from_first = cells[cell] / row();
     return first_v + spacing * (0.5 + static_cast<double>(from_first));
