@@ -57,7 +57,7 @@ for low, high in ((1, 5), (5, 10), (10, 20), (20, 35)):
 # A point on the end wall and the next shot: their covariance is the sum of the products of their loadings.
 
 # %%
-first = int(np.argmax(points["X"] > 29.5))
+first = int(np.argmax((points["X"] > 29.5) & (abs(points["Z"]) < 1)))
 a, b = points[first], points[first + 1]
 loadings = [np.array([[p[f"Loading{n}{axis}"] for n in range(1, len(factors) + 1)] for axis in "XYZ"], float)
             for p in (a, b)]
