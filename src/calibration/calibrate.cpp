@@ -240,20 +240,7 @@ class Work {
       for (int& label : labels[r]) {
         if (label >= 0) label += static_cast<int>(first_view[r]);
       }
-      give_shots(coarse_[r], labels[r], r);
-    }
-  }
-
-  /// Gives the views of one recording the shots that are labelled theirs.
-  void give_shots(const RangedShots& shots, const std::vector<int>& labels, std::size_t recording) {
-    hand_out(shots, labels, recording, problem_);
-    for (std::size_t v = 0; v < problem_.views.size(); ++v) {
-      WallView& view = problem_.views[v];
-      if (view.recording != recording) continue;
-      auto own = std::make_shared<RangedShots>(*view.shots);
-      fill_range_terms(problem_, v, *own);
-      view.shots = std::move(own);
-      view.cell_begin.clear();
+      hand_out(coarse_[r], labels[r], r, problem_);
     }
   }
 
@@ -305,7 +292,8 @@ class Work {
       update_range_variances(solution);
       problem_ = std::move(solution.problem);
       for (std::size_t r = 0; r < recordings_.size(); ++r) {
-        give_shots(coarse_[r], label_shots(problem_, r, coarse_[r], all_[r].pointing).view, r);
+        hand_out(coarse_[r], label_shots(problem_, r, coarse_[r], all_[r].pointing).view, r,
+                 problem_);
       }
       drop_empty_views(problem_);
     }
@@ -319,7 +307,7 @@ class Work {
 
   void hand_out_all() {
     for (std::size_t r = 0; r < all_.size(); ++r) {
-      give_shots(all_[r].shots, all_[r].labels.view, r);
+      hand_out(all_[r].shots, all_[r].labels.view, r, problem_);
     }
   }
 

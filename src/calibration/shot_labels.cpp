@@ -110,7 +110,10 @@ void hand_out(const RangedShots& shots, const std::vector<int>& view, std::size_
     for (const auto& block : rows_of_blocks) {
       rows.insert(rows.end(), block[v].begin(), block[v].end());
     }
-    problem.views[v].shots = std::make_shared<const RangedShots>(rows_of(shots, rows));
+    RangedShots own = rows_of(shots, rows);
+    fill_range_terms(problem, v, own);
+    problem.views[v].shots = std::make_shared<const RangedShots>(std::move(own));
+    problem.views[v].cell_begin.clear();
   });
 }
 

@@ -38,7 +38,8 @@ struct Labels {
 Labels label_shots(const PlanarProblem& problem, std::size_t recording, const RangedShots& shots,
                    double pointing);
 
-/// Gives the views of one recording the shots that are labelled theirs.
+/// Gives the views of one recording the shots that are labelled theirs, with their shares in the
+/// range terms.
 void hand_out(const RangedShots& shots, const std::vector<int>& view, std::size_t recording,
               PlanarProblem& problem);
 

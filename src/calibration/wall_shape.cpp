@@ -402,7 +402,7 @@ class ShapeSearch {
 ShapePrior typical_walls() { return {{{1.5e-3, 2.0, 0.5e-3}}, {1.0}}; }
 
 ShapePrior building_walls() {
-  constexpr double kSigmas[] = {0.6e-3, 1.2e-3, 2.4e-3, 4.8e-3, 9.6e-3};
+  constexpr double kSigmas[] = {0.3e-3, 0.6e-3, 1.2e-3, 2.4e-3, 4.8e-3, 9.6e-3};
   constexpr double kLengths[] = {0.45, 0.9, 1.8, 3.6};
   constexpr double kWhites[] = {0.5e-3, 1.5e-3};
   ShapePrior prior;

@@ -502,16 +502,21 @@ class Work {
     while (row < end && block.rows.size() < kBlockRows) {
       std::size_t shot_end = row + 1;
       while (shot_end < end && same_shot(piece_->rows, row, shot_end)) ++shot_end;
-      std::size_t returns = 0;
-      for (std::size_t i = row; i < shot_end; ++i) returns += has_return(i) ? 1 : 0;
+      std::size_t returns = 0, last = 0;
+      for (std::size_t i = row; i < shot_end; ++i) {
+        if (!has_return(i)) continue;
+        ++returns;
+        last = std::max<std::size_t>(last, piece_->rows.return_number[i]);
+      }
+      // Alike in all rows of a shot, and no less than any of their numbers.
+      const auto number_of_returns = static_cast<std::uint8_t>(std::max(returns, last));
       for (std::size_t i = row; i < shot_end; ++i) {
         if (!has_return(i)) {
           ++summary_.no_return;
           continue;
         }
         block.rows.push_back(i);
-        block.returns.push_back(static_cast<std::uint8_t>(
-            std::max<std::size_t>(returns, piece_->rows.return_number[i])));
+        block.returns.push_back(number_of_returns);
       }
       row = shot_end;
     }

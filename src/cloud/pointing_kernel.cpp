@@ -411,11 +411,15 @@ class Kernel : public Points {
     const Batch across = azimuth.sine * d.x - azimuth.cosine * d.y;
     const Batch along = azimuth.cosine * d.x + azimuth.sine * d.y;
     const Batch t = across / along, t2 = t * t;
-    const Batch atan = t * (Batch(1.0) + t2 * (Batch(-1.0 / 3.0) + t2 * Batch(0.2)));
-    const Lanes near = t2 < Batch(0.25) && along > Batch(0.0);
-    xsimd::select(near, atan, Batch(kPi / 2)).store_unaligned(a_.azimuth_residual + at);
+    const Batch atan =
+        t * (Batch(1.0) + t2 * (Batch(-1.0 / 3.0) + t2 * (Batch(0.2) + t2 * Batch(-1.0 / 7.0))));
+    // Neither near nor far where the beam is NaN.
+    const Lanes far = t2 >= Batch(0.25) || along <= Batch(0.0);
+    xsimd::select(far, Batch(kPi / 2), atan).store_unaligned(a_.azimuth_residual + at);
     const Batch s = zenith.sine * d.z - zenith.cosine * horizontal, s2 = s * s;
-    const Batch asin = s * (Batch(1.0) + s2 * (Batch(1.0 / 6.0) + s2 * Batch(3.0 / 40.0)));
+    const Batch asin =
+        s * (Batch(1.0) +
+             s2 * (Batch(1.0 / 6.0) + s2 * (Batch(3.0 / 40.0) + s2 * Batch(15.0 / 336.0))));
     asin.store_unaligned(a_.zenith_residual + at);
   }
 

@@ -816,13 +816,15 @@ struct FollowedPiece {
   std::vector<std::uint8_t> firing_order;  // of shots without lag
 };
 
-/// Follows the rotors through a stretch, and anew where they are lost.
-void follow_all(NumberedShots& shots, ShotRange range, const sensors::Sensor& sensor, bool in_turn,
-                bool prepared, std::vector<FollowedPiece>& pieces, const Progress& progress) {
+/// Follows the rotors through a stretch.
+/// @param prepared  whether prepare_shots() was called for the series
+/// @return nothing where they are not found
+std::optional<FollowedPiece> follow_piece(NumberedShots& shots, ShotRange range,
+                                          const sensors::Sensor& sensor, bool in_turn,
+                                          bool prepared, const Progress& progress) {
   const std::optional<bool> decided = prepared ? std::optional<bool>(false) : std::nullopt;
-  if (range.size() == 0) return;
   std::optional<Start> start = coarse_start(shots, range, sensor, in_turn, decided, progress);
-  if (!start) return;
+  if (!start) return std::nullopt;
   if (!prepared) {
     prepare_shots(shots.series, *start);
     start->mirrored = false;
@@ -848,7 +850,7 @@ void follow_all(NumberedShots& shots, ShotRange range, const sensors::Sensor& se
                                  1.5 * one.start.residual_rms);
     if (lost == 0 && trial.residual_rms < fine) break;
   }
-  if (!best) return;
+  if (!best) return std::nullopt;
   Anchor anchor = *std::move(best);
   shots.firing_order = anchor.firing_order;
   Followed followed = follow(shots, anchor, range);
@@ -863,12 +865,32 @@ void follow_all(NumberedShots& shots, ShotRange range, const sensors::Sensor& se
   }
   const std::size_t begin = followed.begin, end = followed.end;
   constexpr std::size_t kFewestFollowed = 1000;
-  if (end < begin + std::min(kFewestFollowed, range.size())) return;
+  if (end < begin + std::min(kFewestFollowed, range.size())) return std::nullopt;
   const Lags lags(followed.slips, anchor.shot);
-  const FollowedPiece piece{followed, lags.first(), shots.firing_order};
-  follow_all(shots, {range.begin, begin}, sensor, in_turn, true, pieces, progress);
-  pieces.push_back(piece);
-  follow_all(shots, {end, range.end}, sensor, in_turn, true, pieces, progress);
+  return FollowedPiece{std::move(followed), lags.first(), shots.firing_order};
+}
+
+/// Follows the rotors through all shots, and anew where they are lost. @return pieces in time order
+std::vector<FollowedPiece> follow_all(NumberedShots& shots, const sensors::Sensor& sensor,
+                                      bool in_turn, const Progress& progress) {
+  std::vector<FollowedPiece> pieces;
+  std::vector<ShotRange> waiting{{0, shots.size()}};  // the first of them last
+  bool prepared = false;
+  while (!waiting.empty()) {
+    const ShotRange range = waiting.back();
+    waiting.pop_back();
+    if (range.size() == 0) continue;
+    std::optional<FollowedPiece> piece =
+        follow_piece(shots, range, sensor, in_turn, std::exchange(prepared, true), progress);
+    if (!piece) continue;
+    waiting.push_back({piece->followed.end, range.end});
+    waiting.push_back({range.begin, piece->followed.begin});
+    pieces.push_back(*std::move(piece));
+  }
+  std::sort(pieces.begin(), pieces.end(), [](const FollowedPiece& a, const FollowedPiece& b) {
+    return a.followed.begin < b.followed.begin;
+  });
+  return pieces;
 }
 
 /// By how many shots the order of one piece runs ahead of another's; 0 where they differ otherwise.
@@ -898,8 +920,7 @@ ShotCount find_slips(const CountedShots& counted, const sensors::Sensor& sensor,
     shots.number.push_back(std::llround(1e-9 * static_cast<double>(time) * shots.rate));
   }
   const bool in_turn = counted.in_turn && sensor.train.emitters() > 1;
-  std::vector<FollowedPiece> pieces;
-  follow_all(shots, {0, shots.size()}, sensor, in_turn, false, pieces, progress);
+  const std::vector<FollowedPiece> pieces = follow_all(shots, sensor, in_turn, progress);
   if (pieces.empty()) return result;
   result.followed = true;
   const auto emitters = static_cast<std::int64_t>(pieces.front().firing_order.size());

@@ -45,7 +45,9 @@ BlockInput::BlockInput(std::string path)
 }
 
 const std::uint8_t* BlockInput::at(std::uint64_t offset, std::size_t count) {
-  if (offset < block_offset_ || offset + count > block_offset_ + block_bytes_) {
+  const bool held = offset >= block_offset_ && offset - block_offset_ <= block_bytes_ &&
+                    count <= block_bytes_ - (offset - block_offset_);
+  if (!held) {
     if (count > block_.size() || offset > size_ - count) {
       throw InvalidArgument(fmt::format("bytes = [{}, {}), allowed at most {} within [0, {})",
                                         offset, offset + count, block_.size(), size_));

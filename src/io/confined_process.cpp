@@ -26,6 +26,8 @@ namespace {
 
 /// Status with which a child ends that got no more memory.
 constexpr int kOutOfMemory = 3;
+/// Status with which a child ends whose service threw something else.
+constexpr int kThrew = 4;
 
 /// @return whether all bytes were moved
 bool send_all(int socket, const void* bytes, std::size_t size) {
@@ -88,7 +90,8 @@ void close_all_but(int socket) {
   ::close_range(own + 1, ~0U, 0);
 }
 
-[[noreturn]] void serve(int socket, const ConfinedProcess::Service& service) {
+/// Runs in the child on a copy of its owner's stack, whose frames no exception may reach.
+[[noreturn]] void serve(int socket, const ConfinedProcess::Service& service) noexcept {
   close_all_but(socket);
   if (!send_message(socket, {})) ::_exit(0);
   // The owner ends this process; it hears of signals itself.
@@ -113,6 +116,8 @@ void close_all_but(int socket) {
       if (!send_message(socket, answer)) break;
     } catch (const std::bad_alloc&) {
       ::_exit(kOutOfMemory);
+    } catch (...) {
+      ::_exit(kThrew);
     }
   }
   ::_exit(0);
@@ -208,6 +213,9 @@ void ConfinedProcess::fail() {
   if (ended > 0 && WIFEXITED(status) && WEXITSTATUS(status) == kOutOfMemory) {
     throw ProcessEnded(
         fmt::format("the library needed more than {} MiB of memory", kMostBytes >> 20));
+  }
+  if (ended > 0 && WIFEXITED(status) && WEXITSTATUS(status) == kThrew) {
+    throw ProcessEnded("the library failed: it threw an exception");
   }
   throw ProcessEnded("the library's process ended without an answer");
 }

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <iterator>
 #include <limits>
-#include <map>
 #include <set>
 #include <span>
 
@@ -15,6 +14,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs {
@@ -34,18 +34,14 @@ constexpr std::size_t kFewestInField = 1000;
 /// The emitters' firing order says the rest; smaller rolls are within what emitters may be off.
 constexpr double kLeastRoll = radians_from_degrees(20.0);
 
-/// The built-in presets of the types of sensors; those of single units, of reversed rotors and of
-/// the manufacturer's sequences have longer names than that of their type.
+/// The built-in presets of the types of sensors, which bear the names of their models; those of
+/// single units, of reversed rotors and of the manufacturer's sequences have names of their own.
 std::vector<Sensor> type_presets() {
-  std::map<int, Sensor> by_type;
+  std::vector<Sensor> result;
   for (const std::string& name : sensors::builtin_preset_names()) {
     Sensor sensor = sensors::load_sensor(name);
-    const auto [place, is_new] = by_type.try_emplace(sensor.device_type, sensor);
-    if (!is_new && name.size() < place->second.name.size()) place->second = std::move(sensor);
+    if (name == lower_case(sensor.model)) result.push_back(std::move(sensor));
   }
-  std::vector<Sensor> result;
-  result.reserve(by_type.size());
-  for (auto& [type, sensor] : by_type) result.push_back(std::move(sensor));
   return result;
 }
 

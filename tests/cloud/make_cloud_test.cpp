@@ -164,6 +164,29 @@ TEST_F(MakeCloud, CountsWhatHasNoPoint) {
   EXPECT_EQ(summary.points, 10000U - 1000U - summary.outliers);
 }
 
+// The first of two returns may have none itself: LAS asks for one number in all points of a pulse.
+TEST_F(MakeCloud, AllReturnsOfAShotHaveOneNumberOfReturns) {
+  SimulatedReader reader(wall_settings(0.5, 5000.0), [](recordings::Observations& o) {
+    recordings::Observations tripled;
+    for (std::size_t i = 0; i < o.size(); ++i) {
+      recordings::Observations row = o;
+      row.drop_front(i);
+      row.resize(1);
+      for (const int number : {1, 2, 3}) {
+        row.return_number[0] = static_cast<std::uint8_t>(number);
+        row.range[0] = number == 1 ? 0.0 : o.range[i] + 0.5 * number;
+        row.valid[0] = number == 1 ? 0 : 1;
+        tripled.append(row);
+      }
+    }
+    o = tripled;
+  });
+  make_cloud(reader, type_, path(), {});
+  auto found = columns();
+  ASSERT_GT(found["Time_s"].size(), 1000U);
+  for (const double number : found["NumberOfReturns"]) EXPECT_EQ(number, 3.0);
+}
+
 TEST_F(MakeCloud, ReturnsOfOneShotAreCounted) {
   // Every third shot gets a second return behind the first.
   SimulatedReader reader(wall_settings(2.0, 5000.0), [](recordings::Observations& o) {

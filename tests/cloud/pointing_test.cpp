@@ -682,6 +682,20 @@ TEST(ComputePoints, DoWithoutRotationAngles) {
   EXPECT_TRUE(needs_rotation_angles(sensor, options));
 }
 
+TEST(ComputePoints, ResidualsAreExactUpToATenthOfARadian) {
+  const PointingModel model = imperfect_model("PA-AP", 6);
+  PointedShots shots = random_shots(model, 24, 6);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const double off = 0.098 - 0.008 * static_cast<double>(i);  // to -0.086
+    shots.azimuth[i] = wrap_to_pi(shots.azimuth[i] + off);
+    shots.zenith[i] += off;
+  }
+  for (const InstructionSet set : available_instruction_sets()) {
+    SCOPED_TRACE(to_string(set));
+    expect_points(model, shots, points_of(model, header_of(model), shots, set));
+  }
+}
+
 // A damaged record must not look like a sound one, however far off it is.
 TEST(ComputePoints, ResidualsOfOutliersAreLarge) {
   const PointingModel model = imperfect_model("PA-AP", 8);
@@ -742,6 +756,10 @@ TEST(ComputePoints, WhatIsNotKnownIsNaNAndLeavesItsNeighboursAlone) {
         SCOPED_TRACE(fmt::format("{} shot {}", to_string(set), i));
         if (i == 0 || i == 6 || i == 18) {
           EXPECT_TRUE(point_of(points, i).array().isNaN().all());
+          if (!reported) {
+            EXPECT_TRUE(std::isnan(points.azimuth_residual[i]));
+            EXPECT_TRUE(std::isnan(points.zenith_residual[i]));
+          }
         } else {
           EXPECT_EQ(point_of(points, i), point_of(sound, i));
           EXPECT_EQ(covariance_of(points, i), covariance_of(sound, i));

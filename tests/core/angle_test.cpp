@@ -16,6 +16,17 @@ TEST(Angle, WrapsIntoOneTurn) {
   EXPECT_NEAR(wrap_to_pi(kTwoPi - 0.5), -0.5, 1e-15);
 }
 
+TEST(Angle, NextToFullTurnsStaysWithinOne) {
+  for (int turns = -1000; turns <= 1000; ++turns) {
+    for (const double towards : {-1e9, 1e9}) {
+      const double angle = std::nextafter(turns * kTwoPi, towards);
+      EXPECT_GE(wrap_to_two_pi(angle), 0.0) << angle;
+      EXPECT_LT(wrap_to_two_pi(angle), kTwoPi) << angle;
+    }
+  }
+  EXPECT_GE(wrap_to_two_pi(106.81415022205296), 0.0);  // a little less than 17 turns
+}
+
 TEST(Angle, WhatIsNoAngleStaysNoAngle) {
   for (const double value :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <numeric>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -75,6 +76,13 @@ TEST(ConfinedProcess, ACrashEndsTheChildAlone) {
   });
   EXPECT_THAT(end_of(process, "crash"), HasSubstr("Segmentation fault"));
   EXPECT_THAT(end_of(process, "again"), HasSubstr("has ended"));
+}
+
+// The child's stack holds the frames of the test, too, which an exception must not reach.
+TEST(ConfinedProcess, AnExceptionEndsTheChild) {
+  ConfinedProcess process(
+      [](std::string_view) -> std::string { throw std::runtime_error("of a library"); });
+  EXPECT_THAT(end_of(process, "throw"), HasSubstr("the library failed"));
 }
 
 TEST(ConfinedProcess, AnEndlessLoopIsEnded) {

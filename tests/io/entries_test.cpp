@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 // What the entries of the layer refuse, and that they say what would be right.
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -96,6 +97,9 @@ TEST(Entries, BlocksOfFilesLieWithinThem) {
   BlockInput file(path);
   EXPECT_EQ(file.at(0, 8)[0], 7);
   EXPECT_EQ(refusal([&] { file.at(4, 5); }), "bytes = [4, 9), allowed at most 8 within [0, 8)");
+  constexpr std::uint64_t kLast = std::numeric_limits<std::uint64_t>::max();
+  EXPECT_THROW(file.at(kLast - 3, 8), InvalidArgument);
+  EXPECT_THROW(file.at(4, kLast), InvalidArgument);
 }
 
 TEST(Entries, PowersOfTenFit64Bits) {

@@ -186,6 +186,14 @@ TEST(Preset, EveryBuiltInOneSaysWhereEachValueComesFrom) {
   }
 }
 
+// Recordings are read with the preset of their sensor's type, whatever other presets there are.
+TEST(Preset, EveryModelHasOneThatIsTheTypes) {
+  for (const std::string& name : builtin_preset_names()) {
+    const Sensor sensor = load_sensor(name);
+    EXPECT_EQ(load_sensor(lower_case(sensor.model)).device_type, sensor.device_type) << name;
+  }
+}
+
 TEST(Preset, TextRoundTripKeepsEveryBit) {
   std::vector<Sensor> sensors{calibrated_unit()};
   for (const std::string& name : builtin_preset_names()) sensors.push_back(load_sensor(name));

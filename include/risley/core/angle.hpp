@@ -29,7 +29,8 @@ inline double wrap_to_pi(double angle) { return std::remainder(angle, kTwoPi); }
 
 /// The same angle in [0, 2 pi); NaN for what is no angle.
 inline double wrap_to_two_pi(double angle) {
-  const double wrapped = angle - kTwoPi * std::floor(angle / kTwoPi);
+  const double remainder = std::remainder(angle, kTwoPi);
+  const double wrapped = remainder < 0.0 ? remainder + kTwoPi : remainder;
   return wrapped >= kTwoPi ? 0.0 : wrapped;
 }
 

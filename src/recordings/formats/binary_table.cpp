@@ -218,7 +218,7 @@ bool BinaryTableReader::read(Chunk& chunk, std::size_t max_rows) {
       const Lane& lane = lanes_[used_lanes_.front()];
       const std::size_t into_block = lane.source->is_plain() ? next_ * lane.record_bytes : 0;
       pending_.emplace(path_, FilePlace{lane.block_offset + into_block, {}},
-                       fmt::format("point {} (from 0): {}", number, bad.what()));
+                       fmt::format("point {}: {}", number + 1, bad.what()));
       break;
     }
     ++next_;

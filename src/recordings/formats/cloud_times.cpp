@@ -181,7 +181,7 @@ CloudField time_field(const CloudTime& time, const CloudLayout& layout) {
 void fail_time(const CloudTime& time, std::size_t point, double value) {
   throw BadMessage{
       fmt::format("point {} has {} = {}, allowed at most {} s from the time stamp of its message",
-                  point, time.field, value, kFarthest_ns / 1'000'000'000)};
+                  point + 1, time.field, value, kFarthest_ns / 1'000'000'000)};
 }
 
 void CloudTimeSearch::add(const CloudLayout& layout, std::span<const std::uint8_t> data,

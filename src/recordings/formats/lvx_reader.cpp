@@ -28,10 +28,10 @@ std::string text_field(const std::uint8_t* bytes, std::size_t count) {
 
 const std::uint8_t* lvx_header_bytes(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      std::string_view part) {
-  if (offset + count > file.size()) {
+  if (offset > file.size() || count > file.size() - offset) {
     throw FileError(file.path(), {file.size(), {}},
-                    fmt::format("the file ends within the {}, which takes bytes {} to {}", part,
-                                offset, offset + count - 1));
+                    fmt::format("the file ends within the {}, which takes {} bytes from byte {} on",
+                                part, count, offset));
   }
   return file.at(offset, count);
 }
