@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
 
 #include "io/test_folder.hpp"
