@@ -56,8 +56,16 @@ constexpr double kLeastNoiseSteps = 0.2;
 constexpr double kAnchorAngleSigma = radians_from_degrees(0.5), kAnchorSpeedShare = 1e-3;
 /// How often the optics are fitted again to the mended shots.
 constexpr int kMostRounds = 4;
-/// Shots around the start that they are fitted to.
-constexpr std::size_t kFittedShots = 40000;
+/// Shots around the start that they are fitted to, and those that show what an anchor is worth.
+constexpr std::size_t kFittedShots = 40000, kTriedShots = 12000;
+/// Shots that a slip of shots that are there twice counts for where anchors are compared: optics
+/// that are off at some rotation angles need one in every turn.
+constexpr std::size_t kDoubledCost = 1000;
+/// Packets of the formats hold so many shots. Recorders lose some at their borders: so many slips,
+/// and such a share of them, tell where in the count the borders are.
+constexpr std::int64_t kPacketShots[] = {96, 100};
+constexpr std::size_t kFewestAtBorders = 5;
+constexpr double kShareAtBorders = 0.7;
 
 /// The valid shots of a recording by their numbers in the count.
 struct NumberedShots {
@@ -691,28 +699,36 @@ bool refit(const NumberedShots& shots, Anchor& anchor, const Followed& followed,
   return true;
 }
 
-/// Short windows about a start, each fitted alone, best first: a slip within it spoils a window.
-std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const Start& start,
-                                 const sensors::Sensor& sensor, bool in_turn,
-                                 const Progress& progress) {
-  constexpr double kWindow = 0.02, kAround = 0.08;  // s
+/// A short window that was fitted alone.
+struct Window {
+  bool has_gap = false;
+  Anchor anchor;
+  ShotRange rows;
+};
+
+bool is_better(const Window& a, const Window& b) {
+  if (a.has_gap != b.has_gap) return b.has_gap;
+  return a.anchor.start.residual_rms < b.anchor.start.residual_rms;
+}
+
+/// The best windows of a length about a start.
+/// @param length  s
+std::vector<Window> fitted_windows(NumberedShots& shots, ShotRange range, const Start& start,
+                                   double length, const sensors::Sensor& sensor, bool in_turn,
+                                   const Progress& progress) {
+  constexpr double kAround = 0.08;  // s
   // A slip within a gap that long is only a change of speed.
-  constexpr double kLongGap = 0.15 * kWindow;
-  constexpr std::size_t kMostWindows = 24, kMostFitted = 5, kFewestShots = 400;
-  struct Window {
-    bool has_gap = false;
-    Anchor anchor;
-    ShotRange rows;
-  };
+  const double long_gap = 0.15 * length;
+  constexpr std::size_t kMostWindows = 30, kMostFitted = 8, kFewestShots = 400;
   const double middle = 1e-9 * static_cast<double>(start.time_ns) -
                         static_cast<double>(shots.number[range.begin]) / shots.rate;
   const double first = std::max(0.0, middle - kAround);
   const double last = std::min(length_of(shots, range), middle + kAround);
   std::vector<Window> windows;
-  for (const double begin : window_begins(last - first, kWindow, kMostWindows)) {
+  for (const double begin : window_begins(last - first, length, kMostWindows)) {
     progress.check();
     Window window;
-    window.rows = shots_within(shots, range, first + begin, first + begin + kWindow);
+    window.rows = shots_within(shots, range, first + begin, first + begin + length);
     if (window.rows.size() < kFewestShots) continue;
     if (in_turn &&
         !find_firing_order(shots, window.rows, sensor.train, false, shots.firing_order)) {
@@ -721,7 +737,7 @@ std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const St
     window.anchor.firing_order = shots.firing_order;
     for (std::size_t i = window.rows.begin + 1; i < window.rows.end; ++i) {
       const auto gap = static_cast<double>(shots.number[i] - shots.number[i - 1]) / shots.rate;
-      window.has_gap = window.has_gap || gap > kLongGap;
+      window.has_gap = window.has_gap || gap > long_gap;
     }
     constexpr double kAngleSigma = radians_from_degrees(20.0), kSpeedShare = 0.005;
     Follower::State state = Follower::loose_state(start, kAngleSigma, kSpeedShare);
@@ -738,24 +754,69 @@ std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const St
                  range.end - 1);
     windows.push_back(std::move(window));
   }
-  const auto better = [](const Window& a, const Window& b) {
-    if (a.has_gap != b.has_gap) return b.has_gap;
-    return a.anchor.start.residual_rms < b.anchor.start.residual_rms;
-  };
-  std::stable_sort(windows.begin(), windows.end(), better);
+  std::stable_sort(windows.begin(), windows.end(), is_better);
   if (windows.size() > kMostFitted) windows.resize(kMostFitted);
-  std::vector<Window> fitted;
-  for (Window& window : windows) {
+  std::erase_if(windows, [&](Window& window) {
     progress.check();
     shots.firing_order = window.anchor.firing_order;
     const Followed alone{window.rows.begin, window.rows.end, {}, window.anchor.start.residual_rms};
-    if (refit(shots, window.anchor, alone, sensor, Priors::of_the_type)) fitted.push_back(window);
+    return !refit(shots, window.anchor, alone, sensor, Priors::of_the_type);
+  });
+  return windows;
+}
+
+/// Fits of short windows about a start, best first. A slip within it spoils a window: the shorter
+/// they are, the more of them are free of slips, and the less they determine.
+std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const Start& start,
+                                 const sensors::Sensor& sensor, bool in_turn,
+                                 const Progress& progress) {
+  constexpr double kLengths[] = {0.02, 0.011};  // s
+  std::vector<Window> windows;
+  for (const double length : kLengths) {
+    for (Window& window : fitted_windows(shots, range, start, length, sensor, in_turn, progress)) {
+      windows.push_back(std::move(window));
+    }
   }
-  std::stable_sort(fitted.begin(), fitted.end(), better);
+  std::stable_sort(windows.begin(), windows.end(), is_better);
   std::vector<Anchor> anchors;
-  anchors.reserve(fitted.size());
-  for (Window& window : fitted) anchors.push_back(std::move(window.anchor));
+  anchors.reserve(windows.size());
+  for (Window& window : windows) anchors.push_back(std::move(window.anchor));
   return anchors;
+}
+
+/// Moves slips to the borders of packets where most are there: at some rotation angles rotors that
+/// turn against each other do not tell by some dozens of shots where it was.
+void move_to_borders(const NumberedShots& shots, ShotRange range, std::vector<FoundSlip>& slips) {
+  if (slips.size() < kFewestAtBorders) return;
+  const auto past = [](std::int64_t number, std::int64_t border, std::int64_t packet) {
+    return ((number - border) % packet + packet) % packet;  // shots behind the last border
+  };
+  std::size_t most = 0;
+  std::int64_t border = 0, packet = 0;
+  for (const std::int64_t size : kPacketShots) {
+    for (std::int64_t place = 0; place < size; ++place) {
+      const auto at = std::count_if(slips.begin(), slips.end(), [&](const FoundSlip& slip) {
+        const std::int64_t after = shots.number[slip.after];
+        return past(after, place, size) < after - shots.number[slip.before];
+      });
+      if (static_cast<std::size_t>(at) <= most) continue;
+      most = static_cast<std::size_t>(at);
+      border = place;
+      packet = size;
+    }
+  }
+  if (static_cast<double>(most) < kShareAtBorders * static_cast<double>(slips.size())) return;
+  for (FoundSlip& slip : slips) {
+    const std::int64_t after = shots.number[slip.after], behind = past(after, border, packet);
+    if (behind < after - shots.number[slip.before]) continue;
+    const std::int64_t to = after - behind + (2 * behind > packet ? packet : 0);
+    const auto first = shots.number.begin() + static_cast<std::ptrdiff_t>(range.begin);
+    const auto last = shots.number.begin() + static_cast<std::ptrdiff_t>(range.end);
+    const auto found = std::lower_bound(first, last, to);
+    if (found == first || found == last) continue;
+    slip.after = static_cast<std::size_t>(found - shots.number.begin());
+    slip.before = slip.after - 1;
+  }
 }
 
 /// Follows the rotors from an anchor to both ends of a stretch, or as far as they can be followed.
@@ -797,6 +858,7 @@ Followed follow(const NumberedShots& shots, const Anchor& anchor, ShotRange rang
     }
   }
   std::erase_if(result.slips, [](const FoundSlip& slip) { return slip.shots == 0; });
+  move_to_borders(shots, {result.begin, result.end}, result.slips);
   result.residual_rms = (ahead.missed() + back.missed()) /
                         static_cast<double>(std::max<std::size_t>(1, result.end - result.begin));
   return result;
@@ -832,23 +894,26 @@ std::optional<FollowedPiece> follow_piece(NumberedShots& shots, ShotRange range,
   }
   // An anchor is as good as what comes of following the rotors from it.
   std::optional<Anchor> best;
-  std::size_t least_lost = std::numeric_limits<std::size_t>::max();
+  std::size_t least_cost = std::numeric_limits<std::size_t>::max();
   double least_missed = std::numeric_limits<double>::infinity();
   for (const Anchor& one : find_anchors(shots, range, *start, sensor, in_turn, progress)) {
     progress.check();
     shots.firing_order = one.firing_order;
-    const ShotRange near{std::max(range.begin, one.shot - std::min(one.shot, kFittedShots / 2)),
-                         std::min(range.end, one.shot + kFittedShots / 2)};
+    const ShotRange near{std::max(range.begin, one.shot - std::min(one.shot, kTriedShots / 2)),
+                         std::min(range.end, one.shot + kTriedShots / 2)};
     const Followed trial = follow(shots, one, near);
-    const std::size_t lost = near.size() - trial.size();
-    if (lost < least_lost || (lost == least_lost && trial.residual_rms < least_missed)) {
+    const auto doubled = std::count_if(trial.slips.begin(), trial.slips.end(),
+                                       [](const FoundSlip& slip) { return slip.shots < 0; });
+    const std::size_t cost =
+        near.size() - trial.size() + kDoubledCost * static_cast<std::size_t>(doubled);
+    if (cost < least_cost || (cost == least_cost && trial.residual_rms < least_missed)) {
       best = one;
-      least_lost = lost;
+      least_cost = cost;
       least_missed = trial.residual_rms;
     }
     const double fine = std::max(kLeastNoiseSteps * usual_step(one.start, shots.rate),
                                  1.5 * one.start.residual_rms);
-    if (lost == 0 && trial.residual_rms < fine) break;
+    if (cost == 0 && trial.residual_rms < fine) break;
   }
   if (!best) return std::nullopt;
   Anchor anchor = *std::move(best);
