@@ -25,6 +25,7 @@
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/observability.hpp"
 #include "risley/jobs/plan_calibration.hpp"
+#include "risley/recordings/reader.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/truth_file.hpp"
 
@@ -372,6 +373,27 @@ TEST_F(JobsTest, SayWhichOptionIsWrongByItsField) {
   EXPECT_THAT(messages, Each(HasSubstr("option ")));
   EXPECT_THAT(messages, Each(Not(HasSubstr("--"))));
   EXPECT_TRUE(names().empty());
+}
+
+TEST_F(JobsTest, RefuseRangesThatTheSensorCannotHaveMeasured) {
+  const auto calibrate = [this](double factor) {
+    std::ofstream csv(path("ranges.csv"));
+    csv << "time_s,azimuth_deg,zenith_deg,range_m\n";
+    const recordings::Observations shots = recordings::load_recording(hall()).data.observations;
+    for (std::size_t i = 0; i < 20000; ++i) {
+      csv << 1e-9 * static_cast<double>(shots.time_ns[i] - shots.time_ns[0]) << ','
+          << degrees_from_radians(shots.azimuth[i]) << ',' << degrees_from_radians(shots.zenith[i])
+          << ',' << factor * shots.range[i] << '\n';
+    }
+    csv.close();
+    CalibrateRecordingsOptions options = calibration();
+    options.recordings = {path("ranges.csv")};
+    options.truths.clear();
+    options.files = {};
+    return calibrate_recordings(options);
+  };
+  EXPECT_THROW(calibrate(1000.0), EstimationError);
+  EXPECT_THROW(calibrate(0.01), EstimationError);
 }
 
 TEST_F(JobsTest, RefuseTheSameRecordingTwice) {
