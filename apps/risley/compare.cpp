@@ -96,7 +96,7 @@ ExitStatus run_compare(const CompareOptions& options, const CommonOptions& commo
   add_results_of_tables(compared, told);
   require_apart(told, {options.page});
   if (!options.page.empty()) {
-    io::write_text_file(options.page, report::units_page(compared, provenance_of(told)));
+    write_page_file(options.page, report::units_page(compared, provenance_of(told)));
   }
   if (common.json) {
     Json json = json::of(compared);
@@ -128,6 +128,8 @@ Run declare_compare(CLI::App& verb) {
       ->required()
       ->expected(1, 1'000'000);
   verb.add_option("-o,--output", o.page, "Page (HTML) to write (default: none)");
+  verb.add_flag("--anywhere", o.job.anywhere,
+                "Open results that a table names outside of its own folder, too");
   verb.add_option(
           "--false-alarm", o.job.false_alarm,
           "Probability that chance is taken for a change, or a unit for an outlier, at most")

@@ -49,7 +49,16 @@ ExitStatus run_verb(const Run& run, const CommonOptions& common) {
 
 ExitStatus run_command(const std::vector<std::string>& words) {
   CommandLine line;
-  const CommandLine::Parsed parsed = line.parse(words);
+  CommandLine::Parsed parsed;
+  try {
+    parsed = line.parse(words);
+  } catch (...) {  // a result that an option names is not to be used
+    CommonOptions told = line.common();
+    told.json = std::find(words.begin(), words.end(), "--json") != words.end();
+    if (!words.empty()) told.verb = words.front();
+    const Failure failure = current_failure();
+    return fail(failure.status, failure.message, told, failure.details);
+  }
   const CommonOptions& common = line.common();
   if (parsed.help) {
     std::fputs(parsed.help->c_str(), stdout);

@@ -16,6 +16,7 @@ constexpr OptionName kNames[] = {
     {"accuracy", "--accuracy"},
     {"additional", "--free"},
     {"angle_noise", "--noise-angle-deg"},
+    {"anywhere", "--anywhere"},
     {"cell_size", "--cell-size-m"},
     {"chunk", "--chunk"},
     {"clock_drift", "--clock-drift-ppm"},

@@ -51,9 +51,21 @@ std::string result_beside(const std::string& table, const std::string& output) {
   return fs::exists(beside, ignored) ? beside : output;
 }
 
+/// Whether a file or folder is in the folder of a table, or below, by whatever links.
+bool is_below_folder_of(const std::string& table, const std::string& path) {
+  std::error_code code;
+  const fs::path folder = fs::canonical(fs::absolute(table).parent_path(), code);
+  if (code) return false;
+  const fs::path found = fs::canonical(path, code);
+  if (code) return false;
+  return std::mismatch(folder.begin(), folder.end(), found.begin(), found.end()).first ==
+         folder.end();
+}
+
 /// Follows one row to its result. @return why there is none, or nothing
 std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
-                                const std::vector<io::TableCell>& cells, LoadedResults& loaded) {
+                                const std::vector<io::TableCell>& cells, bool anywhere,
+                                LoadedResults& loaded) {
   const std::string input = text_of(cells[0]), output = text_of(cells[1]);
   const std::string name = input.empty() ? fmt::format("{} row {}", table, row) : input;
   const auto* status = std::get_if<std::int64_t>(&cells[2]);
@@ -67,10 +79,22 @@ std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
   const std::string path = result_beside(table, output);
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return LeftOut{name, fmt::format("{} is missing", path), true};
-  if (fs::is_directory(path, ignored) && !calibration_in(path)) {
-    return LeftOut{name, fmt::format("{} has no {}", path, kCalibrationFile), false};
+  // A table may come from anybody: what it names is not opened wherever it is.
+  if (!anywhere && !is_below_folder_of(table, path)) {
+    return LeftOut{
+        name,
+        fmt::format("{} is not in the folder of {}: results elsewhere are opened on demand alone "
+                    "(option anywhere)",
+                    path, table),
+        true};
+  }
+  if (!fs::is_directory(path, ignored) && !fs::is_regular_file(path, ignored)) {
+    return LeftOut{name, fmt::format("{} is neither a file nor a folder", path), true};
   }
   try {
+    if (fs::is_directory(path, ignored) && !calibration_in(path)) {
+      return LeftOut{name, fmt::format("{} has no {}", path, kCalibrationFile), false};
+    }
     loaded.add(path, load_result(path));
   } catch (const FileError& error) {
     return LeftOut{name, error.what(), true};
@@ -78,15 +102,15 @@ std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
   return std::nullopt;
 }
 
-void load_table(const std::string& table, LoadedResults& loaded, std::vector<LeftOut>& left_out,
-                const Progress& progress) {
+void load_table(const std::string& table, bool anywhere, LoadedResults& loaded,
+                std::vector<LeftOut>& left_out, const Progress& progress) {
   const std::vector<io::TableColumn> columns = {
       {"input"}, {"output"}, {"exit_status", io::CellKind::integer}, {"message"}};
   const std::size_t left_out_before = left_out.size();
   std::size_t row = 0;
   for (const auto& cells : io::read_table(table, columns, progress)) {
     progress.check();
-    if (std::optional<LeftOut> none = load_row(table, ++row, cells, loaded)) {
+    if (std::optional<LeftOut> none = load_row(table, ++row, cells, anywhere, loaded)) {
       left_out.push_back(*std::move(none));
     }
   }
@@ -102,15 +126,15 @@ void load_table(const std::string& table, LoadedResults& loaded, std::vector<Lef
                               row, first));
 }
 
-LoadedResults load(const std::vector<std::string>& paths, std::vector<LeftOut>& left_out,
+LoadedResults load(const CompareUnitsOptions& options, std::vector<LeftOut>& left_out,
                    const Progress& progress) {
   LoadedResults loaded;
-  for (const std::string& path : paths) {
+  for (const std::string& path : options.results) {
     progress.check();
     std::error_code ignored;
     if (!fs::is_directory(path, ignored) && io::is_table(path)) {
       loaded.any_table = true;
-      load_table(path, loaded, left_out, progress);
+      load_table(path, options.anywhere, loaded, left_out, progress);
     } else {
       loaded.add(path, load_result(path));
     }
@@ -209,7 +233,7 @@ ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& 
   require_between("option false_alarm", options.false_alarm, 0, 1);
   ComparedUnits found;
   found.false_alarm = options.false_alarm;
-  LoadedResults loaded = load(options.results, found.left_out, progress);
+  LoadedResults loaded = load(options, found.left_out, progress);
   require_at_least("number of results", static_cast<long long>(loaded.paths.size()), 2);
   found.results = loaded.paths;
   found.units = units_of(loaded, found.left_out);

@@ -218,7 +218,10 @@ class ResultTest(CommandTest):
     def test_a_stopped_exchange_is_marked(self):
         self.copy("stopped")
         (self.folder / "stopped/INCOMPLETE").write_text("as a killed run leaves it")
-        self.assertIn("INCOMPLETE", self.expect(0, "report", "stopped").stderr)
+        for words in (("report", "stopped"), ("compare", "stopped", "stopped"),
+                      ("cloud", "unit.lvx", "--calibration", "stopped", "-o", "c.las"),
+                      ("estimate", "unit.lvx", "--sensor", "stopped/calibration.yaml")):
+            self.assertIn("INCOMPLETE", self.expect(3, *words).stderr)
         self.expect(0, "estimate", "unit.lvx", "-o", "stopped")
         self.assertNotIn("INCOMPLETE", self.contents("stopped"))
 

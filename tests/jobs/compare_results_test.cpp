@@ -211,7 +211,7 @@ TEST_F(CompareResults, OfATableFollowsItsRows) {
   std::filesystem::create_directories(folder_.path() / "c3");
   io::write_text_file((folder_.path() / "c3/calibration.yaml").string(), "model: {");
   const std::int64_t done = 0, failed = 3;
-  for (const char* name : {"table.csv", "table.nc", "table.sqlite"}) {
+  for (const char* name : {"table.csv", "table.nc"}) {
     SCOPED_TRACE(name);
     const std::string table =
         table_of(folder_.path() / name, {{"a/may.lvx", "a1/may", done, {}},

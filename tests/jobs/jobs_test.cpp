@@ -155,10 +155,10 @@ TEST_F(JobsTest, TextsAppearWithTheOtherFilesAndOlderOnesStepAside) {
   options.texts = [this](const EstimatedRecording& result) {
     EXPECT_TRUE(names().contains("estimate"));
     EXPECT_FALSE(names().contains("estimate/calibration.yaml"));  // not before the texts are made
-    return std::vector<NamedText>{{"report.json", result.estimate.sensor.name}};
+    return std::vector<NamedText>{{"report.json", "risley " + result.estimate.sensor.name}};
   };
   EXPECT_THAT(estimate_recording(options).warnings, Each(Not(HasSubstr("earlier"))));
-  EXPECT_EQ(io::read_text_file(path("estimate/report.json")), "mid-40");
+  EXPECT_EQ(io::read_text_file(path("estimate/report.json")), "risley mid-40");
   // Of the next run without texts and states none may pass for its own.
   options.texts = nullptr;
   options.files.states = StatesRows::none;
