@@ -128,6 +128,9 @@ Run declare_compare(CLI::App& verb) {
       ->required()
       ->expected(1, 1'000'000);
   verb.add_option("-o,--output", o.page, "Page (HTML) to write (default: none)");
+  verb.add_flag("--unlike", o.job.unlike,
+                "Compare a calibration, which says where beams truly go, with an estimate of what "
+                "the sensor believes, too");
   verb.add_flag("--anywhere", o.job.anywhere,
                 "Open results that a table names outside of its own folder, too");
   verb.add_option(

@@ -61,6 +61,7 @@ constexpr OptionName kNames[] = {
     {"trajectory_errors", "--trajectory-errors"},
     {"trajectory_topic", "--trajectory-topic"},
     {"truth", "--truth"},
+    {"unlike", "--unlike"},
 };
 
 constexpr std::string_view kWord = "ption ";  // after "o" or "O"

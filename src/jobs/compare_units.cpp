@@ -205,6 +205,34 @@ void add_pairs_between(const std::vector<std::size_t>& kind, const std::vector<C
   }
 }
 
+/// A truth and a belief.
+bool are_unlike(const Sensor& a, const Sensor& b) {
+  using sensors::CalibrationReference;
+  return a.reference != CalibrationReference::none && b.reference != CalibrationReference::none &&
+         a.reference != b.reference;
+}
+
+/// @throws InvalidArgument where nothing else was to be compared
+void leave_out_unlike(ComparedUnits& found, const std::vector<Sensor>& sensors) {
+  const auto words = [&](const ComparedPair& pair) {
+    const bool first = sensors[pair.a].reference == sensors::CalibrationReference::planes;
+    return fmt::format(
+        "{} is a calibration, which says where beams truly go, and {} an estimate of what the "
+        "sensor believes: they differ in a unit that never changed (option unlike compares them)",
+        found.results[first ? pair.a : pair.b], found.results[first ? pair.b : pair.a]);
+  };
+  const std::size_t before = found.pairs.size();
+  std::string first;
+  std::erase_if(found.pairs, [&](const ComparedPair& pair) {
+    if (!are_unlike(sensors[pair.a], sensors[pair.b])) return false;
+    if (first.empty()) first = words(pair);
+    found.left_out.push_back(
+        {found.results[pair.a] + " and " + found.results[pair.b], words(pair), false});
+    return true;
+  });
+  if (before > 0 && found.pairs.empty()) throw InvalidArgument(first);
+}
+
 void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Progress& progress) {
   found.least_p_value =
       found.false_alarm / static_cast<double>(std::max<std::size_t>(found.pairs.size(), 1));
@@ -213,7 +241,9 @@ void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Pro
       [&](std::size_t i) {
         ComparedPair& pair = found.pairs[i];
         pair.comparison = compare_results(sensors[pair.a], sensors[pair.b], OneUnit::caller);
-        pair.changed = pair.comparison.change.degrees_of_freedom > 0 &&
+        const std::string &serial_a = sensors[pair.a].serial, &serial_b = sensors[pair.b].serial;
+        const bool others = !serial_a.empty() && !serial_b.empty() && serial_a != serial_b;
+        pair.changed = !others && pair.comparison.change.degrees_of_freedom > 0 &&
                        pair.comparison.change.p_value < found.least_p_value;
       },
       progress);
@@ -253,6 +283,7 @@ ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& 
       add_pairs_between(kind, found.units, found.pairs);
     }
   }
+  if (!options.unlike) leave_out_unlike(found, loaded.sensors);
   if (found.pairs.empty() && fleets.empty()) {
     require_same_optics(loaded.sensors[0], loaded.sensors[1]);
     throw InvalidArgument(fmt::format(
@@ -275,6 +306,7 @@ ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& 
 
 std::string answer_words(const ComparedPair& pair) {
   if (pair.comparison.change.degrees_of_freedom == 0) return "no sigmas to test with";
+  if (one_unit_words(pair.comparison) == "no") return "two units";
   return pair.changed ? "changed" : "no change seen";
 }
 

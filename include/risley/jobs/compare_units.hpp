@@ -23,6 +23,9 @@ struct CompareUnitsOptions {
   /// Whether results that a table names are opened wherever they are, or only in its own folder and
   /// below.
   bool anywhere = false;
+  /// Whether a calibration, which says where beams truly go, is compared with an estimate of what
+  /// the sensor believes: they differ in a unit that never changed.
+  bool unlike = false;
 };
 
 /// Two results, of one unit or of two units of a kind.
