@@ -20,6 +20,7 @@
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/convert_recording.hpp"
 #include "risley/jobs/estimate_recording.hpp"
 #include "risley/jobs/inspect_recording.hpp"
@@ -185,6 +186,33 @@ TEST_F(JobsTest, AStoppedExchangeLeavesItsMark) {
   options.texts = nullptr;
   estimate_recording(options);
   EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/calibration.yaml"}));
+}
+
+TEST_F(JobsTest, WhatSomebodyElseWroteStays) {
+  EstimateRecordingOptions options = estimation();
+  options.details = false;
+  fs::create_directories(path("estimate"));
+  for (const char* name : {"states_1.nc", "trajectory.csv", "report.html"}) {
+    io::write_text_file(path(std::string("estimate/") + name), "mine");
+  }
+  estimate_recording(options);
+  for (const char* name : {"states_1.nc", "trajectory.csv", "report.html"}) {
+    EXPECT_EQ(io::read_text_file(path(std::string("estimate/") + name)), "mine") << name;
+  }
+  io::write_text_file(path("estimate/calibration.yaml"), "mine");
+  EXPECT_THROW(estimate_recording(options), FileError);
+  EXPECT_EQ(io::read_text_file(path("estimate/calibration.yaml")), "mine");
+}
+
+TEST_F(JobsTest, AResultIsTakenOnlyWhenItIsWhole) {
+  EstimateRecordingOptions options = estimation();
+  options.details = false;
+  estimate_recording(options);
+  EXPECT_NO_THROW(load_result(path("estimate")));
+  EXPECT_NO_THROW(load_result(path("estimate/calibration.yaml")));
+  io::write_text_file(path("estimate/INCOMPLETE"), "as a killed run leaves it");
+  EXPECT_THROW(load_result(path("estimate")), FileError);
+  EXPECT_THROW(load_result(path("estimate/calibration.yaml")), FileError);
 }
 
 TEST_F(JobsTest, WriteNothingThatNoOptionNames) {
