@@ -14,8 +14,8 @@ namespace {
 
 /// A wedge of fewer sigmas is one that nobody saw.
 constexpr double kSeenSigmas = 3.0;
-/// Neighbouring residuals of noise are as good as independent. Of a train that leaves as much as the
-/// noise again, three hang together.
+/// Neighbouring residuals of noise are as good as independent. Of a train that leaves as much as
+/// the noise again, three hang together.
 constexpr double kMostCorrelated = 3.0;
 
 }  // namespace

@@ -9,8 +9,8 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/identification/soundness.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/identification/soundness.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
@@ -107,11 +107,10 @@ void judge(IdentifiedRecording& result) {
     result.to_do = "record for longer, or with less of the field of view without returns";
     return;
   }
-  const identification::Doubt doubt =
-      identification::doubt_of(found, result.sensor.sensor);
+  const identification::Doubt doubt = identification::doubt_of(found, result.sensor.sensor);
   if (!doubt.words.empty()) {
-    result.verdict = doubt.refuted ? IdentificationVerdict::inconsistent
-                                   : IdentificationVerdict::undecided;
+    result.verdict =
+        doubt.refuted ? IdentificationVerdict::inconsistent : IdentificationVerdict::undecided;
     result.words = fmt::format("{}; it leaves {}", doubt.words, rms);
     result.to_do =
         "check that the recording is of one sensor at rest, with prisms that all turn, and record "

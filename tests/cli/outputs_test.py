@@ -243,6 +243,11 @@ class ResultTest(CommandTest):
         os.close(writing)
         self.assertEqual(done.returncode, 3, done.stderr)
 
+    def test_a_small_stack_is_enough(self):
+        done = subprocess.run(["sh", "-c", 'ulimit -s 128; exec "$0" estimate unit.lvx --quiet', str(COMMAND)],
+                              cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
     def test_who_waits_for_a_pipe_ends_when_interrupted(self):
         os.mkfifo(self.folder / "scene.yaml")
         with subprocess.Popen([COMMAND, "simulate", "--scene", "scene.yaml", "-o", "waits.nc"],

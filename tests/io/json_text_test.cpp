@@ -21,8 +21,8 @@ TEST(JsonText, IsNoDeeperThanAnyProgramWritesIt) {
   }
   EXPECT_THROW(require_shallow_json("a", std::string(101, '{')), FileError);
   // Not what stands in a text, nor lists beside each other.
-  EXPECT_NO_THROW(require_shallow_json("a", "\"" + std::string(200, '[') + "\\\"" +
-                                                std::string(200, '[') + "\""));
+  EXPECT_NO_THROW(require_shallow_json(
+      "a", "\"" + std::string(200, '[') + "\\\"" + std::string(200, '[') + "\""));
   std::string flat;
   for (int i = 0; i < 1000; ++i) flat += "[],";
   EXPECT_NO_THROW(require_shallow_json("a", flat));

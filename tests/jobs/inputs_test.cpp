@@ -67,8 +67,8 @@ class InputsTest : public ::testing::Test {
 };
 
 TEST_F(InputsTest, EverythingBehindANameIsKnown) {
-  make({"a.db3", "a.db3-wal", "u.truth.yaml", "u.truth.nc", "u.mount.truth.yaml", "est/calibration.yaml",
-        "est/states.nc"});
+  make({"a.db3", "a.db3-wal", "u.truth.yaml", "u.truth.nc", "u.mount.truth.yaml",
+        "est/calibration.yaml", "est/states.nc"});
   EXPECT_THAT(files_behind("a.db3"), ElementsAre("a.db3", "a.db3-wal"));
   EXPECT_THAT(files_behind("u.truth.yaml"),
               ElementsAre("u.mount.truth.yaml", "u.truth.nc", "u.truth.yaml"));
