@@ -94,23 +94,6 @@ TEST_F(CompareResults, TwoUnitsAreNotOneThatChanged) {
   EXPECT_FALSE(found.pairs[0].changed);
 }
 
-TEST_F(CompareResults, ATableOpensNothingOutsideOfItsFolder) {
-  const std::int64_t done = 0;
-  std::filesystem::create_directories(folder_.path() / "below");
-  saved("a", result("A1"));
-  saved("b", result("B2"));
-  std::filesystem::create_symlink(folder_.path() / "b", folder_.path() / "below/b");
-  const std::string table = table_of(folder_.path() / "below/table.csv",
-                                     {{"a.lvx", (folder_.path() / "a").string(), done, {}},
-                                      {"b.lvx", "b", done, {}},
-                                      {"zero", "/dev/zero", done, {}}});
-  EXPECT_THROW(compare_units({{table}, 0.01}), FileError);
-  const ComparedUnits found = compare_units({{table}, 0.01, true});
-  EXPECT_EQ(found.results.size(), 2U);
-  ASSERT_EQ(found.left_out.size(), 1U);
-  EXPECT_EQ(found.left_out[0].name, "zero");
-}
-
 // Turning the incident beam turns all beams alike, to a twentieth.
 TEST_F(CompareResults, SaysHowFarDirectionsDiffer) {
   sensors::Sensor turned = result("A1");
@@ -360,6 +343,23 @@ TEST_F(CompareResults, SaysWhatIsMissing) {
     EXPECT_THAT(error.what(), HasSubstr("calibration.yaml"));
     EXPECT_THAT(error.what(), HasSubstr("is missing"));
   }
+}
+
+TEST_F(CompareResults, ATableOpensNothingOutsideOfItsFolder) {
+  const std::int64_t done = 0;
+  std::filesystem::create_directories(folder_.path() / "below");
+  saved("a", result("A1"));
+  saved("b", result("B2"));
+  std::filesystem::create_symlink(folder_.path() / "b", folder_.path() / "below/b");
+  const std::string table = table_of(folder_.path() / "below/table.csv",
+                                     {{"a.lvx", (folder_.path() / "a").string(), done, {}},
+                                      {"b.lvx", "b", done, {}},
+                                      {"zero", "/dev/zero", done, {}}});
+  EXPECT_THROW(compare_units({{table}, 0.01}), FileError);
+  const ComparedUnits found = compare_units({{table}, 0.01, true});
+  EXPECT_EQ(found.results.size(), 2U);
+  ASSERT_EQ(found.left_out.size(), 1U);
+  EXPECT_EQ(found.left_out[0].name, "zero");
 }
 
 }  // namespace risley::jobs::compare_results_test
