@@ -12,7 +12,6 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/jobs/compare_units.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/report/units_page.hpp"

@@ -14,7 +14,6 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/number_text.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/jobs/pattern_details.hpp"
 #include "risley/jobs/write_pattern.hpp"
 #include "risley/report/pattern_page.hpp"
@@ -136,7 +135,7 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
     details = jobs::pattern_details(options.sensor, scan, coverage, bar.progress());
   }
   if (!options.report.empty()) {
-    io::write_text_file(options.report, report::pattern_page(*details, provenance_of(common)));
+    write_page_file(options.report, report::pattern_page(*details, provenance_of(common)));
   }
   if (to_stdout) {
     std::cout.flush();

@@ -9,7 +9,6 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/report/comparison_page.hpp"
 #include "risley/report/report_file.hpp"

@@ -47,6 +47,13 @@ void require_folder_apart(const CommonOptions& common, const std::string& folder
   outputs.insert(outputs.end(), {"calibration.yaml", "report.json", "report.html"});
   for (std::string& name : outputs) name = (std::filesystem::path(folder) / name).string();
   require_apart(common, outputs);
+  // Before an hour of computing; of rotor states not all are written.
+  for (const std::string& name : outputs) {
+    if (std::filesystem::path(name).extension() == ".nc" || jobs::is_own_result(name)) continue;
+    throw FileError(name, {},
+                    "is not a result of risley, and would be replaced by one: move it, or give "
+                    "another folder");
+  }
 }
 
 void write_page_file(const std::string& path, const std::string& html) {
