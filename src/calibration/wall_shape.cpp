@@ -36,6 +36,8 @@ constexpr int kSmoothness = 2, kPower = kSmoothness + 1;
 
 /// Parameters that weigh less against the likeliest ones are left aside.
 constexpr double kUnlikely = 1e-3;
+/// Parameters that weigh less change no digit of what is found.
+constexpr double kHopeless = 1e-15;
 
 /// Numbers of the nodes: those along the shorter side follow each other, which keeps the band
 /// narrow.
@@ -205,6 +207,7 @@ class ShapeSearch {
         std::max_element(prior_.weight.begin(), prior_.weight.end()) - prior_.weight.begin())};
     while (!next.empty()) {
       try_all(next);
+      forget_hopeless();
       next = beside_likely();
     }
     return mixture();
@@ -289,6 +292,17 @@ class ShapeSearch {
       if (!own.result.positive) continue;
       own.log_weight = std::log(prior_.weight[row]) -
                        0.5 * (log_determinant + own.result.log_determinant + own.result.cost);
+    }
+  }
+
+  /// Parameters that add nothing to the mean are no parameters any more: of walls that many
+  /// recordings share, each keeps megabytes.
+  void forget_hopeless() {
+    const double least = best() + std::log(kHopeless);
+    for (Tried& one : tried_) {
+      if (!one.done || one.log_weight >= least) continue;
+      one = {};
+      one.done = true;
     }
   }
 
