@@ -43,7 +43,7 @@ Doubt doubt_of(const Identification& found, const sensors::Sensor& sensor) {
     return {fmt::format("what the best train leaves is no noise: {:.0f} neighbouring shots are off "
                         "alike",
                         found.correlation_time_factor),
-            true};
+            false};
   }
   return {};
 }

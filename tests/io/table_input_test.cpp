@@ -117,17 +117,15 @@ TEST(TableInput, RefusesOtherKinds) {
 
 TEST(TableInput, SurvivesAnyChangedByte) {
   const TestFolder folder;
-  for (const char* name : {"t.csv"}) {
-    write(folder.file(name));
-    const std::string bytes = read_text_file(folder.file(name));
-    for (std::size_t at = 16; at < bytes.size(); at += 7) {
-      std::string changed = bytes;
-      changed[at] = static_cast<char>(changed[at] ^ (1 << (at % 8)));
-      write_text_file(folder.file(name), changed);
-      try {
-        ASSERT_LE(read_table(folder.file(name), kColumns).size(), 100U);
-      } catch (const FileError&) {  // named, not obeyed
-      }
+  write(folder.file("t.csv"));
+  const std::string bytes = read_text_file(folder.file("t.csv"));
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    std::string changed = bytes;
+    changed[at] = static_cast<char>(changed[at] ^ (1 << (at % 8)));
+    write_text_file(folder.file("t.csv"), changed);
+    try {
+      ASSERT_LE(read_table(folder.file("t.csv"), kColumns).size(), 100U);
+    } catch (const FileError&) {  // named, not obeyed
     }
   }
 }
@@ -137,10 +135,8 @@ TEST(TableInput, CanBeCancelled) {
   CancelFlag flag;
   flag.set();
   const Progress progress([](double) {}, &flag);
-  for (const char* name : {"t.csv", "t.nc"}) {
-    write(folder.file(name));
-    EXPECT_THROW(read_table(folder.file(name), kColumns, progress), Cancelled);
-  }
+  write(folder.file("t.csv"));
+  EXPECT_THROW(read_table(folder.file("t.csv"), kColumns, progress), Cancelled);
 }
 
 }  // namespace risley::io::table_input_test
