@@ -338,7 +338,7 @@ TEST_F(JobsTest, AnotherThreadStopsAnEstimate) {
 
 TEST_F(JobsTest, FailedNumbersSetAnOlderCalibrationAside) {
   fs::create_directories(path("estimate"));
-  std::ofstream(path("estimate/calibration.yaml")) << "older";
+  std::ofstream(path("estimate/calibration.yaml")) << "risley, older";
   EstimateRecordingOptions options = estimation();
   options.truth.clear();
   options.additional = {"refractive_index_air", "wedge_angle_deg"};  // no data tell them apart
