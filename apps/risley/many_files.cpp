@@ -358,10 +358,7 @@ class Runner {
     if (!jobs::is_whole(*record, work_text_, hashes, progress.silent())) return std::nullopt;
     try {
       Finished finished = Finished::from_json(Json::parse(record->outcome));
-      // A result has files of its own; those that stand there have to be these.
-      if (!job.output.empty() && finished.outcome.status == kDone && record->outputs.empty()) {
-        return std::nullopt;
-      }
+      // Files of a result that stand there have to be those of the record.
       const std::set<std::string> known = names_of(record->outputs);
       for (const std::string& file : files_of(work_, job)) {
         std::error_code ignored;

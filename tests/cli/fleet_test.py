@@ -141,7 +141,8 @@ class FleetTest(CommandTest):
         ended = os.times()  # processor time: others may be busy
         self.assertLess(ended.children_user - started.children_user, 1 if not SANITIZED else 60)
         self.assertEqual(self.counts(found), (0, 5, 6))
-        self.assertTrue(all(one["skipped"] for one in found["results"]))
+        # What could not be read may have been the machine's fault.
+        self.assertTrue(all(one.get("skipped", False) == (one["status"] != 3) for one in found["results"]))
         self.assertEqual(self.rows("again.csv"), self.rows("fleet.csv"))
         shutil.copy(self.folder / "fleet/zenith.lvx", self.folder / "before.lvx")
         try:  # another file of the same name; its time tells nothing
