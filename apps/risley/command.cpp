@@ -44,6 +44,7 @@ CancelFlag
     interrupted;  // NOLINT(*-avoid-non-const-global-variables): of the process, as signals are
 
 sem_t interruptions;                    // NOLINT(*-avoid-non-const-global-variables): as above
+std::string object_when_interrupted;    // NOLINT(*-avoid-non-const-global-variables): as above
 std::atomic<bool> in_own_time = false;  // NOLINT(*-avoid-non-const-global-variables): as above
 
 void note_signal(int) {
@@ -60,7 +61,9 @@ void wait_for_interruption() {
   if (in_own_time) return;
   io::remove_temporaries();
   constexpr std::string_view kWords = "risley: error: interrupted\n";
-  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kWords.data(), kWords.size());
+  [[maybe_unused]] auto written = ::write(STDERR_FILENO, kWords.data(), kWords.size());
+  const std::string& object = object_when_interrupted;
+  if (!object.empty()) written = ::write(STDOUT_FILENO, object.data(), object.size());
   ::_exit(kInterrupted);
 }
 
@@ -82,6 +85,24 @@ void watch_signals() {
   std::signal(SIGTERM, note_signal);
   // nohup and the like want it ignored.
   if (std::signal(SIGHUP, note_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+}
+
+void prepare_interruption(const CommonOptions& common) {
+  if (!common.json) return;
+  Json inputs = Json::array();
+  for (const auto* files : {&common.inputs, &common.files}) {
+    for (const std::string& path : *files) inputs.push_back({{"path", path}, {"sha256", nullptr}});
+  }
+  Json object = {{"format_version", json::kFormatVersion},
+                 {"version", RISLEY_VERSION},
+                 {"command", common.command},
+                 {"inputs", inputs},
+                 {"error", "interrupted"},
+                 {"exit_status", static_cast<int>(kInterrupted)}};
+  if (common.verb == "estimate" || common.verb == "calibrate") {
+    object.update(undecided("interrupted"));
+  }
+  object_when_interrupted = object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 void end_in_own_time() { in_own_time = true; }

@@ -93,6 +93,9 @@ Run declare_emulate(CLI::App& verb);
 /// beyond the limit for files, fails like any other writing.
 void watch_signals();
 
+/// What --json says in that case, before anything is computed.
+void prepare_interruption(const CommonOptions& common);
+
 /// For verbs that end a recording when they are interrupted: they take the time that they need.
 void end_in_own_time();
 

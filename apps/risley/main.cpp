@@ -76,6 +76,7 @@ ExitStatus run_command(const std::vector<std::string>& words) {
                                               static_cast<std::size_t>(common.threads))
             .release();
   }
+  prepare_interruption(common);
   return run_verb(line.run_of(*parsed.verb), common);
 }
 
