@@ -3,6 +3,7 @@
 // Everything from a recording to a cloud through the jobs alone, as another front end would do it,
 // and what cancelling them leaves behind: nothing.
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -27,6 +28,7 @@
 #include "risley/jobs/observability.hpp"
 #include "risley/jobs/plan_calibration.hpp"
 #include "risley/recordings/reader.hpp"
+#include "risley/recordings/truth.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/truth_file.hpp"
 
@@ -186,6 +188,24 @@ TEST_F(JobsTest, AStoppedExchangeLeavesItsMark) {
   options.texts = nullptr;
   estimate_recording(options);
   EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/calibration.yaml"}));
+}
+
+TEST_F(JobsTest, RotationAnglesAreThoseOfTheFirstShot) {
+  EstimateRecordingOptions options = estimation();
+  options.details = false;
+  options.files = {};
+  const EstimatedRecording found = estimate_recording(options);
+  const estimation::Estimate& estimate = found.estimate;
+  const std::int64_t first_ns = estimate.series.time_ns(0);
+  ASSERT_LT(first_ns, estimate.states.time_ns.front()) << "the first knot comes later";
+  const auto truth = recordings::load_truth(hall() + ".truth.nc", std::vector{first_ns});
+  ASSERT_EQ(truth.time_ns.size(), 1U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const estimation::EstimatedValue& angle = estimate.values[estimate.values.size() - 2 + k];
+    EXPECT_LT(std::abs(wrap_to_pi(angle.value - truth.rotation_angle[k][0])), 5 * angle.sigma)
+        << angle.name;
+    ASSERT_LT(angle.sigma, radians_from_degrees(0.1));
+  }
 }
 
 TEST_F(JobsTest, WhatSomebodyElseWroteStays) {
