@@ -99,7 +99,8 @@ estimation::Evaluation evaluate_by_file(const estimation::Estimate& estimate,
   // One row per state, and the first shot's: the truth of a full-rate recording is larger than the
   // recording.
   std::vector<std::int64_t> times = estimate.states.time_ns;
-  times.push_back(estimate.series.time_ns(estimation::first_used_shot(estimate)));
+  const std::int64_t first_ns = estimate.series.time_ns(estimation::first_used_shot(estimate));
+  if (std::find(times.begin(), times.end(), first_ns) == times.end()) times.push_back(first_ns);
   std::sort(times.begin(), times.end());
   const recordings::TruthColumns columns = recordings::load_truth(truth_columns(truth), times);
   check_beams(estimate.series, columns, truth);
