@@ -311,7 +311,7 @@ Run declare_calibrate(CLI::App& verb) {
                    "calibration, or with --table for one each");
   verb.get_option("--table")->description(
       "Calibrate every recording on its own, and write a table with one row for each; the ending "
-      "chooses the format: .csv, .nc (NetCDF), .sqlite, .sqlite3 or .db (SQLite)");
+      "chooses the format: .csv or .nc (NetCDF)");
   verb.get_option("--resume")
       ->description(
           "Calibrate every recording on its own, but skip those whose results are whole and were "

@@ -182,9 +182,10 @@ Run declare_campaign(CLI::App& verb) {
           "whole is not computed again (default: all chunks, then the merge)")
       ->type_name("I/N");
   verb.add_flag("--merge", o.merge, "Make the table and the summary of the chunks that are there");
-  verb.add_option("--table", o.table,
-                  "Table to write with one row per cell; the ending chooses the format: .csv, .nc "
-                  "(NetCDF), .sqlite, .sqlite3 or .db (SQLite) (default: cells.csv in the folder)")
+  verb.add_option(
+          "--table", o.table,
+          "Table to write with one row per cell; the ending chooses the format: .csv or .nc "
+          "(NetCDF) (default: cells.csv in the folder)")
       ->type_name("FILE");
   return [options](const CommonOptions& common) { return run_campaign(*options, common); };
 }

@@ -9,7 +9,6 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/jobs/beam_origins.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
 #include "risley/jobs/recording_input.hpp"
@@ -90,8 +89,8 @@ std::string calibration_text(const jobs::RecordingCloud& made) {
 ExitStatus write_beam_origin_map(const CloudCommandOptions& options, const CommonOptions& common) {
   const sensors::Sensor calibration = sensors::load_sensor(options.calibration);
   const jobs::BeamOrigins found = jobs::beam_origins(calibration);
-  io::write_text_file(options.beam_origin_map,
-                      report::beam_origin_page(found.map, calibration, provenance_of(common)));
+  write_page_file(options.beam_origin_map,
+                  report::beam_origin_page(found.map, calibration, provenance_of(common)));
   if (common.json) {
     Json json = {{"html", options.beam_origin_map}};
     json.update(json::of(found));
@@ -120,11 +119,11 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
                   job.output);
   }
   if (s.distribution) {
-    io::write_text_file(options.distribution,
-                        report::distribution_page(*s.distribution, job.input, provenance));
+    write_page_file(options.distribution,
+                    report::distribution_page(*s.distribution, job.input, provenance));
   }
   if (s.sample) {
-    io::write_text_file(options.report, report::cloud_page(s, job.input, provenance));
+    write_page_file(options.report, report::cloud_page(s, job.input, provenance));
   }
   std::string text = fmt::format("{}: {} points", job.output, grouped(s.points));
   if (s.no_return > 0) text += fmt::format(", {} shots without return", grouped(s.no_return));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -16,10 +17,12 @@
 #include <map>
 #include <new>
 #include <set>
+#include <thread>
 #include <unordered_map>
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <semaphore.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -29,6 +32,7 @@
 #include "risley/core/text.hpp"
 #include "risley/io/file_identity.hpp"
 #include "risley/io/sha256.hpp"
+#include "risley/io/temporaries.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/wire/udp_socket.hpp"
@@ -39,7 +43,29 @@ namespace {
 CancelFlag
     interrupted;  // NOLINT(*-avoid-non-const-global-variables): of the process, as signals are
 
-void note_signal(int) { interrupted.set(); }
+sem_t interruptions;                    // NOLINT(*-avoid-non-const-global-variables): as above
+std::string object_when_interrupted;    // NOLINT(*-avoid-non-const-global-variables): as above
+std::atomic<bool> in_own_time = false;  // NOLINT(*-avoid-non-const-global-variables): as above
+
+void note_signal(int) {
+  interrupted.set();
+  ::sem_post(&interruptions);
+}
+
+/// Ends the process when nobody notices that it was interrupted.
+void wait_for_interruption() {
+  constexpr auto kPatience = std::chrono::milliseconds(1500);
+  while (::sem_wait(&interruptions) != 0) {
+  }
+  std::this_thread::sleep_for(kPatience);
+  if (in_own_time) return;
+  io::remove_temporaries();
+  constexpr std::string_view kWords = "risley: error: interrupted\n";
+  [[maybe_unused]] auto written = ::write(STDERR_FILENO, kWords.data(), kWords.size());
+  const std::string& object = object_when_interrupted;
+  if (!object.empty()) written = ::write(STDOUT_FILENO, object.data(), object.size());
+  ::_exit(kInterrupted);
+}
 
 std::string duration_text(double seconds) {
   const int whole = static_cast<int>(std::lround(std::min(seconds, 359999.0)));
@@ -51,11 +77,35 @@ std::string duration_text(double seconds) {
 }  // namespace
 
 void watch_signals() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+  ::sem_init(&interruptions, 0, 0);
+  std::thread(wait_for_interruption).detach();
   std::signal(SIGINT, note_signal);
   std::signal(SIGTERM, note_signal);
   // nohup and the like want it ignored.
   if (std::signal(SIGHUP, note_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
+
+void prepare_interruption(const CommonOptions& common) {
+  if (!common.json) return;
+  Json inputs = Json::array();
+  for (const auto* files : {&common.inputs, &common.files}) {
+    for (const std::string& path : *files) inputs.push_back({{"path", path}, {"sha256", nullptr}});
+  }
+  Json object = {{"format_version", json::kFormatVersion},
+                 {"version", RISLEY_VERSION},
+                 {"command", common.command},
+                 {"inputs", inputs},
+                 {"error", "interrupted"},
+                 {"exit_status", static_cast<int>(kInterrupted)}};
+  if (common.verb == "estimate" || common.verb == "calibrate") {
+    object.update(undecided("interrupted"));
+  }
+  object_when_interrupted = object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void end_in_own_time() { in_own_time = true; }
 
 void hold_standard_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
@@ -275,6 +325,22 @@ ExitStatus close_stdout(ExitStatus status) {
   return std::max(status, kBadFile);
 }
 
+namespace {
+
+/// Where a file will be, by whatever spelling and links.
+std::string place_of(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  fs::path place = fs::absolute(path, ignored);
+  constexpr int kMostLinks = 40;
+  for (int links = 0; links < kMostLinks && fs::is_symlink(place, ignored); ++links) {
+    place = place.parent_path() / fs::read_symlink(place, ignored);
+  }
+  return fs::weakly_canonical(place, ignored).string();
+}
+
+}  // namespace
+
 void require_apart(const CommonOptions& common, const std::vector<std::string>& outputs) {
   namespace fs = std::filesystem;
   std::vector<std::string> inputs = common.inputs;
@@ -288,7 +354,7 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
     return fs::is_regular_file(path, ignored) ? io::file_identity(path) : std::nullopt;
   };
   std::map<io::FileIdentity, std::string> read, written;
-  std::set<std::string> names;
+  std::map<std::string, std::string> names;
   for (const std::string& input : inputs) {
     if (const auto identity = identity_of(input)) read.try_emplace(*identity, input);
   }
@@ -300,7 +366,8 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
           fmt::format("the output {} would replace {}, which this command reads: give another name",
                       output, input->second == output ? "the input of that name" : input->second));
     }
-    std::string other = names.insert(output).second ? "" : output;
+    const auto [named, is_new_name] = names.try_emplace(place_of(output), output);
+    std::string other = is_new_name ? "" : named->second;
     if (identity && other.empty()) {
       const auto [place, is_new] = written.try_emplace(*identity, output);
       if (!is_new) other = place->second;

@@ -88,7 +88,16 @@ Run declare_emulate(CLI::App& verb);
 
 /// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in
 /// the making is removed by its owner.
+/// Who does not notice within two seconds, because it waits for a pipe or computes what cannot be
+/// stopped, is ended; outputs in the making are removed then, too. Writing to a closed pipe, or
+/// beyond the limit for files, fails like any other writing.
 void watch_signals();
+
+/// What --json says in that case, before anything is computed.
+void prepare_interruption(const CommonOptions& common);
+
+/// For verbs that end a recording when they are interrupted: they take the time that they need.
+void end_in_own_time();
 
 /// Standard streams that the caller closed are taken, so that no file gets their numbers and what
 /// is meant for a terminal.

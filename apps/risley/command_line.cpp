@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <filesystem>
 #include <limits>
 #include <memory>
 #include <sstream>
@@ -191,6 +192,39 @@ std::string usage_error(const CLI::ParseError& error, const std::vector<std::str
                      fmt::join(names, ", "));
 }
 
+/// Whether a text, or what stands in it between commas or behind an equals sign, is NaN or
+/// infinite.
+bool holds_no_number(const std::string& text) {
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find_first_of(",=:", begin), text.size());
+    std::string part = lower_case(text.substr(begin, end - begin));
+    if (part.starts_with('+') || part.starts_with('-')) part.erase(0, 1);
+    if (part == "inf" || part == "infinity" || part == "nan" || part.starts_with("nan(")) {
+      return true;
+    }
+    begin = end + 1;
+  }
+  return false;
+}
+
+/// The first option whose value holds a number that is none: nothing here is computed with NaN or
+/// infinity. Names of files may be anything. Empty: there is none.
+std::string not_a_number(const CLI::App& verb) {
+  for (const CLI::Option* option : verb.get_options()) {
+    if (option->get_lnames().empty()) continue;  // inputs
+    for (const std::string& value : option->results()) {
+      std::error_code ignored;
+      if (!holds_no_number(value) || std::filesystem::exists(value, ignored)) continue;
+      return fmt::format("{} = {}, expected finite numbers", option->get_name(), value);
+    }
+  }
+  for (const CLI::App* below : verb.get_subcommands()) {
+    if (std::string found = not_a_number(*below); !found.empty()) return found;
+  }
+  return {};
+}
+
 /// Options that take a calibration take the folder that `calibrate` or `estimate` wrote it to.
 void take_result_folders(CLI::App& verb) {
   for (CLI::Option* option : verb.get_options([](const CLI::Option* one) {
@@ -198,6 +232,8 @@ void take_result_folders(CLI::App& verb) {
        })) {
     option->transform(CLI::Validator(
         [](std::string& value) {
+          std::error_code ignored;
+          if (std::filesystem::is_regular_file(value, ignored)) jobs::require_settled(value);
           value = jobs::calibration_in(value).value_or(value);
           return std::string();
         },
@@ -245,6 +281,10 @@ CommandLine::Parsed CommandLine::parse(const std::vector<std::string>& words) {
   }
   parsed.verb = app_.get_subcommands().front();
   common_.verb = parsed.verb->get_name();
+  if (const std::string unusable = not_a_number(*parsed.verb); !unusable.empty()) {
+    parsed.problem = fmt::format("{} (see risley {} --help)", unusable, common_.verb);
+    return parsed;
+  }
   note_files(*parsed.verb, common_);
   return parsed;
 }

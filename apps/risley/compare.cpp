@@ -12,7 +12,6 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/jobs/compare_units.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/report/units_page.hpp"
@@ -96,7 +95,7 @@ ExitStatus run_compare(const CompareOptions& options, const CommonOptions& commo
   add_results_of_tables(compared, told);
   require_apart(told, {options.page});
   if (!options.page.empty()) {
-    io::write_text_file(options.page, report::units_page(compared, provenance_of(told)));
+    write_page_file(options.page, report::units_page(compared, provenance_of(told)));
   }
   if (common.json) {
     Json json = json::of(compared);
@@ -128,6 +127,11 @@ Run declare_compare(CLI::App& verb) {
       ->required()
       ->expected(1, 1'000'000);
   verb.add_option("-o,--output", o.page, "Page (HTML) to write (default: none)");
+  verb.add_flag("--unlike", o.job.unlike,
+                "Compare a calibration, which says where beams truly go, with an estimate of what "
+                "the sensor believes, too");
+  verb.add_flag("--anywhere", o.job.anywhere,
+                "Open results that a table names outside of its own folder, too");
   verb.add_option(
           "--false-alarm", o.job.false_alarm,
           "Probability that chance is taken for a change, or a unit for an outlier, at most")

@@ -183,6 +183,7 @@ Run declare_emulate(CLI::App& verb) {
   declare_clock(verb, o);
   declare_faults(verb, o);
   return [options](const CommonOptions& common) {
+    end_in_own_time();
     const jobs::EmulatedSensor truth = jobs::emulate_sensor(
         job_of(*options, common), [](const std::string& words) { spdlog::debug(words); },
         cancellable());

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <malloc.h>
+#include <pthread.h>
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -49,7 +50,16 @@ ExitStatus run_verb(const Run& run, const CommonOptions& common) {
 
 ExitStatus run_command(const std::vector<std::string>& words) {
   CommandLine line;
-  const CommandLine::Parsed parsed = line.parse(words);
+  CommandLine::Parsed parsed;
+  try {
+    parsed = line.parse(words);
+  } catch (...) {  // a result that an option names is not to be used
+    CommonOptions told = line.common();
+    told.json = std::find(words.begin(), words.end(), "--json") != words.end();
+    if (!words.empty()) told.verb = words.front();
+    const Failure failure = current_failure();
+    return fail(failure.status, failure.message, told, failure.details);
+  }
   const CommonOptions& common = line.common();
   if (parsed.help) {
     std::fputs(parsed.help->c_str(), stdout);
@@ -66,6 +76,7 @@ ExitStatus run_command(const std::vector<std::string>& words) {
                                               static_cast<std::size_t>(common.threads))
             .release();
   }
+  prepare_interruption(common);
   return run_verb(line.run_of(*parsed.verb), common);
 }
 
@@ -102,6 +113,29 @@ void keep_freed_memory() {
 #endif
 }
 
+/// Runs a command on a stack that is large enough, whatever the limit for that of the process.
+ExitStatus run_on_large_stack(const std::vector<std::string>& words) {
+  struct Task {
+    const std::vector<std::string>& words;
+    ExitStatus status;
+  } task{words, kFault};
+  const auto run = [](void* of) -> void* {
+    auto* own = static_cast<Task*>(of);
+    own->status = run_command(own->words);
+    return nullptr;
+  };
+  constexpr std::size_t kStackBytes = std::size_t{8} << 20U;
+  pthread_attr_t attributes;
+  pthread_t thread;
+  ::pthread_attr_init(&attributes);
+  const bool started = ::pthread_attr_setstacksize(&attributes, kStackBytes) == 0 &&
+                       ::pthread_create(&thread, &attributes, run, &task) == 0;
+  ::pthread_attr_destroy(&attributes);
+  if (!started) return run_command(words);
+  ::pthread_join(thread, nullptr);
+  return task.status;
+}
+
 /// What no handler caught is a bug, or memory that ran out where nobody could say so.
 [[noreturn]] void end_by_fault() {
   constexpr std::string_view kWords =
@@ -120,5 +154,5 @@ int main(int argc, char** argv) {
   hold_standard_streams();
   start_log();
   watch_signals();
-  return close_stdout(run_command({argv + std::min(argc, 1), argv + argc}));
+  return close_stdout(run_on_large_stack({argv + std::min(argc, 1), argv + argc}));
 }

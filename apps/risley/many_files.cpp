@@ -11,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -21,6 +22,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/folder.hpp"
+#include "risley/io/folder_lock.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/io/table_file.hpp"
@@ -190,10 +192,11 @@ std::string work_text(const CLI::App& verb, const CommonOptions& common) {
     }
     if (values.empty()) continue;
     for (std::string& value : values) {
-      std::error_code ignored;
-      if (fs::is_regular_file(value, ignored)) {
-        value = "sha256:" + io::sha256_of_file(value, cancellable());
+      std::string contents;
+      for (const std::string& file : jobs::files_behind(value)) {
+        contents += " sha256:" + io::sha256_of_file(file, cancellable());
       }
+      if (!contents.empty()) value = contents;
     }
     lines.push_back(fmt::format("{}={}", name, fmt::join(values, " ")));
   }
@@ -216,16 +219,10 @@ bool is_large(const std::string& input) {
   return kMemoryPerByte * bytes * static_cast<double>(parallel::thread_count()) > memory;
 }
 
-/// Whether the same failure would come of the same bytes again: neither the machine nor another
-/// file was to blame.
-bool is_of_input(const FileOutcome& outcome, const std::vector<std::string>& files) {
-  if (outcome.status == kDone || outcome.status == kNumbersFailed ||
-      outcome.status == kWrongUsage) {
-    return true;
-  }
-  return outcome.status == kBadFile && outcome.json.contains("file") &&
-         std::find(files.begin(), files.end(), outcome.json["file"].get<std::string>()) !=
-             files.end();
+/// Whether the same would come of the same bytes again. What could not be read or written may be
+/// the machine's fault, and is quickly found out again.
+bool is_of_input(const FileOutcome& outcome) {
+  return outcome.status == kDone || outcome.status == kNumbersFailed;
 }
 
 std::vector<std::string> files_of(const FileWork& work, const FileJob& job) {
@@ -246,6 +243,7 @@ class Runner {
         hashes_(jobs_.size()),
         spool_(jobs_.size()) {
     if (!records_.empty()) work_text_ = work_text(verb, common);
+    if (!jobs.folder.empty()) lock_.emplace(jobs.folder);
     if (!wishes.table.empty()) const io::OutputFile can_be_written(wishes.table);
   }
 
@@ -305,11 +303,7 @@ class Runner {
     // Before the work: if the file changes meanwhile, the result is made again.
     hashes_[i] = jobs::input_hashes(job.input, progress.silent());
     Finished finished;
-    std::vector<std::string> files;
-    for (const auto& [file, hash] : hashes_[i]) {
-      files.push_back(file);
-      finished.hashes.push_back(hash);
-    }
+    for (const auto& [file, hash] : hashes_[i]) finished.hashes.push_back(hash);
     if (wishes_.resume) {
       if (std::optional<Finished> before = made_before(job, finished.hashes, progress)) {
         return *std::move(before);
@@ -326,7 +320,7 @@ class Runner {
       finished.outcome = failed(job, current_failure(), common_);
     }
     finished.elapsed = now() - started;
-    if (!records_.empty() && is_of_input(finished.outcome, files)) {
+    if (!records_.empty() && is_of_input(finished.outcome)) {
       // What stands where a failed result would be is of an earlier run.
       keep(job, finished, is_made ? files_of(work_, job) : std::vector<std::string>(), progress);
     }
@@ -344,6 +338,16 @@ class Runner {
         .string();
   }
 
+  static std::string absolute_name(const std::string& file) {
+    return fs::absolute(file).lexically_normal().string();
+  }
+  static std::set<std::string> names_of(
+      const std::vector<std::pair<std::string, std::string>>& files) {
+    std::set<std::string> names;
+    for (const auto& [file, hash] : files) names.insert(absolute_name(file));
+    return names;
+  }
+
   std::optional<Finished> made_before(const FileJob& job, const std::vector<std::string>& hashes,
                                       const Progress& progress) const {
     std::optional<jobs::ResultRecord> record = jobs::load_record(record_of(job));
@@ -354,6 +358,15 @@ class Runner {
     if (!jobs::is_whole(*record, work_text_, hashes, progress.silent())) return std::nullopt;
     try {
       Finished finished = Finished::from_json(Json::parse(record->outcome));
+      // Files of a result that stand there have to be those of the record.
+      const std::set<std::string> known = names_of(record->outputs);
+      for (const std::string& file : files_of(work_, job)) {
+        std::error_code ignored;
+        if (finished.outcome.status == kDone && fs::exists(file, ignored) &&
+            !known.contains(absolute_name(file))) {
+          return std::nullopt;
+        }
+      }
       Json& json = finished.outcome.json;
       json["input"] = job.input;
       if (json.contains("output") && !job.output.empty()) json["output"] = job.output;
@@ -478,6 +491,7 @@ class Runner {
   std::vector<std::vector<std::pair<std::string, std::string>>>
       hashes_;  ///< of every input's files
   Spool spool_;
+  std::optional<io::FolderLock> lock_;  ///< of the folder for all results
   std::size_t done_ = 0, failed_ = 0, skipped_ = 0;
   std::uint64_t total_ = 0;
   ExitStatus status_ = kDone;
@@ -517,9 +531,10 @@ CLI::Option* add_many_options(CLI::App& verb, ManyWishes& wishes, const std::str
   verb.add_option("--list", wishes.list,
                   "Text file with further inputs, one a line; lines that begin with # do not count")
       ->type_name("FILE");
-  verb.add_option("--table", wishes.table,
-                  "Table to write with one row per input; the ending chooses the format: .csv, .nc "
-                  "(NetCDF), .sqlite, .sqlite3 or .db (SQLite)")
+  verb.add_option(
+          "--table", wishes.table,
+          "Table to write with one row per input; the ending chooses the format: .csv or .nc "
+          "(NetCDF)")
       ->type_name("FILE");
   verb.add_flag(
       "--resume", wishes.resume,
@@ -563,7 +578,11 @@ FileJobs file_jobs(const ManyWishes& wishes, const std::string& output, bool int
                                  : output;
     result.jobs.push_back({input.path, made, input.place});
   }
-  if (into_folder && !output.empty() && !ending.empty()) io::make_folder(output);
+  if (into_folder && !output.empty()) {
+    if (!ending.empty()) io::make_folder(output);
+    std::error_code ignored;
+    if (result.many && fs::is_directory(output, ignored)) result.folder = output;
+  }
   return result;
 }
 

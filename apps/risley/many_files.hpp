@@ -50,6 +50,7 @@ struct FileJobs {
   /// Whether they are told as several are, with "results": by what was typed, not by how many
   /// inputs that came to.
   bool many = false;
+  std::string folder;   ///< that all results go to; empty: none, or each into one of its own
   std::string records;  ///< folder for records of what was made; empty: none are kept
 };
 

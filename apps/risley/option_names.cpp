@@ -16,6 +16,7 @@ constexpr OptionName kNames[] = {
     {"accuracy", "--accuracy"},
     {"additional", "--free"},
     {"angle_noise", "--noise-angle-deg"},
+    {"anywhere", "--anywhere"},
     {"cell_size", "--cell-size-m"},
     {"chunk", "--chunk"},
     {"clock_drift", "--clock-drift-ppm"},
@@ -60,6 +61,7 @@ constexpr OptionName kNames[] = {
     {"trajectory_errors", "--trajectory-errors"},
     {"trajectory_topic", "--trajectory-topic"},
     {"truth", "--truth"},
+    {"unlike", "--unlike"},
 };
 
 constexpr std::string_view kWord = "ption ";  // after "o" or "O"

@@ -14,7 +14,6 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/number_text.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/jobs/pattern_details.hpp"
 #include "risley/jobs/write_pattern.hpp"
 #include "risley/report/pattern_page.hpp"
@@ -50,6 +49,7 @@ sensors::ScanPatternOptions scan_options(const PatternOptions& options) {
   sensors::ScanPatternOptions scan;
   scan.shot_rate = options.rate_hz;
   scan.every = options.every;
+  scan.whole_groups = options.every > 1;
   if (!options.firing.empty()) {
     scan.firing =
         options.firing == "together" ? sensors::Firing::together : sensors::Firing::in_turn;
@@ -135,7 +135,7 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
     details = jobs::pattern_details(options.sensor, scan, coverage, bar.progress());
   }
   if (!options.report.empty()) {
-    io::write_text_file(options.report, report::pattern_page(*details, provenance_of(common)));
+    write_page_file(options.report, report::pattern_page(*details, provenance_of(common)));
   }
   if (to_stdout) {
     std::cout.flush();
@@ -173,7 +173,10 @@ Run declare_pattern(CLI::App& verb) {
       ->capture_default_str();
   verb.add_option("--duration-s", o.duration_s, "Length of the scan, s")->capture_default_str();
   verb.add_option("--rate-hz", o.rate_hz, "Shots per second, Hz (default: the sensor's)");
-  verb.add_option("--every", o.every, "Keep only the last of every N shots")
+  verb.add_option(
+          "--every", o.every,
+          "Keep only the last of every N shots; of a sensor with several emitters, which fire in "
+          "turn, the last of every N rounds of all of them")
       ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1'000'000'000}))
       ->capture_default_str();
   verb.add_option(

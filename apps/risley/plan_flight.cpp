@@ -9,7 +9,6 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/report/distribution_page.hpp"
 
 #include "distribution_text.hpp"
@@ -82,12 +81,12 @@ ExitStatus run_flight_plan(jobs::PlanFlightOptions options, const std::string& p
   for (const std::string& warning : planned.forecast.warnings) spdlog::warn(warning);
   if (!page.empty()) {
     if (!planned.distribution) throw InvalidArgument("--report: there are no points to draw");
-    io::write_text_file(
-        page, report::distribution_page(
-                  *planned.distribution,
-                  fmt::format("{}, {}", options.plan.name.empty() ? plan : options.plan.name,
-                              planned.sensor.name),
-                  provenance_of(common)));
+    write_page_file(page,
+                    report::distribution_page(
+                        *planned.distribution,
+                        fmt::format("{}, {}", options.plan.name.empty() ? plan : options.plan.name,
+                                    planned.sensor.name),
+                        provenance_of(common)));
   }
   if (common.json) {
     Json json = json::of(planned);

@@ -277,6 +277,7 @@ Run declare_record(CLI::App& verb) {
       ->check(CLI::IsMember({"yes", "no"}))
       ->capture_default_str();
   return [options](const CommonOptions& common) {
+    end_in_own_time();
     const jobs::RecordOptions job = job_of(*options);
     if (options->list) {
       if (!options->output.empty()) throw InvalidArgument("--list writes no file: leave out -o");

@@ -9,7 +9,6 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/report/comparison_page.hpp"
 #include "risley/report/report_file.hpp"
@@ -36,18 +35,13 @@ report::Report report_of(const std::string& path) {
     throw FileError(data.string(), {},
                     "is missing: estimate -o and calibrate -o write it beside calibration.yaml");
   }
-  if (fs::exists(folder / jobs::kIncomplete)) {
-    spdlog::warn(
-        "{}: the files beside it may be of different runs, because the last one was "
-        "stopped: run it again",
-        (folder / jobs::kIncomplete).string());
-  }
+  jobs::require_settled(path);
   return report::read_report(data.string());
 }
 
 ExitStatus write_page(const std::string& page, const std::string& html, const Json& facts,
                       const CommonOptions& common) {
-  io::write_text_file(page, html);
+  write_page_file(page, html);
   if (common.json) {
     Json json{{"html", page}, {"bytes", html.size()}};
     json.update(facts);

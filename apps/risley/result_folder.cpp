@@ -3,12 +3,15 @@
 #include "result_folder.hpp"
 
 #include <filesystem>
+#include <fstream>
 #include <utility>
 #include <variant>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
+#include "risley/io/text_file.hpp"
 
 #include "option_names.hpp"
 
@@ -44,6 +47,26 @@ void require_folder_apart(const CommonOptions& common, const std::string& folder
   outputs.insert(outputs.end(), {"calibration.yaml", "report.json", "report.html"});
   for (std::string& name : outputs) name = (std::filesystem::path(folder) / name).string();
   require_apart(common, outputs);
+  // Before an hour of computing; of rotor states not all are written.
+  for (const std::string& name : outputs) {
+    if (std::filesystem::path(name).extension() == ".nc" || jobs::is_own_result(name)) continue;
+    throw FileError(name, {},
+                    "is not a result of risley, and would be replaced by one: move it, or give "
+                    "another folder");
+  }
+}
+
+void write_page_file(const std::string& path, const std::string& html) {
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(path, ignored)) {
+    std::string head(15, '\0');
+    std::ifstream(path, std::ios::binary).read(head.data(), 15);
+    if (lower_case(head) != "<!doctype html>" || !jobs::is_own_result(path)) {
+      throw FileError(path, {},
+                      "is not a page of risley, and would be replaced by one: give another name");
+    }
+  }
+  io::write_text_file(path, html);
 }
 
 std::vector<jobs::NamedText> report_texts(report::Report report) {

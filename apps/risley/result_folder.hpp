@@ -28,6 +28,9 @@ std::vector<std::string> result_files_of(const std::string& folder);
 void require_folder_apart(const CommonOptions& common, const std::string& folder,
                           std::vector<std::string> states);
 
+/// Writes a page. @throws FileError, also where it would replace a file that is none of risley's
+void write_page_file(const std::string& path, const std::string& html);
+
 /// report.json and the page report.html.
 std::vector<jobs::NamedText> report_texts(report::Report report);
 /// The page; what it says of options is in words of the command.

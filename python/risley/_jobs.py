@@ -300,7 +300,8 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
     recording : str, path or Recording
         A recording of one sensor, with ranges: a file, or in memory.
     calibration : str or path
-        ``calibration.yaml`` of an estimate or a calibration, or the name of a preset.
+        ``calibration.yaml`` of an estimate or a calibration, the folder that holds it, or the name
+        of a preset.
     output : str or path
         The file; its ending chooses the format unless `format` does.
     format : str, optional
@@ -602,8 +603,8 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
         return dict(_risley.observability(options, threads, tell))
 
 
-def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
-            progress: Progress = None) -> Dict[str, Any]:
+def compare(results: Sequence[Path], *, false_alarm: float = 0.01, anywhere: bool = False,
+            unlike: bool = False, progress: Progress = None) -> Dict[str, Any]:
     """Find out whether a unit has changed, and which units of a fleet are unlike the others.
 
     Parameters
@@ -613,6 +614,11 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
         also tables of such results, whose rows are followed. At least two results.
     false_alarm : float, default 0.01
         Probability that chance is taken for a change, or a unit for an outlier, at most.
+    anywhere : bool, default False
+        Open results that a table names outside of its own folder, too.
+    unlike : bool, default False
+        Compare a calibration, which says where beams truly go, with an estimate of what the sensor
+        believes, too.
     progress : bool or callable, optional
         As in `risley.read`.
 
@@ -628,7 +634,7 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01,
         kind of sensor.
     """
     with telling(progress) as tell:
-        return dict(_risley.compare(_paths(results), false_alarm, tell))
+        return dict(_risley.compare(_paths(results), false_alarm, anywhere, unlike, tell))
 
 
 def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = None,

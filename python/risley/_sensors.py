@@ -25,7 +25,7 @@ def load_sensor(name_or_path: Path) -> _risley.Sensor:
     Parameters
     ----------
     name_or_path : str or path
-        A name from `presets`, or a file.
+        A name from `presets`, a file, or a folder that `estimate` or `calibrate` wrote.
 
     Returns
     -------

@@ -61,6 +61,11 @@ Eigen::MatrixXd SymmetricSolver::inverse() const {
 
 double SymmetricSolver::chi2(const Eigen::VectorXd& v) const { return v.dot(solve(v)); }
 
+double SymmetricSolver::log_determinant() const {
+  if (!positive_) return std::numeric_limits<double>::quiet_NaN();
+  return factors_.vectorD().array().log().sum() - 2.0 * scale_.array().log().sum();
+}
+
 Eigen::VectorXd unit_scale(const Eigen::VectorXd& diagonal) {
   return diagonal.unaryExpr([](double d) { return d > 0 ? 1.0 / std::sqrt(d) : 1.0; });
 }

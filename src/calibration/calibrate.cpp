@@ -15,6 +15,7 @@
 
 #include "calibration/belief.hpp"
 #include "calibration/calibrated_sensor.hpp"
+#include "calibration/copies.hpp"
 #include "calibration/entry_checks.hpp"
 #include "calibration/held.hpp"
 #include "calibration/labelled_shots.hpp"
@@ -98,6 +99,7 @@ class Work {
     range_noise_ = options.range_noise.value_or(options.sensor.range_noise);
     require_entries();
     belief_ = pooled_belief(recordings);
+    require_no_copies(recordings);
     // Rounding adds its own variance.
     range_noise_ = std::hypot(range_noise_, options.sensor.range_resolution / std::sqrt(12.0));
     for (std::size_t r = 0; r < recordings.size(); ++r) {
@@ -405,6 +407,10 @@ void Work::fill_result(const PlanarSolution& solution) {
   result_.sensor.serial = recordings_.front().serial;
   fill_datum(solution);
   result_.reason = reason_of_failure(result_, solution);
+  if (result_.reason.empty()) {
+    result_.reason = reason_of_ranges(result_, recordings_, range_noise_);
+    result_.unit_doubted = !result_.reason.empty();
+  }
   result_.converged = result_.reason.empty();
   result_.tolerance = options_.tolerance.value_or(options_.sensor.pointing_tolerance);
   result_.verdict = verdict_of(result_);

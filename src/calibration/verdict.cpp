@@ -75,6 +75,9 @@ CalibrationVerdict undecided_words(const Calibration& c) {
         "check the normals and poses that were stated, or leave them out (option planes, option "
         "stations)"};
   }
+  if (c.unit_doubted) {
+    return {CalibrationCode::undecided, c.reason, "state the unit of the ranges in the file"};
+  }
   return {CalibrationCode::undecided, c.reason, kBetterScan};
 }
 
@@ -127,6 +130,21 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
     }
   }
   return reason;
+}
+
+std::string reason_of_ranges(const Calibration& c, const std::vector<RangedRecording>& recordings,
+                             double range_noise) {
+  // Sound units scatter by a third of their specification at least; centimetres for millimetres,
+  // metres for feet are further off.
+  constexpr double kMostOff = 3.0;
+  const auto assumed = std::find_if(recordings.begin(), recordings.end(),
+                                    [](const RangedRecording& one) { return one.unit_assumed; });
+  if (assumed == recordings.end()) return "";
+  if (c.sigma0 <= kMostOff && c.sigma0 * kMostOff >= 1.0) return "";
+  return fmt::format(
+      "{} does not name the unit of its ranges, and they scatter by {:.2g} mm about the walls, "
+      "where those of a {} scatter by {:.2g} mm: the unit is probably another one",
+      assumed->name, 1e3 * c.sigma0 * range_noise, c.sensor.name, 1e3 * range_noise);
 }
 
 CalibrationVerdict verdict_of(const Calibration& c) {

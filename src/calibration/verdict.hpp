@@ -14,6 +14,12 @@ namespace risley::calibration {
 /// that the walls do not tell, a station or plane that contradicts the data. Empty for a sound one.
 std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution);
 
+/// Why the ranges are probably not in the unit that they were taken in, where none is stated: they
+/// scatter about the walls unlike this sensor's. Empty where they do not.
+/// @param range_noise  that the sensor is known for, m
+std::string reason_of_ranges(const Calibration& c, const std::vector<RangedRecording>& recordings,
+                             double range_noise);
+
 /// What a calibration comes to: whether its parameters differ from the believed ones by more than
 /// chance and what was held explain once in a thousand times; whether walls became flatter and
 /// directions can be expected to be nearer to the truth; and whether the error is larger than is

@@ -8,7 +8,9 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -21,6 +23,7 @@
 #include "risley/parallel/parallel.hpp"
 
 #include "calibration/band_cholesky.hpp"
+#include "calibration/own_unknowns.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -33,6 +36,8 @@ constexpr int kSmoothness = 2, kPower = kSmoothness + 1;
 
 /// Parameters that weigh less against the likeliest ones are left aside.
 constexpr double kUnlikely = 1e-3;
+/// Parameters that weigh less change no digit of what is found.
+constexpr double kHopeless = 1e-15;
 
 /// Numbers of the nodes: those along the shorter side follow each other, which keeps the band
 /// narrow.
@@ -186,40 +191,15 @@ WallShare share_of(const Precision& precision, WallEquations equations, const Sh
   return share;
 }
 
-/// The linear problem of the unknowns when everything else is integrated out.
-struct Remaining {
-  Eigen::VectorXd step;
-  MatrixXd covariance, normal, response;
-  double log_likelihood = 0;
-  bool positive = false;
-};
-
-Remaining remaining(const MatrixXd& system, Index unknowns, double log_determinant) {
-  const Index quantities = system.cols() - unknowns - 1;
-  Remaining r;
-  r.normal = system.topLeftCorner(unknowns, unknowns);
-  const Eigen::VectorXd gradient = system.col(system.cols() - 1).head(unknowns);
-  const Eigen::VectorXd scale = algebra::unit_scale(r.normal.diagonal());
-  const algebra::SymmetricSolver solver(r.normal);
-  r.positive = solver.positive();
-  if (!r.positive) return r;
-  r.step = solver.solve(gradient);
-  r.covariance = solver.inverse();
-  r.response = -solver.solve_columns(system.block(0, unknowns, unknowns, quantities).eval());
-  const Eigen::LDLT<MatrixXd> factors(algebra::scaled(r.normal, scale));
-  const double of_normal = factors.vectorD().array().log().sum() - 2.0 * scale.array().log().sum();
-  const double cost = system(system.rows() - 1, system.cols() - 1) - gradient.dot(r.step);
-  r.log_likelihood = -0.5 * (log_determinant + of_normal + cost);
-  return r;
-}
-
 /// Tries the parameters of a prior from the likeliest one before the data on, and goes on beside
 /// those that turn out likely: most of a grid is not worth its time.
 class ShapeSearch {
  public:
   ShapeSearch(const ShapeProblem& problem, const ShapePrior& prior)
       : problem_(problem), prior_(prior), tried_(prior.parameters.size()) {
-    for (const WallSums& wall : problem.walls) precision_.emplace_back(wall.grid);
+    for (const WallSums& wall : problem.walls) {
+      wall.grid.empty() ? precision_.emplace_back() : precision_.emplace_back(wall.grid);
+    }
   }
 
   ShapeSolution run() {
@@ -227,6 +207,7 @@ class ShapeSearch {
         std::max_element(prior_.weight.begin(), prior_.weight.end()) - prior_.weight.begin())};
     while (!next.empty()) {
       try_all(next);
+      forget_hopeless();
       next = beside_likely();
     }
     return mixture();
@@ -240,7 +221,8 @@ class ShapeSearch {
     double log_determinant = 0;
   };
   struct Tried {
-    Remaining result;
+    SharedSolution result;
+    std::vector<WithoutOwn> walls;
     double log_weight = -std::numeric_limits<double>::infinity();
     bool done = false;
   };
@@ -251,41 +233,76 @@ class ShapeSearch {
     if (is_new) {
       at->second.resize(problem_.walls.size());
       parallel::for_each(at->second.size(), [&, &all = at->second](std::size_t wall) {
+        const WallSums& sums = problem_.walls[wall];
+        if (sums.grid.empty()) return;
         WithoutWhite& own = all[wall];
-        own.taken = MatrixXd::Zero(problem_.system.rows(), problem_.system.cols());
-        std::tie(own.equations, own.log_determinant) =
-            without_white_part(problem_.walls[wall], white, own.taken);
+        own.taken = MatrixXd::Zero(sums.system.rows(), sums.system.cols());
+        std::tie(own.equations, own.log_determinant) = without_white_part(sums, white, own.taken);
       });
     }
     return at->second;
   }
 
+  /// One wall without its shape and its own unknowns.
+  WithoutOwn reduced(std::size_t wall, const ShapeParameters& p) const {
+    const WallSums& sums = problem_.walls[wall];
+    if (sums.grid.empty()) return without_own(sums.system, sums.own);
+    const WithoutWhite& white = of_white_.at(p.white)[wall];
+    const WallShare share = share_of(*precision_[wall], white.equations, p);
+    WithoutOwn result;
+    result.positive = share.positive;
+    if (!share.positive) return result;
+    result = without_own(sums.system + white.taken - share.system, sums.own);
+    result.log_determinant += share.log_determinant + white.log_determinant;
+    return result;
+  }
+
   void try_all(const std::vector<std::size_t>& rows) {
-    const std::size_t walls = problem_.walls.size();
     for (const std::size_t row : rows) without_white(prior_.parameters[row].white);
-    std::vector<WallShare> shares(rows.size() * walls);
-    parallel::for_each(shares.size(), [&](std::size_t i) {
-      const ShapeParameters& p = prior_.parameters[rows[i / walls]];
-      const std::size_t wall = i % walls;
-      shares[i] = share_of(precision_[wall], of_white_.at(p.white)[wall].equations, p);
+    // What remains of walls that many recordings share is large: no more of it than threads need.
+    const std::size_t together =
+        1 + parallel::thread_count() / std::max<std::size_t>(problem_.walls.size(), 1);
+    for (std::size_t first = 0; first < rows.size(); first += together) {
+      try_some({rows.data() + first, std::min(together, rows.size() - first)});
+    }
+  }
+
+  void try_some(std::span<const std::size_t> rows) {
+    const std::size_t walls = problem_.walls.size();
+    for (const std::size_t row : rows) tried_[row].walls.resize(walls);
+    parallel::for_each(rows.size() * walls, [&](std::size_t i) {
+      const std::size_t row = rows[i / walls], wall = i % walls;
+      tried_[row].walls[wall] = reduced(wall, prior_.parameters[row]);
     });
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      Tried& own = tried_[rows[i]];
+    for (const std::size_t row : rows) {
+      Tried& own = tried_[row];
       own.done = true;
       MatrixXd system = problem_.system;
       double log_determinant = 0;
       bool positive = true;
-      const auto& white = of_white_.at(prior_.parameters[rows[i]].white);
       for (std::size_t wall = 0; wall < walls && positive; ++wall) {
-        const WallShare& share = shares[i * walls + wall];
-        positive = share.positive;
+        WithoutOwn& part = own.walls[wall];
+        positive = part.positive;
         if (!positive) break;
-        system += white[wall].taken - share.system;
-        log_determinant += share.log_determinant + white[wall].log_determinant;
+        add_at(problem_.walls[wall].places, part.rest, system);
+        part.rest.resize(0, 0);
+        log_determinant += part.log_determinant;
       }
-      if (positive) own.result = remaining(system, problem_.unknowns, log_determinant);
+      if (positive) own.result = shared_solution(system, problem_.unknowns);
       if (!own.result.positive) continue;
-      own.log_weight = std::log(prior_.weight[rows[i]]) + own.result.log_likelihood;
+      own.log_weight = std::log(prior_.weight[row]) -
+                       0.5 * (log_determinant + own.result.log_determinant + own.result.cost);
+    }
+  }
+
+  /// Parameters that add nothing to the mean are no parameters any more: of walls that many
+  /// recordings share, each keeps megabytes.
+  void forget_hopeless() {
+    const double least = best() + std::log(kHopeless);
+    for (Tried& one : tried_) {
+      if (!one.done || one.log_weight >= least) continue;
+      one = {};
+      one.done = true;
     }
   }
 
@@ -340,10 +357,10 @@ class ShapeSearch {
     }
     solution.positive = sum > 0;
     if (!solution.positive) return solution;
-    const Index n = problem_.unknowns;
+    const Index n = problem_.unknowns, quantities = problem_.system.cols() - n - 1;
     solution.step = Eigen::VectorXd::Zero(n);
     solution.covariance = MatrixXd::Zero(n, n);
-    solution.response = MatrixXd::Zero(n, problem_.system.cols() - n - 1);
+    solution.response = MatrixXd::Zero(n, quantities);
     for (std::size_t k = 0; k < tried_.size(); ++k) {
       const double weight = solution.weight[k] /= sum;
       if (weight == 0) continue;
@@ -361,8 +378,44 @@ class ShapeSearch {
           solution.weight[k] * (tried_[k].result.covariance + off * off.transpose());
     }
     solution.normal = tried_[solution.likeliest].result.normal;
+    solution.promised =
+        solution.step.dot(solution.normal.selfadjointView<Eigen::Lower>() * solution.step);
+    solution.own.resize(problem_.walls.size());
+    for (std::size_t wall = 0; wall < solution.own.size(); ++wall) fill_own(wall, solution);
     fill_heights(solution);
     return solution;
+  }
+
+  /// The mixture for the unknowns of one wall alone.
+  void fill_own(std::size_t wall, ShapeSolution& solution) const {
+    const WallSums& sums = problem_.walls[wall];
+    OwnSolution& own = solution.own[wall];
+    own.step = Eigen::VectorXd::Zero(sums.own);
+    own.covariance = MatrixXd::Zero(sums.own, sums.own);
+    own.response = MatrixXd::Zero(sums.own, solution.response.cols());
+    if (sums.own == 0) return;
+    std::vector<std::pair<double, Eigen::VectorXd>> steps;
+    for (std::size_t k = 0; k < tried_.size(); ++k) {
+      const double weight = solution.weight[k];
+      if (weight == 0) continue;
+      OwnSolution one = own_solution(tried_[k].walls[wall], sums.places, tried_[k].result);
+      own.step += weight * one.step;
+      own.covariance += weight * one.covariance;
+      own.response += weight * one.response;
+      steps.emplace_back(weight, std::move(one.step));
+    }
+    for (const auto& [weight, step] : steps) {
+      const Eigen::VectorXd off = step - own.step;
+      own.covariance += weight * off * off.transpose();
+    }
+    // The step of these against where they follow to when the others step.
+    const Tried& likeliest = tried_[solution.likeliest];
+    const WithoutOwn& part = likeliest.walls[wall];
+    Eigen::VectorXd off = own.step;
+    for (std::size_t j = 0; j < sums.places.size() && sums.places[j] < problem_.unknowns; ++j) {
+      off += part.from_rest.col(static_cast<Index>(j)) * solution.step[sums.places[j]];
+    }
+    solution.promised += off.dot(part.normal * off);
   }
 
   void fill_heights(ShapeSolution& solution) {
@@ -370,12 +423,18 @@ class ShapeSearch {
     const auto& white = without_white(p.white);
     solution.height.resize(problem_.walls.size());
     parallel::for_each(problem_.walls.size(), [&](std::size_t wall) {
-      const WallGrid& grid = problem_.walls[wall].grid;
+      const WallSums& sums = problem_.walls[wall];
+      const WallGrid& grid = sums.grid;
+      if (grid.empty()) return;
       WallEquations equations = white[wall].equations;
-      precision_[wall].add_to(equations.nodes, p);
+      precision_[wall]->add_to(equations.nodes, p);
       equations.nodes.factorise();
       BandMatrix::Rows right = equations.columns.rightCols(1) -
-                               equations.columns.leftCols(problem_.unknowns) * solution.step;
+                               equations.columns.leftCols(sums.own) * solution.own[wall].step;
+      for (std::size_t j = 0; j < sums.places.size() && sums.places[j] < problem_.unknowns; ++j) {
+        right -=
+            equations.columns.col(sums.own + static_cast<Index>(j)) * solution.step[sums.places[j]];
+      }
       equations.nodes.solve_lower(right);
       Eigen::VectorXd height = right.col(0);
       equations.nodes.solve_upper(height);
@@ -392,10 +451,26 @@ class ShapeSearch {
 
   const ShapeProblem& problem_;
   const ShapePrior& prior_;
-  std::vector<Precision> precision_;                      // [walls]
+  std::vector<std::optional<Precision>> precision_;       // [walls]
   std::map<double, std::vector<WithoutWhite>> of_white_;  // by the white part
   std::vector<Tried> tried_;                              // [parameters]
 };
+
+/// Sums of one length, at columns that the system of so many has.
+void require_wall(const WallSums& wall, Index columns) {
+  const auto size = static_cast<std::size_t>(wall.own) + wall.places.size();
+  for (const Index place : wall.places) {
+    require_place("column of a wall", static_cast<std::size_t>(place),
+                  static_cast<std::size_t>(columns));
+  }
+  require_length("rows of a wall", static_cast<std::size_t>(wall.system.rows()), size);
+  require_length("columns of a wall", static_cast<std::size_t>(wall.system.cols()), size);
+  if (wall.grid.empty()) return;
+  require_length("cells", wall.weight.size(), wall.grid.cells.size());
+  require_length("rows of cells", static_cast<std::size_t>(wall.columns.rows()),
+                 3 * wall.grid.cells.size());
+  require_length("columns of cells", static_cast<std::size_t>(wall.columns.cols()), size);
+}
 
 }  // namespace
 
@@ -430,13 +505,7 @@ ShapeSolution solve_with_shape(const ShapeProblem& problem, const ShapePrior& pr
                   static_cast<double>(columns - 1));
   require_at_least("number of parameters", static_cast<long long>(prior.parameters.size()), 1);
   require_length("weights of the shape", prior.weight.size(), prior.parameters.size());
-  for (const WallSums& wall : problem.walls) {
-    require_length("cells", wall.weight.size(), wall.grid.cells.size());
-    require_length("rows of cells", static_cast<std::size_t>(wall.columns.rows()),
-                   3 * wall.grid.cells.size());
-    require_length("columns of cells", static_cast<std::size_t>(wall.columns.cols()),
-                   static_cast<std::size_t>(columns));
-  }
+  for (const WallSums& wall : problem.walls) require_wall(wall, columns);
   return ShapeSearch(problem, prior).run();
 }
 

@@ -164,12 +164,10 @@ ViewThickness thickness_of(const PlanarProblem& problem, std::size_t view,
 WallThickness wall_thickness(const PlanarSolution& solution, const PrismTrain& believed,
                              const std::vector<LabelledShots>& recordings) {
   const PlanarProblem& problem = solution.problem;
-  // Heights are of the walls that have a grid, in their order.
   std::vector<double> shape_sigma(problem.walls.size(), 0.0);
-  for (std::size_t w = 0, row = 0; w < problem.walls.size(); ++w) {
+  for (std::size_t w = 0; w < solution.shape.height.size(); ++w) {
     const WallGrid& grid = problem.walls[w].grid;
-    if (grid.empty() || row == solution.shape.height.size()) continue;
-    shape_sigma[w] = rms_where_seen(grid, solution.shape.height[row++]);
+    if (!grid.empty()) shape_sigma[w] = rms_where_seen(grid, solution.shape.height[w]);
   }
   std::vector<ProfileBuilder> builders;
   builders.emplace_back("incidence", 0.0, kPi / 2, kIncidenceBins);

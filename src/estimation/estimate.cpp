@@ -12,6 +12,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/require.hpp"
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/ekf.hpp"
 #include "risley/estimation/free_parameters.hpp"
@@ -35,12 +36,16 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate) {
   const RotorStates& states = estimate.states;
   const RotorTrajectory& motion = estimate.trajectory;
   const int prisms = states.prisms();
+  // Knots begin later.
+  const std::size_t first_shot = first_used_shot(estimate);
+  const RotorStates begin = states_of_shots(estimate, {first_shot, first_shot + 1});
   std::size_t diagonal = 0;
   std::vector<EstimatedValue> angles;
   for (int rotor = 0; rotor < prisms; ++rotor) {
     const auto k = static_cast<std::size_t>(rotor);
     const auto& angle = states.rotation_angle[k];
     const auto& variance = states.rotation_angle_covariance[diagonal];
+    const double begin_sigma = std::sqrt(begin.rotation_angle_covariance[diagonal][0]);
     diagonal += static_cast<std::size_t>(prisms - rotor);
     // The mean speed is the angle turned over the time it took; the ends are far apart and so
     // independent.
@@ -61,7 +66,7 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate) {
     speed.sigma_given_held = speed.sigma;
     values.push_back(speed);
     angles.push_back({fmt::format("rotation_angle_{}_deg", prism_letter(rotor)),
-                      wrap_to_pi(angle[0]), std::sqrt(variance[0]), std::sqrt(variance[0])});
+                      wrap_to_pi(begin.rotation_angle[k][0]), begin_sigma, begin_sigma});
   }
   values.insert(values.end(), angles.begin(), angles.end());
   return values;
@@ -668,6 +673,11 @@ Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
       estimate);
   judge(estimate, options.sensor);
   return estimate;
+}
+
+std::size_t first_used_shot(const Estimate& estimate) {
+  require_at_least("knots of the estimate", static_cast<long long>(estimate.trajectory.size()), 1);
+  return estimate.trajectory.first_shot.front();
 }
 
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots) {

@@ -11,6 +11,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/saturating.hpp"
 #include "risley/optics/prism.hpp"
 
 namespace risley::estimation {
@@ -83,7 +84,8 @@ RotorTrajectory make_knots(const PackedSeries& series, std::span<const ShotRange
     const std::int64_t origin = series.time_ns(range.begin);
     for (std::size_t i = range.begin; i < range.end;) {
       const std::int64_t first_ns = series.time_ns(i);
-      const std::int64_t slot_end = first_ns - (first_ns - origin) % interval_ns + interval_ns;
+      const std::int64_t slot_end =
+          saturating_sum(first_ns - (first_ns - origin) % interval_ns, interval_ns);
       knots.first_shot.push_back(i);
       i = series.first_at({i + 1, range.end}, slot_end);
       const std::int64_t last_ns = series.time_ns(i - 1);

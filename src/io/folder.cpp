@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/temporaries.hpp"
 
 namespace risley::io {
 
@@ -55,11 +56,13 @@ TemporaryFolder::TemporaryFolder(double bytes) {
                     fmt::format("no temporary folder can be created there: {}",
                                 code ? code.message() : std::strerror(errno)));
   }
+  note_temporary(path_);
 }
 
 TemporaryFolder::~TemporaryFolder() {
   std::error_code ignored;
   fs::remove_all(path_, ignored);
+  forget_temporary(path_);
 }
 
 }  // namespace risley::io

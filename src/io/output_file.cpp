@@ -23,6 +23,7 @@
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/temporaries.hpp"
 
 #include "io/file_target.hpp"
 
@@ -152,14 +153,18 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
     for (int tries = 0; temporary_ < 0; ++tries) {
       if (tries == kMostTries) refuse(path_, EEXIST);
       temporary_path_ = beginning + random_name();
+      note_temporary(temporary_path_);
       temporary_ = whole([&] {
         return ::open(temporary_path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
                       mode);
       });
-      if (temporary_ < 0 && errno != EEXIST) refuse(path_, errno);
+      const int error = errno;
+      if (temporary_ < 0) forget_temporary(temporary_path_);
+      if (temporary_ < 0 && error != EEXIST) refuse(path_, error);
       if (temporary_ < 0) continue;
       lock(temporary_);
       if (is_named(temporary_, temporary_path_)) continue;  // nobody took it for an orphan
+      forget_temporary(temporary_path_);
       ::close(temporary_);
       temporary_ = -1;
     }
@@ -178,7 +183,9 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
 OutputFile::~OutputFile() {
   if (temporary_ < 0) return;
   ::close(temporary_);
-  if (!temporary_path_.empty()) ::unlink(temporary_path_.c_str());
+  if (temporary_path_.empty()) return;
+  ::unlink(temporary_path_.c_str());
+  forget_temporary(temporary_path_);
 }
 
 void OutputFile::sync() const {
@@ -194,10 +201,12 @@ void OutputFile::commit() {
     const int copied = copy_bytes(temporary_, target);
     if (::close(target) != 0 || copied != 0) refuse(path_, copied != 0 ? copied : errno);
     ::unlink(temporary_path_.c_str());
-    temporary_path_.clear();
+    forget_temporary(std::exchange(temporary_path_, {}));
     return;
   }
+  const std::string temporary = temporary_path_;
   replace_target({target_, copied_}, path_, temporary_path_);
+  forget_temporary(temporary);
 }
 
 }  // namespace risley::io

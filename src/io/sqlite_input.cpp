@@ -58,6 +58,13 @@ std::uint64_t bytes_by_header(const std::string& path, std::uint64_t file_bytes)
 
 constexpr int kInstructionsPerLook = 10'000;  // of SQLite's machine
 
+/// A name as SQL takes it: in quotes.
+std::string sql_name(const std::string& name) {
+  std::string text = "\"";
+  for (const char c : name) text += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return text + "\"";
+}
+
 }  // namespace
 
 /// The open database, and the limits of what one step may take.
@@ -189,16 +196,8 @@ void SqliteQuery::rewind() {
   sqlite3_reset(statement_.get());  // returns the last error again, which was reported
 }
 
-bool SqliteQuery::is_missing(int column) const {
-  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
-}
-
 std::int64_t SqliteQuery::integer(int column) const {
   return sqlite3_column_int64(statement_.get(), column);
-}
-
-double SqliteQuery::real(int column) const {
-  return sqlite3_column_double(statement_.get(), column);
 }
 
 std::string SqliteQuery::text(int column) const {
@@ -238,24 +237,10 @@ void SqliteInput::require_plain_table(const std::string& name) const {
   }
 }
 
-bool SqliteInput::has_column(const std::string& table, const std::string& column) const {
-  SqliteQuery columns = query(fmt::format("PRAGMA table_xinfo({})", sql_name(table)));
-  while (columns.next("give its columns")) {
-    if (columns.text(1) == column) return true;
-  }
-  return false;
-}
-
 SqliteQuery SqliteInput::query(const std::string& sql) const {
   return {*this, database_->prepare(sql)};
 }
 
 void SqliteInput::fail(const std::string& problem) const { database_->fail(problem); }
-
-std::string sql_name(const std::string& name) {
-  std::string text = "\"";
-  for (const char c : name) text += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return text + "\"";
-}
 
 }  // namespace risley::io

@@ -8,14 +8,12 @@
 #include <string_view>
 
 #include <fmt/format.h>
-#include <sqlite3.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/netcdf.hpp"
 #include "risley/io/output_file.hpp"
-#include "risley/io/sqlite_input.hpp"
 #include "risley/io/text_table.hpp"
 
 namespace risley::io {
@@ -35,17 +33,13 @@ class TableFile::Writer {
 
 namespace {
 
-enum class TableFormat { csv, netcdf, sqlite };
+enum class TableFormat { csv, netcdf };
 
 struct TableEnding {
   std::string_view ending;
   TableFormat format;
 };
-constexpr TableEnding kTableEndings[] = {{".csv", TableFormat::csv},
-                                         {".nc", TableFormat::netcdf},
-                                         {".sqlite", TableFormat::sqlite},
-                                         {".sqlite3", TableFormat::sqlite},
-                                         {".db", TableFormat::sqlite}};
+constexpr TableEnding kTableEndings[] = {{".csv", TableFormat::csv}, {".nc", TableFormat::netcdf}};
 
 TableFormat table_format(const std::string& path) {
   const std::string name = lower_case(path);
@@ -53,8 +47,8 @@ TableFormat table_format(const std::string& path) {
     if (name.ends_with(one.ending)) return one.format;
   }
   throw InvalidArgument(
-      fmt::format("{}: the ending does not say which kind of table, allowed: .csv (text), .nc "
-                  "(NetCDF), .sqlite, .sqlite3 or .db (SQLite)",
+      fmt::format("{}: the ending does not say which kind of table, allowed: .csv (text) or "
+                  ".nc (NetCDF)",
                   path));
 }
 
@@ -183,95 +177,6 @@ class NetcdfTable final : public TableFile::Writer {
   std::size_t rows_ = 0;
 };
 
-struct CloseTable {
-  void operator()(sqlite3* database) const { sqlite3_close(database); }
-  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
-};
-
-class SqliteTable final : public TableFile::Writer {
- public:
-  SqliteTable(std::string path, const std::vector<TableColumn>& columns, const TableAbout& about)
-      : output_(std::move(path)) {
-    sqlite3* database = nullptr;
-    const int result =
-        sqlite3_open_v2(output_.temporary_path().c_str(), &database, SQLITE_OPEN_READWRITE,
-                        "unix-none");  // the output has a lock of its own
-    database_.reset(database);
-    check(result);
-    // The file has no name yet: whoever is interrupted leaves nothing, so there is nothing to roll
-    // back either.
-    run("PRAGMA journal_mode=OFF");
-    run("PRAGMA synchronous=OFF");
-    run("BEGIN");
-    std::string definition, places;
-    for (const TableColumn& column : columns) {
-      const char* type = column.kind == CellKind::text      ? "TEXT"
-                         : column.kind == CellKind::integer ? "INTEGER"
-                                                            : "REAL";
-      definition +=
-          fmt::format("{}{} {}", definition.empty() ? "" : ", ", sql_name(column.name), type);
-      places += places.empty() ? "?" : ", ?";
-    }
-    run("CREATE TABLE columns (name TEXT, unit TEXT, description TEXT)");
-    const Statement column_row = prepare("INSERT INTO columns VALUES (?, ?, ?)");
-    for (const TableColumn& column : columns) {
-      insert(column_row.get(), {column.name, column.unit, column.description});
-    }
-    run("CREATE TABLE about (name TEXT, value TEXT)");
-    const Statement about_row = prepare("INSERT INTO about VALUES (?, ?)");
-    for (const auto& [name, value] : about) insert(about_row.get(), {name, value});
-    run(fmt::format("CREATE TABLE results ({})", definition));
-    row_ = prepare(fmt::format("INSERT INTO results VALUES ({})", places));
-  }
-  void add(const std::vector<TableCell>& cells) override { insert(row_.get(), cells); }
-  void close() override {
-    row_.reset();
-    run("COMMIT");
-    check(sqlite3_close(database_.release()));
-    output_.commit();
-  }
-
- private:
-  using Statement = std::unique_ptr<sqlite3_stmt, CloseTable>;
-
-  void check(int result) const {
-    if (result == SQLITE_OK || result == SQLITE_DONE || result == SQLITE_ROW) return;
-    throw FileError(
-        output_.path(), {},
-        fmt::format("cannot be written: SQLite: {}",
-                    database_ ? sqlite3_errmsg(database_.get()) : sqlite3_errstr(result)));
-  }
-  void run(const std::string& query) const {
-    check(sqlite3_exec(database_.get(), query.c_str(), nullptr, nullptr, nullptr));
-  }
-  Statement prepare(const std::string& query) const {
-    sqlite3_stmt* statement = nullptr;
-    check(sqlite3_prepare_v2(database_.get(), query.c_str(), -1, &statement, nullptr));
-    return Statement(statement);
-  }
-  void insert(sqlite3_stmt* statement, const std::vector<TableCell>& cells) const {
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      const int place = static_cast<int>(i) + 1;
-      if (const auto* whole = std::get_if<std::int64_t>(&cells[i])) {
-        check(sqlite3_bind_int64(statement, place, *whole));
-      } else if (const auto* real = std::get_if<double>(&cells[i])) {
-        check(sqlite3_bind_double(statement, place, *real));
-      } else if (const auto* text = std::get_if<std::string>(&cells[i])) {
-        check(sqlite3_bind_text(statement, place, text->data(), static_cast<int>(text->size()),
-                                SQLITE_STATIC));
-      } else {
-        check(sqlite3_bind_null(statement, place));
-      }
-    }
-    check(sqlite3_step(statement));
-    check(sqlite3_reset(statement));
-  }
-
-  OutputFile output_;
-  std::unique_ptr<sqlite3, CloseTable> database_;
-  Statement row_;
-};
-
 /// The same cell, one without a value where it is not finite.
 TableCell checked(const TableCell& cell, const TableColumn& column) {
   if (std::holds_alternative<std::monostate>(cell)) return cell;
@@ -299,9 +204,6 @@ TableFile::TableFile(const std::string& path, std::vector<TableColumn> columns, 
       break;
     case TableFormat::netcdf:
       writer_ = std::make_unique<NetcdfTable>(path, columns_, std::move(about));
-      break;
-    case TableFormat::sqlite:
-      writer_ = std::make_unique<SqliteTable>(path, columns_, about);
       break;
   }
 }

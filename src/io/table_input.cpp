@@ -19,7 +19,6 @@
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/netcdf.hpp"
-#include "risley/io/sqlite_input.hpp"
 #include "risley/io/text_table.hpp"
 
 namespace risley::io {
@@ -27,11 +26,9 @@ namespace {
 
 using Rows = std::vector<std::vector<TableCell>>;
 
-constexpr std::string_view kSqliteMark = "SQLite format 3";
 constexpr std::string_view kHdf5Mark = "\x89HDF\r\n";
 constexpr std::string_view kClassicNetcdfMark = "CDF";
 constexpr const char* kRowDimension = "row";
-constexpr const char* kResults = "results";
 
 std::string head_of(const std::string& path) {
   std::string head(16, '\0');
@@ -214,62 +211,16 @@ Rows read_netcdf(const std::string& path, const std::vector<TableColumn>& column
   return rows;
 }
 
-Rows read_sqlite(const std::string& path, const std::vector<TableColumn>& columns,
-                 const Progress& progress) {
-  const SqliteInput database(path, "a table of results", progress);
-  database.require_plain_table(kResults);
-  std::string names;
-  std::vector<std::size_t> places;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (!database.has_column(kResults, columns[i].name)) continue;
-    names += (names.empty() ? "" : ", ") + sql_name(columns[i].name);
-    places.push_back(i);
-  }
-  if (places.empty()) fail_without_columns(path, columns);
-  SqliteQuery query =
-      database.query(fmt::format("SELECT {} FROM {} ORDER BY rowid", names, kResults));
-  Rows rows;
-  std::uint64_t bytes = 0;
-  while (query.next("give its rows")) {
-    progress.check();
-    rows.emplace_back(columns.size());
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      const int column = static_cast<int>(k);
-      TableCell& cell = rows.back()[places[k]];
-      if (query.is_missing(column)) continue;
-      switch (columns[places[k]].kind) {
-        case CellKind::text:
-          cell = query.text(column);
-          bytes += std::get<std::string>(cell).size();
-          break;
-        case CellKind::integer:
-          cell = query.integer(column);
-          break;
-        case CellKind::real:
-          cell = query.real(column);
-          break;
-      }
-    }
-    if (bytes > database.file_bytes()) {  // pages that stand in several rows
-      database.fail(fmt::format("the texts up to row {} have {} bytes, but the database only {}",
-                                rows.size(), bytes, database.file_bytes()));
-    }
-  }
-  return rows;
-}
-
 }  // namespace
 
 bool is_table(const std::string& path) {
   const std::string head = head_of(path);
-  return head.starts_with(kSqliteMark) || is_netcdf(head) ||
-         (!head.empty() && lower_case(path).ends_with(".csv"));
+  return is_netcdf(head) || (!head.empty() && lower_case(path).ends_with(".csv"));
 }
 
 Rows read_table(const std::string& path, const std::vector<TableColumn>& columns,
                 const Progress& progress) {
   const std::string head = head_of(path);
-  if (head.starts_with(kSqliteMark)) return read_sqlite(path, columns, progress);
   if (is_netcdf(head)) return read_netcdf(path, columns, progress);
   return read_text(path, columns, progress);
 }

@@ -16,9 +16,14 @@
 namespace risley::io {
 
 std::string read_text_file(const std::string& path) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 28;  // devices never end
   std::string text;
-  read_bytes(path,
-             [&text](std::span<const char> bytes) { text.append(bytes.data(), bytes.size()); });
+  read_bytes(path, [&](std::span<const char> bytes) {
+    text.append(bytes.data(), bytes.size());
+    if (text.size() <= kMostBytes) return;
+    throw FileError(path, {kMostBytes, {}},
+                    fmt::format("expected a text of at most {} bytes", kMostBytes));
+  });
   return text;
 }
 

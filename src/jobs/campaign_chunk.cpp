@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "risley/core/error.hpp"
+#include "risley/io/json_text.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/io/text_file.hpp"
 
@@ -103,6 +104,7 @@ ChunkHead read_chunk(const std::string& path, const Progress& progress,
     ++line;
     const std::size_t end = text.find('\n', begin);
     if (end == std::string::npos) fail("the file ends here, cells are missing");
+    io::require_shallow_json(path, std::string_view(text).substr(begin, end - begin));
     ChunkJson json = ChunkJson::parse(text.begin() + static_cast<std::ptrdiff_t>(begin),
                                       text.begin() + static_cast<std::ptrdiff_t>(end));
     begin = end + 1;

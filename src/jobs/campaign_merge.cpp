@@ -302,6 +302,14 @@ std::vector<SoundChunk> find_chunks(const CampaignPlan& plan, const CampaignOpti
       const ChunkHead head =
           read_chunk(file, progress, [&](const ChunkHead& its, CellOutcome&& outcome) {
             check(its);
+            const CampaignCell cell = plan.cell(outcome.cell.number);
+            if (outcome.cell.setting != cell.setting || outcome.cell.seed != cell.seed) {
+              throw FileError(
+                  file, {},
+                  fmt::format("cell {} is of setting {} and seed {}, expected {} and {}",
+                              cell.number, outcome.cell.setting, outcome.cell.seed, cell.setting,
+                              cell.seed));
+            }
             table.note(outcome);
           });
       check(head);

@@ -7,10 +7,15 @@
 #include <optional>
 #include <system_error>
 
+#include <fmt/format.h>
+
+#include "risley/cloud/map_projection.hpp"
 #include "risley/core/error.hpp"
 #include "risley/io/sha256.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/provenance.hpp"
 #include "risley/jobs/recording_input.hpp"
+#include "risley/jobs/result_files.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/checks.hpp"
@@ -28,6 +33,26 @@ std::optional<std::chrono::sys_days> day_of(const recordings::Source& recording)
   return floor<days>(file_clock::to_sys(time));
 }
 
+/// Where the recording names its sensor, that has to be of the calibration's kind: to find it out
+/// from the shots takes long.
+void require_same_type(const CloudOfRecordingOptions& options, const sensors::Sensor& calibration,
+                       const Progress& progress) {
+  std::error_code ignored;
+  if (!options.recording.recording() &&
+      !std::filesystem::is_regular_file(options.recording.name(), ignored)) {
+    return;  // read once
+  }
+  const auto reader = recordings::open_recording(options.recording, options.reading, progress);
+  for (const recordings::Device& device : reader->header().devices) {
+    if (device.type == recordings::kUnknownDeviceType || device.type_inferred) continue;
+    if (device.type == calibration.device_type) continue;
+    throw EstimationError(
+        fmt::format("{} is a recording of a {}, and {} describes another kind of sensor ({})",
+                    options.recording.name(), recordings::device_type_name(device.type),
+                    options.calibration, calibration.name));
+  }
+}
+
 }  // namespace
 
 RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
@@ -39,10 +64,15 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   if (settings.loadings && !settings.pointing.covariance) {
     throw InvalidArgument("option common_factors yes and option covariance no cannot be combined");
   }
-  const sensors::Sensor calibration = sensors::load_sensor(options.calibration);
+  const sensors::Sensor calibration = load_result(options.calibration);
   cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read
+  require_same_type(options, calibration, progress);
   std::vector<recordings::Source> inputs{options.recording};
   if (moves(options.platform)) {
+    if (!options.platform.crs.empty()) {  // before anything is read
+      const std::string& datum = options.platform.datum;
+      const cloud::MapProjection known(options.platform.crs, datum.empty() ? "EPSG:4979" : datum);
+    }
     settings.platform = load_platform(options.platform, progress);
     for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
   }
@@ -50,8 +80,9 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   settings.provenance = [&] {
     Provenance provenance = hashes.with_inputs(options.provenance);
     provenance.emplace_back("calibration", options.calibration);
-    if (std::filesystem::is_regular_file(options.calibration)) {
-      provenance.emplace_back("calibration_sha256", io::sha256_of_file(options.calibration));
+    const std::string file = calibration_in(options.calibration).value_or(options.calibration);
+    if (std::filesystem::is_regular_file(file)) {
+      provenance.emplace_back("calibration_sha256", io::sha256_of_file(file));
     }
     return provenance;
   };

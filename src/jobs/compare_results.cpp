@@ -236,7 +236,11 @@ calibration::PointingError directions_apart(const Sensor& a, const Sensor& b,
 
 Sensor load_result(const std::string& path) {
   namespace fs = std::filesystem;
-  if (!fs::is_directory(path)) return sensors::load_sensor(path);
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) {
+    if (fs::is_regular_file(path, ignored)) require_settled(path);
+    return sensors::load_sensor(path);
+  }
   const std::optional<std::string> file = calibration_in(path);
   if (!file) {
     throw FileError(

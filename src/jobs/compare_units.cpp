@@ -51,9 +51,21 @@ std::string result_beside(const std::string& table, const std::string& output) {
   return fs::exists(beside, ignored) ? beside : output;
 }
 
+/// Whether a file or folder is in the folder of a table, or below, by whatever links.
+bool is_below_folder_of(const std::string& table, const std::string& path) {
+  std::error_code code;
+  const fs::path folder = fs::canonical(fs::absolute(table).parent_path(), code);
+  if (code) return false;
+  const fs::path found = fs::canonical(path, code);
+  if (code) return false;
+  return std::mismatch(folder.begin(), folder.end(), found.begin(), found.end()).first ==
+         folder.end();
+}
+
 /// Follows one row to its result. @return why there is none, or nothing
 std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
-                                const std::vector<io::TableCell>& cells, LoadedResults& loaded) {
+                                const std::vector<io::TableCell>& cells, bool anywhere,
+                                LoadedResults& loaded) {
   const std::string input = text_of(cells[0]), output = text_of(cells[1]);
   const std::string name = input.empty() ? fmt::format("{} row {}", table, row) : input;
   const auto* status = std::get_if<std::int64_t>(&cells[2]);
@@ -67,10 +79,22 @@ std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
   const std::string path = result_beside(table, output);
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return LeftOut{name, fmt::format("{} is missing", path), true};
-  if (fs::is_directory(path, ignored) && !calibration_in(path)) {
-    return LeftOut{name, fmt::format("{} has no {}", path, kCalibrationFile), false};
+  // A table may come from anybody: what it names is not opened wherever it is.
+  if (!anywhere && !is_below_folder_of(table, path)) {
+    return LeftOut{
+        name,
+        fmt::format("{} is not in the folder of {}: results elsewhere are opened on demand alone "
+                    "(option anywhere)",
+                    path, table),
+        true};
+  }
+  if (!fs::is_directory(path, ignored) && !fs::is_regular_file(path, ignored)) {
+    return LeftOut{name, fmt::format("{} is neither a file nor a folder", path), true};
   }
   try {
+    if (fs::is_directory(path, ignored) && !calibration_in(path)) {
+      return LeftOut{name, fmt::format("{} has no {}", path, kCalibrationFile), false};
+    }
     loaded.add(path, load_result(path));
   } catch (const FileError& error) {
     return LeftOut{name, error.what(), true};
@@ -78,15 +102,15 @@ std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
   return std::nullopt;
 }
 
-void load_table(const std::string& table, LoadedResults& loaded, std::vector<LeftOut>& left_out,
-                const Progress& progress) {
+void load_table(const std::string& table, bool anywhere, LoadedResults& loaded,
+                std::vector<LeftOut>& left_out, const Progress& progress) {
   const std::vector<io::TableColumn> columns = {
       {"input"}, {"output"}, {"exit_status", io::CellKind::integer}, {"message"}};
   const std::size_t left_out_before = left_out.size();
   std::size_t row = 0;
   for (const auto& cells : io::read_table(table, columns, progress)) {
     progress.check();
-    if (std::optional<LeftOut> none = load_row(table, ++row, cells, loaded)) {
+    if (std::optional<LeftOut> none = load_row(table, ++row, cells, anywhere, loaded)) {
       left_out.push_back(*std::move(none));
     }
   }
@@ -102,15 +126,15 @@ void load_table(const std::string& table, LoadedResults& loaded, std::vector<Lef
                               row, first));
 }
 
-LoadedResults load(const std::vector<std::string>& paths, std::vector<LeftOut>& left_out,
+LoadedResults load(const CompareUnitsOptions& options, std::vector<LeftOut>& left_out,
                    const Progress& progress) {
   LoadedResults loaded;
-  for (const std::string& path : paths) {
+  for (const std::string& path : options.results) {
     progress.check();
     std::error_code ignored;
     if (!fs::is_directory(path, ignored) && io::is_table(path)) {
       loaded.any_table = true;
-      load_table(path, loaded, left_out, progress);
+      load_table(path, options.anywhere, loaded, left_out, progress);
     } else {
       loaded.add(path, load_result(path));
     }
@@ -181,6 +205,34 @@ void add_pairs_between(const std::vector<std::size_t>& kind, const std::vector<C
   }
 }
 
+/// A truth and a belief.
+bool are_unlike(const Sensor& a, const Sensor& b) {
+  using sensors::CalibrationReference;
+  return a.reference != CalibrationReference::none && b.reference != CalibrationReference::none &&
+         a.reference != b.reference;
+}
+
+/// @throws InvalidArgument where nothing else was to be compared
+void leave_out_unlike(ComparedUnits& found, const std::vector<Sensor>& sensors) {
+  const auto words = [&](const ComparedPair& pair) {
+    const bool first = sensors[pair.a].reference == sensors::CalibrationReference::planes;
+    return fmt::format(
+        "{} is a calibration, which says where beams truly go, and {} an estimate of what the "
+        "sensor believes: they differ in a unit that never changed (option unlike compares them)",
+        found.results[first ? pair.a : pair.b], found.results[first ? pair.b : pair.a]);
+  };
+  const std::size_t before = found.pairs.size();
+  std::string first;
+  std::erase_if(found.pairs, [&](const ComparedPair& pair) {
+    if (!are_unlike(sensors[pair.a], sensors[pair.b])) return false;
+    if (first.empty()) first = words(pair);
+    found.left_out.push_back(
+        {found.results[pair.a] + " and " + found.results[pair.b], words(pair), false});
+    return true;
+  });
+  if (before > 0 && found.pairs.empty()) throw InvalidArgument(first);
+}
+
 void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Progress& progress) {
   found.least_p_value =
       found.false_alarm / static_cast<double>(std::max<std::size_t>(found.pairs.size(), 1));
@@ -189,7 +241,9 @@ void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Pro
       [&](std::size_t i) {
         ComparedPair& pair = found.pairs[i];
         pair.comparison = compare_results(sensors[pair.a], sensors[pair.b], OneUnit::caller);
-        pair.changed = pair.comparison.change.degrees_of_freedom > 0 &&
+        const std::string &serial_a = sensors[pair.a].serial, &serial_b = sensors[pair.b].serial;
+        const bool others = !serial_a.empty() && !serial_b.empty() && serial_a != serial_b;
+        pair.changed = !others && pair.comparison.change.degrees_of_freedom > 0 &&
                        pair.comparison.change.p_value < found.least_p_value;
       },
       progress);
@@ -209,7 +263,7 @@ ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& 
   require_between("option false_alarm", options.false_alarm, 0, 1);
   ComparedUnits found;
   found.false_alarm = options.false_alarm;
-  LoadedResults loaded = load(options.results, found.left_out, progress);
+  LoadedResults loaded = load(options, found.left_out, progress);
   require_at_least("number of results", static_cast<long long>(loaded.paths.size()), 2);
   found.results = loaded.paths;
   found.units = units_of(loaded, found.left_out);
@@ -229,6 +283,7 @@ ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& 
       add_pairs_between(kind, found.units, found.pairs);
     }
   }
+  if (!options.unlike) leave_out_unlike(found, loaded.sensors);
   if (found.pairs.empty() && fleets.empty()) {
     require_same_optics(loaded.sensors[0], loaded.sensors[1]);
     throw InvalidArgument(fmt::format(
@@ -251,6 +306,7 @@ ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& 
 
 std::string answer_words(const ComparedPair& pair) {
   if (pair.comparison.change.degrees_of_freedom == 0) return "no sigmas to test with";
+  if (one_unit_words(pair.comparison) == "no") return "two units";
   return pair.changed ? "changed" : "no change seen";
 }
 

@@ -96,8 +96,11 @@ estimation::Evaluation evaluate_by_file(const estimation::Estimate& estimate,
                                         const std::string& truth) {
   check_truth_name(truth);
   const sensors::Sensor sensor = sensors::load_sensor(truth);
-  // One row per state: the truth of a full-rate recording is larger than the recording.
+  // One row per state, and the first shot's: the truth of a full-rate recording is larger than the
+  // recording.
   std::vector<std::int64_t> times = estimate.states.time_ns;
+  const std::int64_t first_ns = estimate.series.time_ns(estimation::first_used_shot(estimate));
+  if (std::find(times.begin(), times.end(), first_ns) == times.end()) times.push_back(first_ns);
   std::sort(times.begin(), times.end());
   const recordings::TruthColumns columns = recordings::load_truth(truth_columns(truth), times);
   check_beams(estimate.series, columns, truth);

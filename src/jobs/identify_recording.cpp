@@ -10,6 +10,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/identification/soundness.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
@@ -104,6 +105,16 @@ void judge(IdentifiedRecording& result) {
         rms, found.hypotheses.size() > 1 ? found.hypotheses[1].excess : 0.0,
         identification::kFairLead);
     result.to_do = "record for longer, or with less of the field of view without returns";
+    return;
+  }
+  const identification::Doubt doubt = identification::doubt_of(found, result.sensor.sensor);
+  if (!doubt.words.empty()) {
+    result.verdict =
+        doubt.refuted ? IdentificationVerdict::inconsistent : IdentificationVerdict::undecided;
+    result.words = fmt::format("{}; it leaves {}", doubt.words, rms);
+    result.to_do =
+        "check that the recording is of one sensor at rest, with prisms that all turn, and record "
+        "for longer";
     return;
   }
   result.verdict = IdentificationVerdict::identified;

@@ -21,6 +21,8 @@
 #include "risley/io/text_table.hpp"
 #include "risley/recordings/reader.hpp"
 
+#include "jobs/checks.hpp"
+
 namespace risley::jobs {
 namespace {
 
@@ -278,6 +280,26 @@ std::vector<Input> find_inputs(const InputNames& wanted, const Progress& progres
     }
   }
   return std::move(finder).inputs();
+}
+
+std::vector<std::string> files_behind(const std::string& path) {
+  std::vector<std::string> files = recordings::recording_files(path);
+  std::error_code code;
+  if (fs::is_directory(path, code) && !recordings::is_recording_folder(path)) {
+    for (fs::directory_iterator at(path, code), end; !code && at != end; at.increment(code)) {
+      files.push_back(at->path().string());
+    }
+  }
+  if (path.ends_with(".truth.yaml")) {
+    files.push_back(truth_columns(path));
+    files.push_back(truth_mount(path));
+  }
+  std::erase_if(files, [](const std::string& file) {
+    std::error_code ignored;
+    return !fs::is_regular_file(file, ignored);
+  });
+  std::sort(files.begin(), files.end());
+  return files;
 }
 
 std::vector<std::pair<std::string, std::string>> input_hashes(const std::string& path,

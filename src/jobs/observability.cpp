@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "risley/core/error.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -47,8 +48,8 @@ JudgedObservability judge_observability(const ObservabilityOptions& options,
   progress.check();
   JudgedObservability result;
   if (options.recording.empty()) {
-    const estimation::EstimateOptions settings = settings_of(
-        options, sensors::load_sensor(options.sensor.empty() ? kUsualSensor : options.sensor));
+    const estimation::EstimateOptions settings =
+        settings_of(options, load_result(options.sensor.empty() ? kUsualSensor : options.sensor));
     result.shape = settings.sensor.shape();
     result.observability = of_plan(options, settings, progress.silent());
   } else {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "risley/jobs/compare_results.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs {
@@ -17,7 +18,7 @@ constexpr double kMostDrawn = 25'000;
 PatternDetails pattern_details(const std::string& sensor, const sensors::ScanPatternOptions& scan,
                                const sensors::CoverageOptions& coverage, const Progress& progress) {
   PatternDetails result;
-  result.sensor = sensors::load_sensor(sensor);
+  result.sensor = load_result(sensor);
   result.coverage = sensors::pattern_coverage(result.sensor, scan, coverage, progress);
   const double rate = scan.shot_rate.value_or(result.sensor.shot_rate);
   const double rows = coverage.after.back() * rate / static_cast<double>(scan.every);

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/plan_calibration.hpp"
 
+#include "risley/jobs/compare_results.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/checks.hpp"
@@ -17,7 +18,7 @@ PlannedCalibration plan_calibration(const PlanCalibrationOptions& options,
   check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
   calibration::CalibrationPlan plan;
   plan.scene = options.scene;
-  plan.sensor = sensors::load_sensor(options.sensor.empty() ? kUsualSensor : options.sensor);
+  plan.sensor = load_result(options.sensor.empty() ? kUsualSensor : options.sensor);
   plan.fixed = hold(options.fixed, plan.sensor);
   plan.additional = options.additional;
   plan.duration = options.duration;

@@ -10,6 +10,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/scenes/scene.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -99,7 +100,7 @@ PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress
     }
   }
   PlannedFlightResult result;
-  result.sensor = sensors::load_sensor(options.sensor.empty() ? kUsualSensor : options.sensor);
+  result.sensor = load_result(options.sensor.empty() ? kUsualSensor : options.sensor);
   calibration::FlightForecastOptions wanted;
   if (options.rate) wanted.rate = *options.rate;
   calibration::FlightCalibrationOptions& own = wanted.calibration;

@@ -125,7 +125,8 @@ class Recorder {
   std::unique_ptr<PacketFile> file_;
   std::unique_ptr<OpticsWatch> optics_;  // where the optics are watched
   std::vector<const wire::UdpSocket*> waiting_;
-  std::optional<std::int64_t> first_data_ns_;
+  std::optional<std::int64_t> first_packet_ns_,
+      first_data_ns_;  ///< also a rejected one; a sound one
   std::int64_t last_data_ns_ = 0, frame_due_ns_ = 0, watch_due_ns_ = 0;
   std::int64_t step_ns_ = 0;           // when the last step began
   std::int64_t patient_until_ns_ = 0;  // until then packets may wait for longer
@@ -350,6 +351,7 @@ void Recorder::take_commands(LiveSensor& live, std::int64_t now) {
 
 std::size_t Recorder::take_data(LiveSensor& live, std::int64_t now) {
   const auto take = [&](LiveSensor& whose, const wire::UdpSocket::Datagram& datagram) {
+    if (!first_packet_ns_) first_packet_ns_ = now;
     if (!whose.order.add(datagram.bytes, datagram.kernel_ns)) return;
     if (!first_data_ns_) first_data_ns_ = now;
     last_data_ns_ = now;
@@ -475,8 +477,9 @@ RecordedSensors Recorder::run() {
   std::exception_ptr failure;
   try {
     for (std::int64_t now = begin; !progress_.cancelled(); now = steady_ns()) {
-      const std::int64_t end =
-          first_data_ns_ && options_.duration ? *first_data_ns_ + duration : kEndless;
+      // Of packets that are all rejected, the first one counts.
+      const std::optional<std::int64_t> first = first_data_ns_ ? first_data_ns_ : first_packet_ns_;
+      const std::int64_t end = first && options_.duration ? *first + duration : kEndless;
       if (now >= end) break;
       if (options_.duration && first_data_ns_) {
         try {
@@ -499,6 +502,14 @@ RecordedSensors Recorder::run() {
   if (failure) std::rethrow_exception(failure);
   write_frame(true);
   if (file_->frames() == 0) {
+    std::uint64_t rejected = 0;
+    for (const auto& live : sensors_) rejected += rejected_by(*live);
+    if (first_packet_ns_) {
+      throw wire::NetworkError(fmt::format(
+          "{}: all {} packets that came from {} were rejected, because they are not of the first "
+          "generation's protocol or hold no times in order; nothing was recorded",
+          to_string(interface_.address), rejected, name_of(*sensors_.front())));
+    }
     throw wire::NetworkError(fmt::format("{}: no packet came from {}; nothing was recorded",
                                          to_string(interface_.address),
                                          name_of(*sensors_.front())));

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <regex>
 
 #include <fcntl.h>
@@ -49,10 +50,12 @@ std::string set_aside(const fs::path& file) {
 ResultFolder::ResultFolder(const std::string& folder) : folder_(folder) {
   if (folder_.empty()) return;
   made_ = io::make_folder(folder_);
+  lock_.emplace(folder_);
 }
 
 ResultFolder::~ResultFolder() {
   files_.clear();
+  lock_.reset();
   std::error_code ignored;
   if (made_ && !committed_) fs::remove(folder_, ignored);  // only if it is empty
 }
@@ -71,7 +74,7 @@ void ResultFolder::add_states(const std::string& name, const estimation::Estimat
                : estimation::rows_of(estimate.states, shots);
   };
   content.residuals_over_angle = estimate.residuals_over_angle;
-  write_states(files_.emplace_back(path(name)), content, provenance);
+  write_states(output(name), content, provenance);
 }
 
 void ResultFolder::add_calibration(const sensors::Sensor& sensor) {
@@ -107,7 +110,16 @@ std::vector<std::string> ResultFolder::commit() {
 }
 
 void ResultFolder::write(const std::string& name, const std::string& text) {
-  io::write_text(files_.emplace_back(path(name)), text);
+  io::write_text(output(name), text);
+}
+
+io::OutputFile& ResultFolder::output(const std::string& name) {
+  if (!is_own_result(path(name))) {
+    throw FileError(path(name), {},
+                    "is not a result of risley, and would be replaced by one: move it, or give "
+                    "another folder");
+  }
+  return files_.emplace_back(path(name));
 }
 
 std::vector<std::string> ResultFolder::left_over() const {
@@ -120,7 +132,9 @@ std::vector<std::string> ResultFolder::left_over() const {
     const bool replaced =
         std::any_of(files_.begin(), files_.end(),
                     [&](const io::OutputFile& file) { return file.path() == path(name); });
-    if (!replaced && std::regex_match(name, results)) names.push_back(name);
+    if (!replaced && std::regex_match(name, results) && is_own_result(path(name))) {
+      names.push_back(name);
+    }
   }
   std::sort(names.begin(), names.end());
   return names;
@@ -134,7 +148,40 @@ std::optional<std::string> calibration_in(const std::string& folder) {
   std::error_code ignored;
   const fs::path file = fs::path(folder) / kCalibrationFile;
   if (!fs::is_regular_file(file, ignored)) return std::nullopt;
+  require_settled(folder);
   return file.string();
+}
+
+void require_settled(const std::string& result) {
+  std::error_code ignored;
+  fs::path folder = result;
+  if (!fs::is_directory(folder, ignored)) folder = folder.parent_path();
+  if (folder.empty()) folder = ".";
+  if (fs::exists(folder / kIncomplete, ignored)) {
+    throw FileError((folder / kIncomplete).string(), {},
+                    "says that the files beside it may be of different runs, because the last one "
+                    "was stopped: run it again");
+  }
+  if (io::is_locked_by_other(folder.string())) {
+    throw FileError(folder.string(), {},
+                    "a run is writing its results there: wait until it has ended");
+  }
+}
+
+bool is_own_result(const std::string& file) {
+  std::error_code ignored;
+  const fs::file_status status = fs::status(file, ignored);
+  if (!fs::exists(status)) return true;
+  if (!fs::is_regular_file(status)) return false;
+  if (fs::path(file).filename() == "trajectory.csv") {
+    const fs::path mount = fs::path(file).parent_path() / "mount.yaml";
+    return fs::exists(mount, ignored) && is_own_result(mount.string());
+  }
+  std::string head(4096, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(stream.gcount()));
+  return head.find("risley") != std::string::npos;
 }
 
 }  // namespace risley::jobs

@@ -11,6 +11,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/folder.hpp"
+#include "risley/io/json_text.hpp"
 #include "risley/io/sha256.hpp"
 #include "risley/io/text_file.hpp"
 
@@ -21,7 +22,12 @@ namespace fs = std::filesystem;
 using RecordJson = nlohmann::ordered_json;
 
 constexpr const char* kRecordKind = "risley_record";
-constexpr int kRecordVersion = 1;
+constexpr int kRecordVersion = 2;
+constexpr const char* kSeal = "sha256";  // of all the rest: a record that was edited is none
+
+std::string seal_of(const RecordJson& json) {
+  return io::sha256(json.dump(-1, ' ', false, RecordJson::error_handler_t::replace));
+}
 
 }  // namespace
 
@@ -32,11 +38,12 @@ void save_record(const std::string& path, const ResultRecord& record) {
   for (const auto& [file, hash] : record.outputs) {
     outputs.push_back({{"path", file}, {"sha256", hash}});
   }
-  const RecordJson json = {{kRecordKind, kRecordVersion},
-                           {"work", record.work},
-                           {"inputs_sha256", record.inputs},
-                           {"outputs", outputs},
-                           {"outcome", record.outcome}};
+  RecordJson json = {{kRecordKind, kRecordVersion},
+                     {"work", record.work},
+                     {"inputs_sha256", record.inputs},
+                     {"outputs", outputs},
+                     {"outcome", record.outcome}};
+  json[kSeal] = seal_of(json);
   io::write_text_file(path, json.dump(1, ' ', false, RecordJson::error_handler_t::replace) + "\n");
 }
 
@@ -44,8 +51,13 @@ std::optional<ResultRecord> load_record(const std::string& path) {
   std::error_code ignored;
   if (!fs::is_regular_file(path, ignored)) return std::nullopt;
   try {
-    const RecordJson json = RecordJson::parse(io::read_text_file(path));
+    const std::string text = io::read_text_file(path);
+    io::require_shallow_json(path, text);
+    const RecordJson json = RecordJson::parse(text);
     if (json.at(kRecordKind) != kRecordVersion) return std::nullopt;
+    RecordJson sealed = json;
+    sealed.erase(kSeal);
+    if (json.at(kSeal) != seal_of(sealed)) return std::nullopt;
     ResultRecord record;
     json.at("work").get_to(record.work);
     json.at("inputs_sha256").get_to(record.inputs);

@@ -15,6 +15,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs {
@@ -314,7 +315,7 @@ std::optional<Sensor> preset_of_type(int device_type) {
 
 std::optional<Sensor> given_sensor(const std::string& name_or_path) {
   if (name_or_path.empty()) return std::nullopt;
-  return sensors::load_sensor(name_or_path);
+  return load_result(name_or_path);
 }
 
 SensorChoice choose_sensor(const recordings::Source& source, const recordings::ReadOptions& reading,

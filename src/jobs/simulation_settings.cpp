@@ -10,6 +10,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/sensors/range_values.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
@@ -107,7 +108,7 @@ simulation::SimulationSettings simulation_settings(const SimulationOptions& opti
   if (options.duration) check_positive(*options.duration, "duration", "s");
   if (options.rate) check_positive(*options.rate, "rate", "Hz");
   simulation::SimulationSettings settings;
-  settings.truth = sensors::load_sensor(options.sensor);
+  settings.truth = load_result(options.sensor);
   assign_truth(settings.truth, options.set);
   if (!options.beam_origin) settings.truth.set_prism_geometry({});
   if (options.reported_nominal || !options.reported.empty()) {

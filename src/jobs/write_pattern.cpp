@@ -13,6 +13,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/io/output_file.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/pattern_formats.hpp"
@@ -64,7 +65,7 @@ const std::vector<PatternFormat>& pattern_formats() {
 WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& stream,
                              const Progress& progress) {
   const Format& format = format_of(options.format);
-  const sensors::Sensor sensor = sensors::load_sensor(options.sensor);
+  const sensors::Sensor sensor = load_result(options.sensor);
   const double rate = options.scan.shot_rate.value_or(sensor.shot_rate);
   require_between("duration", options.duration, 0, 1e7, "s");
   require_between("shot_rate", rate, 1e-3, 1e9, "Hz");
@@ -74,7 +75,9 @@ WrittenPattern write_pattern(const WritePatternOptions& options, std::ostream& s
   result.sensor = sensor.name;
   result.format = format.shown.name;
   result.output = options.output;
-  result.rows = shots / options.scan.every;
+  const auto group =
+      options.scan.whole_groups ? static_cast<std::uint64_t>(sensor.train.emitters()) : 1;
+  result.rows = options.scan.every == 1 ? shots : shots / group / options.scan.every * group;
   require_at_least("rows of the pattern", static_cast<long long>(result.rows), 1);
   result.firing = to_string(options.scan.firing.value_or(
       sensor.sequence ? sensor.sequence->firing : sensors::Firing::in_turn));

@@ -139,6 +139,7 @@ Json of(const jobs::EstimatedRecording& found) {
       {"process_jerk_deg_per_s2_per_sqrt_s", jerks},
       {"unobservable", unobservable},
       {"residuals_over_angle_chi2_per_bin", uneven},
+      {"rotation_angle_time_ns", e.series.time_ns(estimation::first_used_shot(e))},
       {"start", start_json(e.start)},
       {"warnings", all_warnings(found.warnings, e.warnings)},
       {"seconds",

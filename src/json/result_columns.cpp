@@ -171,7 +171,7 @@ ResultColumns::ResultColumns() {
   real(after_, "repointing_rms_deg", "deg", "of the points' directions against the reported ones",
        "/repointing_deg/rms");
   add(after_, CellKind::integer, "start_time_ns", "ns", "time that rotation angles are of",
-      {"/start/time_ns"});
+      {"/rotation_angle_time_ns"});
   add(after_, CellKind::integer, "iterations", "1", "of the estimate", {"/iterations"});
   add(after_, CellKind::integer, "warnings", "1", "how many there were", {"/warnings"});
   real(after_, "seconds_read", "s", "time for reading", "/seconds/read");

@@ -400,10 +400,10 @@ py::object observability(const py::dict& values, int threads, const py::object& 
   });
 }
 
-py::object compare(const std::vector<std::string>& results, double false_alarm,
-                   const py::object& tell) {
+py::object compare(const std::vector<std::string>& results, double false_alarm, bool anywhere,
+                   bool unlike, const py::object& tell) {
   return told_by(tell, 0, [&](const Progress& progress) {
-    return jobs::compare_units({results, false_alarm}, progress);
+    return jobs::compare_units({results, false_alarm, anywhere, unlike}, progress);
   });
 }
 
@@ -498,7 +498,8 @@ void bind_jobs(py::module_& module) {
   module.def("pattern", &pattern, options, threads, tell);
   module.def("coverage", &coverage, options, threads, tell);
   module.def("observability", &observability, options, threads, tell);
-  module.def("compare", &compare, py::arg("results"), py::arg("false_alarm"), tell);
+  module.def("compare", &compare, py::arg("results"), py::arg("false_alarm"), py::arg("anywhere"),
+             py::arg("unlike"), tell);
   module.def("campaign", &campaign, options, threads, tell);
   module.def("info", &info, options, tell);
   module.def(

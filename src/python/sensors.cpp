@@ -12,6 +12,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/sensors/sensor.hpp"
 
@@ -169,7 +170,7 @@ void bind_sensors(py::module_& module) {
   module.def(
       "load_sensor",
       [](const std::string& name_or_path) {
-        return unlocked([&] { return sensors::load_sensor(name_or_path); });
+        return unlocked([&] { return jobs::load_result(name_or_path); });
       },
       py::arg("name_or_path"));
 }

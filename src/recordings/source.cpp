@@ -59,14 +59,31 @@ bool Source::is_same_as(const Source& other) const {
   return std::filesystem::equivalent(name_, other.name_, ignored);
 }
 
+namespace {
+
+/// What SQLite reads with a database: messages that are not in it yet.
+void add_with_journals(const std::string& file, std::vector<std::string>& files) {
+  files.push_back(file);
+  for (const char* ending : {"-wal", "-journal"}) {
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(file + ending, ignored)) files.push_back(file + ending);
+  }
+}
+
+}  // namespace
+
 std::vector<std::string> recording_files(const Source& source) {
   if (source.recording()) return {};
   const std::string& path = source.name();
   std::error_code code;
-  if (!std::filesystem::is_directory(path, code)) return {path};
+  std::vector<std::string> files;
+  if (!std::filesystem::is_directory(path, code)) {
+    add_with_journals(path, files);
+    return files;
+  }
   try {
-    std::vector<std::string> files = bags::files_of_bag_folder(path);
-    files.insert(files.begin(), (std::filesystem::path(path) / "metadata.yaml").string());
+    files.push_back((std::filesystem::path(path) / "metadata.yaml").string());
+    for (const std::string& file : bags::files_of_bag_folder(path)) add_with_journals(file, files);
     return files;
   } catch (const FileError&) {  // who reads it is told of it
     return {path};

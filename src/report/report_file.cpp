@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/json_text.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/report/calibration_page.hpp"
 #include "risley/report/estimate_page.hpp"
@@ -501,6 +502,7 @@ void write_report(const std::string& path, const Report& report) {
 Report read_report(const std::string& path) { return parse_report(io::read_text_file(path), path); }
 
 Report parse_report(const std::string& text, const std::string& path) {
+  io::require_shallow_json(path, text);
   Json object;
   try {
     object = Json::parse(text);

@@ -40,6 +40,7 @@ ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::siz
                   0, kLongest, "s");
 
   const auto emitters = static_cast<std::uint64_t>(sensor.train.emitters());
+  const std::uint64_t group = options.whole_groups ? emitters : 1;
   const auto first_shot = static_cast<std::uint64_t>(sequence.first_shot);
   const bool together = options.firing.value_or(sequence.firing) == Firing::together;
   ScanPattern pattern;
@@ -49,7 +50,8 @@ ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::siz
   pattern.emitter.resize(rows);
   std::vector<std::vector<double>> angles(prisms, std::vector<double>(rows));
   for (std::size_t i = 0; i < rows; ++i) {
-    const std::uint64_t shot = options.every * (first_row + i + 1) - 1;
+    const std::uint64_t row = first_row + i;
+    const std::uint64_t shot = (options.every * (row / group + 1) - 1) * group + row % group;
     pattern.time[i] = static_cast<double>(first_shot + shot) / rate;
     pattern.emitter[i] = static_cast<std::uint8_t>(shot % emitters);
     const std::uint64_t of_rotors =

@@ -94,6 +94,19 @@ io::FileDescriptor listening_socket(Endpoint& local) {
 
 }  // namespace
 
+std::vector<std::string> host_names(const Endpoint& local) {
+  constexpr std::uint8_t kLoopback = 127;
+  constexpr int kUsualPort = 80;  // which browsers leave out
+  std::vector<std::string> names = {to_string(local.address)};
+  if (local.address.bytes[0] == kLoopback) names.emplace_back("localhost");
+  std::vector<std::string> hosts;
+  for (const std::string& name : names) {
+    hosts.push_back(fmt::format("{}:{}", name, local.port));
+    if (local.port == kUsualPort) hosts.push_back(name);
+  }
+  return hosts;
+}
+
 class EventServer::Work {
  public:
   Work(const Endpoint& local, std::vector<ServedText> texts)
@@ -115,10 +128,7 @@ class EventServer::Work {
                          ": libmicrohttpd could not start: end other programs, or watch no page");
     }
     const std::scoped_lock lock(mutex_);  // whoever asks already waits for this
-    hosts_.push_back(to_string(local_));
-    constexpr std::uint8_t kLoopback = 127;
-    if (local_.address.bytes[0] == kLoopback)
-      hosts_.push_back(fmt::format("localhost:{}", local_.port));
+    hosts_ = host_names(local_);
   }
 
   ~Work() {

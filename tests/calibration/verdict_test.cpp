@@ -52,6 +52,23 @@ TEST(Verdict, ParametersBeyondChanceAreBentWhereWallsGetFlatter) {
   EXPECT_EQ(code_of(c), "as_believed");
 }
 
+TEST(Verdict, RangesOfNoStatedUnitHaveToScatterAsTheSensorsDo) {
+  Calibration c = moved_by(1e-3);
+  c.sensor = sensors::load_sensor("mid-40");
+  RangedRecording recording;
+  for (const double sigma0 : {0.1, 0.3, 3.1, 10.0}) {
+    c.sigma0 = sigma0;
+    recording.unit_assumed = false;
+    EXPECT_EQ(reason_of_ranges(c, {recording}, 0.02), "");
+    recording.unit_assumed = true;
+    EXPECT_NE(reason_of_ranges(c, {recording}, 0.02), "");
+  }
+  for (const double sigma0 : {0.35, 1.0, 2.9}) {
+    c.sigma0 = sigma0;
+    EXPECT_EQ(reason_of_ranges(c, {recording}, 0.02), "");
+  }
+}
+
 TEST(Verdict, WhatWasHeldMayExplainAChange) {
   Calibration c = moved_by(1e-4);
   EXPECT_EQ(code_of(c), "bent");

@@ -140,8 +140,9 @@ ShapeProblem problem_of(const std::vector<Wall>& walls, const MatrixXd& prior) {
   problem.system = MatrixXd::Zero(kColumns, kColumns);
   problem.system.topLeftCorner(kUnknowns, kUnknowns) = prior;
   for (const Wall& wall : walls) {
-    problem.system += wall.rows.transpose() * wall.rows;
-    problem.walls.push_back(wall.sums);
+    calibration::WallSums& sums = problem.walls.emplace_back(wall.sums);
+    sums.system = wall.rows.transpose() * wall.rows;
+    for (Index j = 0; j < kColumns; ++j) sums.places.push_back(j);
   }
   return problem;
 }
@@ -175,6 +176,43 @@ TEST(WallShape, IsWhatDenseMatricesSay) {
   EXPECT_NEAR(seen, 1.0, 1e-12);
   const auto most = std::max_element(likelihood.begin(), likelihood.end()) - likelihood.begin();
   EXPECT_EQ(all.likeliest, static_cast<std::size_t>(most));
+}
+
+/// The first unknown moved from the whole system to the walls' own, where one wall has to do with
+/// it.
+ShapeProblem with_own_unknown(const Wall& wall, const MatrixXd& prior) {
+  ShapeProblem problem;
+  problem.unknowns = kUnknowns - 1;
+  problem.system = MatrixXd::Zero(kColumns - 1, kColumns - 1);
+  problem.system.topLeftCorner(kUnknowns - 1, kUnknowns - 1) =
+      prior.bottomRightCorner(kUnknowns - 1, kUnknowns - 1);
+  calibration::WallSums& sums = problem.walls.emplace_back(wall.sums);
+  sums.own = 1;
+  sums.system = wall.rows.transpose() * wall.rows;
+  sums.system(0, 0) += prior(0, 0);
+  for (Index j = 0; j < kColumns - 1; ++j) sums.places.push_back(j);
+  return problem;
+}
+
+TEST(WallShape, UnknownsOfOneWallMayBeItsOwn) {
+  const Wall wall = wall_of(grid_of(9, 4, 0.3), kColumns, 5);
+  const MatrixXd prior = 2.0 * MatrixXd::Identity(kUnknowns, kUnknowns);
+  const ShapePrior shapes{{{0.02, 0.8, 0.0}, {0.01, 0.8, 0.004}}, {0.5, 0.5}};
+  const ShapeSolution together = solve_with_shape(problem_of({wall}, prior), shapes);
+  const ShapeSolution apart = solve_with_shape(with_own_unknown(wall, prior), shapes);
+  ASSERT_TRUE(apart.positive);
+  const auto near = [](const MatrixXd& a, const MatrixXd& b) {
+    return a.rows() == b.rows() && a.cols() == b.cols() && (a - b).norm() <= 1e-9 * b.norm();
+  };
+  EXPECT_TRUE(near(apart.step, together.step.tail(2)));
+  EXPECT_TRUE(near(apart.own.at(0).step, together.step.head(1)));
+  EXPECT_TRUE(near(apart.covariance, together.covariance.bottomRightCorner(2, 2)));
+  EXPECT_TRUE(near(apart.own.at(0).covariance, together.covariance.topLeftCorner(1, 1)));
+  EXPECT_TRUE(near(apart.response, together.response.bottomRows(2)));
+  EXPECT_TRUE(near(apart.own.at(0).response, together.response.topRows(1)));
+  EXPECT_TRUE(near(apart.height.at(0), together.height.at(0)));
+  EXPECT_NEAR(apart.promised, together.promised, 1e-9 * together.promised);
+  EXPECT_NEAR(apart.weight.at(0), together.weight.at(0), 1e-9);
 }
 
 TEST(WallShape, ProcessHasTheVarianceThatItStates) {

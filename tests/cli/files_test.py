@@ -70,7 +70,7 @@ class FilesTest(CommandTest):
         inputs = self.expect_json(0, "simulate", "-o", "a.sequence.csv", "--sensor", "result", *seconds)["inputs"]
         self.assertEqual([one["path"] for one in inputs], ["result/calibration.yaml"])
         done = self.expect(3, "simulate", "-o", "c.sequence.csv", "--sensor", "nothing", *seconds)
-        self.assertIn("nothing: is a folder, expected a file", done.stderr)
+        self.assertIn("nothing/calibration.yaml: is missing", done.stderr)
 
     def test_rows_before_damage_are_told(self):
         result = self.expect_json(3, "info", "nan.csv")

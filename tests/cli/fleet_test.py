@@ -9,7 +9,6 @@ import os
 import pathlib
 import shutil
 import signal
-import sqlite3
 import subprocess
 import time
 import unittest
@@ -142,7 +141,8 @@ class FleetTest(CommandTest):
         ended = os.times()  # processor time: others may be busy
         self.assertLess(ended.children_user - started.children_user, 1 if not SANITIZED else 60)
         self.assertEqual(self.counts(found), (0, 5, 6))
-        self.assertTrue(all(one["skipped"] for one in found["results"]))
+        # What could not be read may have been the machine's fault.
+        self.assertTrue(all(one.get("skipped", False) == (one["status"] != 3) for one in found["results"]))
         self.assertEqual(self.rows("again.csv"), self.rows("fleet.csv"))
         shutil.copy(self.folder / "fleet/zenith.lvx", self.folder / "before.lvx")
         try:  # another file of the same name; its time tells nothing
@@ -162,28 +162,18 @@ class FleetTest(CommandTest):
         found = self.expect_json(3, "estimate", "fleet", "-o", "results", *FAST, "--mirror", "no", "--resume")
         self.assertEqual(found["skipped"], 0)
 
-    def test_3_tables_of_three_kinds_hold_the_same(self):
+    def test_3_tables_are_of_two_kinds(self):
         words = ("info", "fleet", "--quiet")
-        for name in ("info.csv", "info.sqlite", "info.nc"):
+        for name in ("info.csv", "info.nc"):
             self.expect(3, *words, "--table", name)
         rows = self.rows("info.csv")
         self.assertEqual(len(rows), 11)
-        with sqlite3.connect(self.folder / "info.sqlite") as database:
-            database.row_factory = sqlite3.Row
-            found = [dict(row) for row in database.execute("SELECT * FROM results")]
-            units = dict(database.execute("SELECT name, unit FROM columns"))
-        self.assertEqual(list(found[0]), list(rows[0]))
-        self.assertEqual(units["duration_s"], "s")
-        for one, row in zip(found, rows):
-            for name, text in row.items():
-                if name != "seconds_total":
-                    self.assertEqual("" if one[name] is None else one[name],
-                                     type(one[name])(text) if one[name] is not None else text, name)
         self.assertEqual((self.folder / "info.nc").read_bytes()[:4], b"\x89HDF")
         damaged = next(row for row in rows if row["input"] == "fleet/bad/middle.lvx")
         self.assertEqual(damaged["exit_status"], "3")
         self.assertGreater(int(damaged["observations"]), 0)  # those before the damage
         self.expect(2, *words, "--table", "info.xlsx")
+        self.expect(2, *words, "--table", "info.sqlite")
         self.expect(3, *words, "--table", "nowhere/info.csv")
 
     def test_4_lists_and_patterns(self):
@@ -207,7 +197,7 @@ class FleetTest(CommandTest):
         self.assertEqual(self.all_names("converted"), ["east/scan.nc", "north/scan.nc"])
         self.assertEqual(found["observations"], 60000)
         found = self.expect_json(0, "convert", "fleet/**/scan.lvx", "-o", "converted", "--format", "netcdf",
-                                 "--resume", "--table", "converted.sqlite")
+                                 "--resume", "--table", "converted.csv")
         self.assertEqual(self.counts(found), (0, 0, 2))
         self.assertEqual(found["observations"], 60000)
         shutil.copytree(self.folder / "fleet/east", self.folder / "more/east")

@@ -4,6 +4,7 @@
 """What may stand at the name of an output, and disks that fill up."""
 import os
 import pathlib
+import resource
 import shutil
 import signal
 import subprocess
@@ -215,10 +216,55 @@ class ResultTest(CommandTest):
         del before["report.html"]
         self.assertEqual(self.contents("whole"), before)
 
+    def test_outputs_are_told_apart_by_their_files(self):
+        (self.folder / "folder").mkdir()
+        (self.folder / "other").symlink_to("folder")
+        pattern = ("pattern", "--sensor", "mid-40", "--format", "npy", "--duration-s", "0.01")
+        for one, other in (("x.npy", "./x.npy"), ("folder/x.npy", "other/x.npy"),
+                           ("x.npy", "folder/../x.npy")):
+            self.expect(2, *pattern, "-o", one, "--report", other)
+        before = self.copy("page")
+        for name in ("states.nc", "calibration.yaml", "report.json"):
+            self.expect(3, "compare", "result", "result", "-o", f"page/{name}")
+        self.assertEqual(self.contents("page"), before)
+
+    def test_limits_and_closed_pipes_are_errors(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        (self.folder / "limited").mkdir()
+        done = subprocess.run([COMMAND, "convert", "unit.lvx", "-o", "limited/unit.csv"], cwd=self.folder,
+                              preexec_fn=limit, stderr=subprocess.PIPE, check=False)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertEqual(list((self.folder / "limited").iterdir()), [])
+        reading, writing = os.pipe()
+        os.close(reading)
+        done = subprocess.run([COMMAND, "preset", "show", "mid-40"], stdout=writing, stderr=subprocess.PIPE,
+                              check=False)
+        os.close(writing)
+        self.assertEqual(done.returncode, 3, done.stderr)
+
+    def test_a_small_stack_is_enough(self):
+        done = subprocess.run(["sh", "-c", 'ulimit -s 128; exec "$0" estimate unit.lvx --quiet', str(COMMAND)],
+                              cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_who_waits_for_a_pipe_ends_when_interrupted(self):
+        os.mkfifo(self.folder / "scene.yaml")
+        with subprocess.Popen([COMMAND, "simulate", "--scene", "scene.yaml", "-o", "waits.nc"],
+                              cwd=self.folder, stderr=subprocess.DEVNULL) as process:
+            time.sleep(0.3)
+            began = time.monotonic()
+            process.send_signal(signal.SIGINT)
+            self.assertEqual(process.wait(timeout=10), 130)
+            self.assertLess(time.monotonic() - began, 2.5)
+
     def test_a_stopped_exchange_is_marked(self):
         self.copy("stopped")
         (self.folder / "stopped/INCOMPLETE").write_text("as a killed run leaves it")
-        self.assertIn("INCOMPLETE", self.expect(0, "report", "stopped").stderr)
+        for words in (("report", "stopped"), ("compare", "stopped", "stopped"),
+                      ("cloud", "unit.lvx", "--calibration", "stopped", "-o", "c.las"),
+                      ("estimate", "unit.lvx", "--sensor", "stopped/calibration.yaml")):
+            self.assertIn("INCOMPLETE", self.expect(3, *words).stderr)
         self.expect(0, "estimate", "unit.lvx", "-o", "stopped")
         self.assertNotIn("INCOMPLETE", self.contents("stopped"))
 

@@ -9,7 +9,9 @@ import subprocess
 import sys
 import time
 import unittest
+import unittest.mock
 
+import livox_peer
 import lvx_file
 from command import COMMAND, ProcessTest
 from livox_peer import AVIA, HORIZON, MID_40, MID_70, SENSOR_PORT, Sensor, bound, frame, packet, send_with_room
@@ -400,6 +402,15 @@ class RecordTest(ProcessTest):
         self.assertEqual(self.expect_json(0, "record", "--list", "--interface", "127.0.0.2", "--find-s",
                                           0.1)["sensors"], [])
         self.assertFalse((self.folder / "nobody.lvx.unfinished").exists())
+
+    def test_packets_that_are_all_rejected_end_too(self):
+        sound = livox_peer.packet
+        with unittest.mock.patch.object(livox_peer, "packet", lambda *a, **k: b"\x09" + sound(*a, **k)[1:]):
+            self.sensor()
+            began = time.monotonic()
+            _, err = self.end(self.start("-o", "rejected.lvx", "--duration-s", "0.5"), 3)
+        self.assertIn("rejected", err)
+        self.assertLess(time.monotonic() - began, 20)
 
     def test_another_program_has_the_port(self):
         other = bound(HOST, 55000)

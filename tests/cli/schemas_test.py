@@ -174,9 +174,9 @@ class SchemasTest(CommandTest):
                       "netcdf", "--resume", "--table", "more.csv")
             cls.print(3, "info", "hall.lvx", "no.lvx", "cut.csv", "gap.sbet", "gap.smrmsg", "flight.sbet",
                       "flight.smrmsg", "scan.csv", "tail.lvx", "bad.lvx", "--table", "info.nc", "--resume")
-            cls.print(0, "estimate", "hall.lvx", *truth, "--table", "one.csv.sqlite", "--resume")
+            cls.print(0, "estimate", "hall.lvx", *truth, "--table", "one.csv.nc", "--resume")
             cls.print(3, "estimate", "hall.lvx", "bad.lvx", "cut.csv", "one.csv", "-o", "several", "--table",
-                      "several.sqlite", "--resume")
+                      "several.nc", "--resume")
         cls.print(0, "cloud", "--calibration", "mid-40", "--beam-origin-map", "map.html")
         cls.print(0, "report", "estimated")
         cls.print(0, "report", "estimated", "calibrated", "-o", "two.html")

@@ -104,6 +104,14 @@ WRONG = [
 
 
 class UsageTest(CommandTest):
+    def test_numbers_are_finite(self):
+        for words in (("simulate", "-o", "n.nc", "--start-angles-deg", "nan,0"),
+                      ("simulate", "-o", "n.nc", "--duration-s", "inf"),
+                      ("simulate", "-o", "n.nc", "--set", "wedge_angle_deg=-Infinity"),
+                      ("cloud", "a.lvx", "--calibration", "mid-40", "-o", "a.las", "--las-scale-m", "NaN")):
+            with self.subTest(words=words):
+                self.assertIn("finite", self.expect(2, *words).stderr)
+
     def test_version(self):
         self.assertRegex(self.expect(0, "--version").stdout, r"^risley \d+\.\d+\.\d+\n$")
 

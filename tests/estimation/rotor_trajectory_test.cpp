@@ -46,6 +46,15 @@ TEST(Stretches, AreCutAtClockResetsAndLongGaps) {
   EXPECT_TRUE(stretches({}).empty());
 }
 
+TEST(MakeKnots, TimesMayBeAsLateAsTheyAreStored) {
+  constexpr std::int64_t kLate = 9'200'000'000'000'000'000;
+  const AngleSeries series = series_at({kLate, kLate + 10, kLate + 20});
+  const std::vector<ShotRange> all{{0, 3}};
+  const RotorTrajectory knots = make_knots(series, all, 1, 1e8);
+  ASSERT_EQ(knots.size(), 1U);
+  EXPECT_EQ(knots.last_shot[0], 3U);
+}
+
 TEST(Thinned, TakesTheFirstShotOfEveryTickOfEachStretch) {
   std::vector<std::int64_t> times;
   for (std::int64_t i = 0; i < 1000; ++i) times.push_back(5'000 + i * 10'000);  // 100 kHz, 10 ms

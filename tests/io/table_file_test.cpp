@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Tables in three formats hold the same, and appear whole or not at all.
+// Tables in two formats hold the same, and appear whole or not at all.
 #include "risley/io/table_file.hpp"
 
 #include <cmath>
@@ -12,7 +12,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netcdf.h>
-#include <sqlite3.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/netcdf.hpp"
@@ -39,22 +38,6 @@ void write(const std::string& path) {
   table.close();
 }
 
-/// All cells of an SQL query, as text.
-std::vector<std::string> queried(const std::string& path, const std::string& query) {
-  sqlite3* database = nullptr;
-  EXPECT_EQ(sqlite3_open_v2(path.c_str(), &database, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
-  std::vector<std::string> cells;
-  const auto add = [](void* to, int count, char** values, char**) {
-    for (int i = 0; i < count; ++i) {
-      static_cast<std::vector<std::string>*>(to)->emplace_back(values[i] ? values[i] : "NULL");
-    }
-    return 0;
-  };
-  EXPECT_EQ(sqlite3_exec(database, query.c_str(), add, &cells, nullptr), SQLITE_OK) << query;
-  sqlite3_close(database);
-  return cells;
-}
-
 TEST(TableFile, WritesText) {
   const TestFolder folder;
   write(folder.file("t.csv"));
@@ -63,22 +46,6 @@ TEST(TableFile, WritesText) {
             "\"a, \"\"b\"\".lvx\",0,0.3333333333333333\n"
             "\"ä\nb.lvx\",,\n"
             ",9007199254740993,2\n");
-}
-
-TEST(TableFile, WritesDatabases) {
-  const TestFolder folder;
-  for (const char* name : {"t.sqlite", "t.DB", "t.sqlite3"}) {
-    write(folder.file(name));
-    EXPECT_THAT(queried(folder.file(name), "SELECT * FROM results"),
-                ElementsAre("a, \"b\".lvx", "0", "0.333333333333333", "ä\nb.lvx", "NULL", "NULL",
-                            "NULL", "9007199254740993", "2.0"));
-    EXPECT_THAT(queried(folder.file(name), "SELECT * FROM columns WHERE unit = 'deg'"),
-                ElementsAre("wedge_angle_deg", "deg", "estimated"));
-    EXPECT_THAT(queried(folder.file(name), "SELECT * FROM about"), ElementsAre("version", "0.1.0"));
-    EXPECT_THAT(queried(folder.file(name), "PRAGMA integrity_check"), ElementsAre("ok"));
-    EXPECT_THAT(queried(folder.file(name), "SELECT typeof(wedge_angle_deg) FROM results LIMIT 1"),
-                ElementsAre("real"));
-  }
 }
 
 TEST(TableFile, WritesNetcdf) {
@@ -101,15 +68,15 @@ TEST(TableFile, WritesNetcdf) {
 
 TEST(TableFile, MayHaveNoRows) {
   const TestFolder folder;
-  for (const char* name : {"t.csv", "t.nc", "t.sqlite"}) {
+  for (const char* name : {"t.csv", "t.nc"}) {
     TableFile(folder.file(name), kColumns, {}).close();
   }
-  EXPECT_EQ(folder.names().size(), 3U);
+  EXPECT_EQ(folder.names().size(), 2U);
 }
 
 TEST(TableFile, IsThereWholeOrNotAtAll) {
   const TestFolder folder;
-  for (const char* name : {"t.csv", "t.nc", "t.sqlite"}) {
+  for (const char* name : {"t.csv", "t.nc"}) {
     write_text_file(folder.file(name), "before");
     {
       TableFile table(folder.file(name), kColumns, {});
@@ -124,6 +91,7 @@ TEST(TableFile, IsThereWholeOrNotAtAll) {
 TEST(TableFile, RefusesWhatDoesNotFit) {
   const TestFolder folder;
   EXPECT_THROW(TableFile::check_name("t.xlsx"), InvalidArgument);
+  EXPECT_THROW(TableFile::check_name("t.sqlite"), InvalidArgument);
   EXPECT_THROW(TableFile(folder.file("t.csv"), {}, {}), InvalidArgument);
   EXPECT_THROW(TableFile(folder.file("nowhere/t.csv"), kColumns, {}), FileError);
   TableFile table(folder.file("t.csv"), kColumns, {});
@@ -134,7 +102,7 @@ TEST(TableFile, RefusesWhatDoesNotFit) {
   try {
     TableFile::check_name("t");
   } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr(".sqlite"));
+    EXPECT_THAT(error.what(), HasSubstr(".csv"));
   }
 }
 

@@ -17,6 +17,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/io/folder.hpp"
+#include "risley/io/sha256.hpp"
 
 #include "jobs/campaign_chunk.hpp"
 #include "refusal.hpp"
@@ -208,6 +209,21 @@ TEST_F(CampaignTest, FilesThatDoNotCountAreNamed) {
   ASSERT_EQ(merged.warnings.size(), 2U);
   EXPECT_NE(merged.warnings[0].find("line"), std::string::npos) << merged.warnings[0];
   EXPECT_NE(merged.warnings[1].find("another plan"), std::string::npos) << merged.warnings[1];
+}
+
+TEST_F(CampaignTest, CellsOfSettingsThatThePlanDoesNotHaveDoNotCount) {
+  const CampaignPlan all = plan();
+  const CampaignChunk chunk = run_chunk(all, {1, 1}, options("a"));
+  std::string text = read(chunk.file);
+  text.resize(text.rfind('\n', text.size() - 2) + 1);  // without the line of the hash
+  const std::string name = "\"setting\":";
+  text.insert(text.find_first_of("0123456789", text.find(name) + name.size()), "214748364");
+  text += "{\"sha256\": \"" + io::sha256(text) + "\"}\n";
+  std::ofstream(chunk.file) << text;
+  const CampaignResult merged = merge_chunks(all, file("a.csv"), options("a"));
+  EXPECT_EQ(merged.done, 0U);
+  ASSERT_EQ(merged.warnings.size(), 1U);
+  EXPECT_NE(merged.warnings[0].find("214748364"), std::string::npos) << merged.warnings[0];
 }
 
 TEST_F(CampaignTest, WhatIsRefusedIsAnOutcomeWithItsReason) {

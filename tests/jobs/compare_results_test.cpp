@@ -71,6 +71,29 @@ TEST_F(CompareResults, OfOneResultWithItselfHasNoDifference) {
   EXPECT_EQ(c.parameters.back().name, "range_offset_m");
 }
 
+TEST_F(CompareResults, ATruthAndABeliefAreTwoThings) {
+  sensors::Sensor belief = result("A1"), truth = result("A1");
+  belief.reference = sensors::CalibrationReference::directions;
+  truth.reference = sensors::CalibrationReference::planes;
+  truth.set(kTilt, truth.get(kTilt) + 20 * kSigma);
+  const std::string a = saved("a", belief), b = saved("b", truth), c = saved("c", belief);
+  EXPECT_THROW(compare_units({{a, b}, 0.01}), InvalidArgument);
+  EXPECT_TRUE(compare_units({{a, b}, 0.01, false, true}).pairs.at(0).changed);
+  const ComparedUnits found = compare_units({{a, b, c}, 0.01});
+  ASSERT_EQ(found.pairs.size(), 1U);  // a and c
+  EXPECT_FALSE(found.pairs[0].changed);
+  EXPECT_EQ(found.left_out.size(), 2U);
+}
+
+TEST_F(CompareResults, TwoUnitsAreNotOneThatChanged) {
+  sensors::Sensor other = result("B2");
+  other.set(kTilt, other.get(kTilt) + 20 * kSigma);
+  const ComparedUnits found = compare_units({{saved("a", result("A1")), saved("b", other)}, 0.01});
+  ASSERT_EQ(found.pairs.size(), 1U);
+  EXPECT_LT(found.pairs[0].comparison.change.p_value, 1e-6);
+  EXPECT_FALSE(found.pairs[0].changed);
+}
+
 // Turning the incident beam turns all beams alike, to a twentieth.
 TEST_F(CompareResults, SaysHowFarDirectionsDiffer) {
   sensors::Sensor turned = result("A1");
@@ -211,7 +234,7 @@ TEST_F(CompareResults, OfATableFollowsItsRows) {
   std::filesystem::create_directories(folder_.path() / "c3");
   io::write_text_file((folder_.path() / "c3/calibration.yaml").string(), "model: {");
   const std::int64_t done = 0, failed = 3;
-  for (const char* name : {"table.csv", "table.nc", "table.sqlite"}) {
+  for (const char* name : {"table.csv", "table.nc"}) {
     SCOPED_TRACE(name);
     const std::string table =
         table_of(folder_.path() / name, {{"a/may.lvx", "a1/may", done, {}},
@@ -320,6 +343,23 @@ TEST_F(CompareResults, SaysWhatIsMissing) {
     EXPECT_THAT(error.what(), HasSubstr("calibration.yaml"));
     EXPECT_THAT(error.what(), HasSubstr("is missing"));
   }
+}
+
+TEST_F(CompareResults, ATableOpensNothingOutsideOfItsFolder) {
+  const std::int64_t done = 0;
+  std::filesystem::create_directories(folder_.path() / "below");
+  saved("a", result("A1"));
+  saved("b", result("B2"));
+  std::filesystem::create_symlink(folder_.path() / "b", folder_.path() / "below/b");
+  const std::string table = table_of(folder_.path() / "below/table.csv",
+                                     {{"a.lvx", (folder_.path() / "a").string(), done, {}},
+                                      {"b.lvx", "b", done, {}},
+                                      {"zero", "/dev/zero", done, {}}});
+  EXPECT_THROW(compare_units({{table}, 0.01}), FileError);
+  const ComparedUnits found = compare_units({{table}, 0.01, true});
+  EXPECT_EQ(found.results.size(), 2U);
+  ASSERT_EQ(found.left_out.size(), 1U);
+  EXPECT_EQ(found.left_out[0].name, "zero");
 }
 
 }  // namespace risley::jobs::compare_results_test

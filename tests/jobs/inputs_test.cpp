@@ -66,6 +66,16 @@ class InputsTest : public ::testing::Test {
   fs::path before_, folder_;
 };
 
+TEST_F(InputsTest, EverythingBehindANameIsKnown) {
+  make({"a.db3", "a.db3-wal", "u.truth.yaml", "u.truth.nc", "u.mount.truth.yaml",
+        "est/calibration.yaml", "est/states.nc"});
+  EXPECT_THAT(files_behind("a.db3"), ElementsAre("a.db3", "a.db3-wal"));
+  EXPECT_THAT(files_behind("u.truth.yaml"),
+              ElementsAre("u.mount.truth.yaml", "u.truth.nc", "u.truth.yaml"));
+  EXPECT_THAT(files_behind("est"), ElementsAre("est/calibration.yaml", "est/states.nc"));
+  EXPECT_TRUE(files_behind("mid-40").empty());
+}
+
 TEST_F(InputsTest, AFolderStandsForAllRecordingsInIt) {
   make({"fleet/b/scan.lvx", "fleet/a/scan.LVX", "fleet/a/deep/er/walk.nc", "fleet/a/notes.txt",
         "fleet/a/.hidden.lvx", "fleet/.git/scan.lvx", "fleet/a/scan.truth.nc",

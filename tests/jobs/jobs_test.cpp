@@ -3,6 +3,7 @@
 // Everything from a recording to a cloud through the jobs alone, as another front end would do it,
 // and what cancelling them leaves behind: nothing.
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -20,11 +21,14 @@
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/convert_recording.hpp"
 #include "risley/jobs/estimate_recording.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/observability.hpp"
 #include "risley/jobs/plan_calibration.hpp"
+#include "risley/recordings/reader.hpp"
+#include "risley/recordings/truth.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/truth_file.hpp"
 
@@ -154,10 +158,10 @@ TEST_F(JobsTest, TextsAppearWithTheOtherFilesAndOlderOnesStepAside) {
   options.texts = [this](const EstimatedRecording& result) {
     EXPECT_TRUE(names().contains("estimate"));
     EXPECT_FALSE(names().contains("estimate/calibration.yaml"));  // not before the texts are made
-    return std::vector<NamedText>{{"report.json", result.estimate.sensor.name}};
+    return std::vector<NamedText>{{"report.json", "risley " + result.estimate.sensor.name}};
   };
   EXPECT_THAT(estimate_recording(options).warnings, Each(Not(HasSubstr("earlier"))));
-  EXPECT_EQ(io::read_text_file(path("estimate/report.json")), "mid-40");
+  EXPECT_EQ(io::read_text_file(path("estimate/report.json")), "risley mid-40");
   // Of the next run without texts and states none may pass for its own.
   options.texts = nullptr;
   options.files.states = StatesRows::none;
@@ -184,6 +188,51 @@ TEST_F(JobsTest, AStoppedExchangeLeavesItsMark) {
   options.texts = nullptr;
   estimate_recording(options);
   EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/calibration.yaml"}));
+}
+
+TEST_F(JobsTest, RotationAnglesAreThoseOfTheFirstShot) {
+  EstimateRecordingOptions options = estimation();
+  options.details = false;
+  options.files = {};
+  const EstimatedRecording found = estimate_recording(options);
+  const estimation::Estimate& estimate = found.estimate;
+  const std::int64_t first_ns = estimate.series.time_ns(0);
+  ASSERT_LT(first_ns, estimate.states.time_ns.front()) << "the first knot comes later";
+  const auto truth = recordings::load_truth(hall() + ".truth.nc", std::vector{first_ns});
+  ASSERT_EQ(truth.time_ns.size(), 1U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const estimation::EstimatedValue& angle = estimate.values[estimate.values.size() - 2 + k];
+    EXPECT_LT(std::abs(wrap_to_pi(angle.value - truth.rotation_angle[k][0])), 5 * angle.sigma)
+        << angle.name;
+    ASSERT_LT(angle.sigma, radians_from_degrees(0.1));
+  }
+}
+
+TEST_F(JobsTest, WhatSomebodyElseWroteStays) {
+  EstimateRecordingOptions options = estimation();
+  options.details = false;
+  fs::create_directories(path("estimate"));
+  for (const char* name : {"states_1.nc", "trajectory.csv", "report.html"}) {
+    io::write_text_file(path(std::string("estimate/") + name), "mine");
+  }
+  estimate_recording(options);
+  for (const char* name : {"states_1.nc", "trajectory.csv", "report.html"}) {
+    EXPECT_EQ(io::read_text_file(path(std::string("estimate/") + name)), "mine") << name;
+  }
+  io::write_text_file(path("estimate/calibration.yaml"), "mine");
+  EXPECT_THROW(estimate_recording(options), FileError);
+  EXPECT_EQ(io::read_text_file(path("estimate/calibration.yaml")), "mine");
+}
+
+TEST_F(JobsTest, AResultIsTakenOnlyWhenItIsWhole) {
+  EstimateRecordingOptions options = estimation();
+  options.details = false;
+  estimate_recording(options);
+  EXPECT_NO_THROW(load_result(path("estimate")));
+  EXPECT_NO_THROW(load_result(path("estimate/calibration.yaml")));
+  io::write_text_file(path("estimate/INCOMPLETE"), "as a killed run leaves it");
+  EXPECT_THROW(load_result(path("estimate")), FileError);
+  EXPECT_THROW(load_result(path("estimate/calibration.yaml")), FileError);
 }
 
 TEST_F(JobsTest, WriteNothingThatNoOptionNames) {
@@ -309,7 +358,7 @@ TEST_F(JobsTest, AnotherThreadStopsAnEstimate) {
 
 TEST_F(JobsTest, FailedNumbersSetAnOlderCalibrationAside) {
   fs::create_directories(path("estimate"));
-  std::ofstream(path("estimate/calibration.yaml")) << "older";
+  std::ofstream(path("estimate/calibration.yaml")) << "risley, older";
   EstimateRecordingOptions options = estimation();
   options.truth.clear();
   options.additional = {"refractive_index_air", "wedge_angle_deg"};  // no data tell them apart
@@ -372,6 +421,27 @@ TEST_F(JobsTest, SayWhichOptionIsWrongByItsField) {
   EXPECT_THAT(messages, Each(HasSubstr("option ")));
   EXPECT_THAT(messages, Each(Not(HasSubstr("--"))));
   EXPECT_TRUE(names().empty());
+}
+
+TEST_F(JobsTest, RefuseRangesThatTheSensorCannotHaveMeasured) {
+  const auto calibrate = [this](double factor) {
+    std::ofstream csv(path("ranges.csv"));
+    csv << "time_s,azimuth_deg,zenith_deg,range_m\n";
+    const recordings::Observations shots = recordings::load_recording(hall()).data.observations;
+    for (std::size_t i = 0; i < 20000; ++i) {
+      csv << 1e-9 * static_cast<double>(shots.time_ns[i] - shots.time_ns[0]) << ','
+          << degrees_from_radians(shots.azimuth[i]) << ',' << degrees_from_radians(shots.zenith[i])
+          << ',' << factor * shots.range[i] << '\n';
+    }
+    csv.close();
+    CalibrateRecordingsOptions options = calibration();
+    options.recordings = {path("ranges.csv")};
+    options.truths.clear();
+    options.files = {};
+    return calibrate_recordings(options);
+  };
+  EXPECT_THROW(calibrate(1000.0), EstimationError);
+  EXPECT_THROW(calibrate(0.01), EstimationError);
 }
 
 TEST_F(JobsTest, RefuseTheSameRecordingTwice) {

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -39,6 +40,19 @@ class ResultRecordTest : public ::testing::Test {
   fs::path folder_;
   ResultRecord record_;
 };
+
+TEST_F(ResultRecordTest, ThatWasEditedIsNone) {
+  const std::string path = file("record.json");
+  record_.outcome = R"({"wedge": 18.0})";
+  save_record(path, record_);
+  ASSERT_TRUE(load_record(path));
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  std::string edited = text.str();
+  edited.replace(edited.find("18.0"), 4, "19.0");
+  write("record.json", edited);
+  EXPECT_FALSE(load_record(path));
+}
 
 TEST_F(ResultRecordTest, IsReadAsWritten) {
   const std::string path = file("a/b/record.json");

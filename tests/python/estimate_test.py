@@ -52,6 +52,7 @@ def test_a_page_is_written(result, tmp_path):
 def test_the_calibrated_sensor_is_a_preset(result, tmp_path):
     result.sensor.write(tmp_path / "calibration.yaml")
     assert risley.load_sensor(tmp_path / "calibration.yaml") == result.sensor
+    assert risley.load_sensor(tmp_path) == result.sensor  # the folder of a result
 
 
 @pytest.mark.parametrize("options, words", [

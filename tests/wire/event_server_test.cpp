@@ -119,6 +119,15 @@ TEST_F(EventServerTest, ThePageComesWithAPolicy) {
   }
 }
 
+TEST(HostNames, AreThoseThatBrowsersUse) {
+  const Address loopback{{127, 0, 0, 1}}, other{{192, 168, 1, 5}};
+  EXPECT_THAT(host_names({loopback, 8080}),
+              ::testing::ElementsAre("127.0.0.1:8080", "localhost:8080"));
+  EXPECT_THAT(host_names({loopback, 80}),
+              ::testing::ElementsAre("127.0.0.1:80", "127.0.0.1", "localhost:80", "localhost"));
+  EXPECT_THAT(host_names({other, 80}), ::testing::ElementsAre("192.168.1.5:80", "192.168.1.5"));
+}
+
 TEST_F(EventServerTest, OnlyItsOwnHostAndOriginAreAnswered) {
   const std::string forbidden = "HTTP/1.1 403 ", bad = "HTTP/1.1 400 ";
   EXPECT_THAT(ask(request("GET /", "Host: example.org\r\n")), StartsWith(forbidden));

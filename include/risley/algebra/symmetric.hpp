@@ -29,6 +29,8 @@ class SymmetricSolver {
   Eigen::MatrixXd inverse() const;
   /// v^T A^-1 v: squared length of v in sigmas when A is its covariance.
   double chi2(const Eigen::VectorXd& v) const;
+  /// Log of the determinant of A, damping included; NaN unless positive().
+  double log_determinant() const;
 
  private:
   Eigen::VectorXd scale_;

@@ -157,7 +157,8 @@ struct Calibration {
   double better_probability = 1;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PriorTest> prior_tests;
-  double sigma0 = 0;  ///< standard deviation of unit weight against the stated range noise
+  bool unit_doubted = false;  ///< of the ranges, which no recording states
+  double sigma0 = 0;          ///< standard deviation of unit weight against the stated range noise
   /// How far the walls deviate from planes, mean after the data; all 0 where they are taken as
   /// flat.
   ShapeParameters shape;

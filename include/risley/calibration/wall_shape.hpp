@@ -54,24 +54,37 @@ ShapePrior building_walls();
 /// One set of parameters in their midst, for plans, which have no data to weigh them by.
 ShapePrior typical_walls();
 
-/// Sums over the shots of all views of one wall, by cells. With e = (1, u - middle, v - middle) and
-/// the derivative d of a shot's range by the wall's height:
+/// Sums over the shots of all views of one wall. Their columns are those of unknowns that are the
+/// wall's own, and then of those of the whole system that it has to do with: `places`, ascending,
+/// the residual last.
 struct WallSums {
-  WallGrid grid;
-  /// Sum of w d^2 e e' [cells][3, 3].
+  Eigen::Index own = 0;              ///< unknowns of the wall alone
+  std::vector<Eigen::Index> places;  ///< columns of ShapeProblem::system
+  Eigen::MatrixXd system;            ///< J' W J [own + places, own + places]
+  WallGrid grid;                     ///< empty: the wall is flat
+  /// By cells: with e = (1, u - middle, v - middle) and the derivative d of a shot's range by the
+  /// wall's height, the sum of w d^2 e e' [cells][3, 3].
   std::vector<Eigen::Matrix3d> weight;
-  /// Sum of w d e x', for the columns x of a linear system and its residual [3 cells, columns].
+  /// Sum of w d e x', for the columns x [3 cells, own + places].
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> columns;
 };
 
-/// A linear least squares problem of unknowns, further quantities that are not estimated, and the
-/// shape of walls.
+/// A linear least squares problem of unknowns, further quantities that are not estimated, and walls
+/// with unknowns of their own and a shape.
 struct ShapeProblem {
   /// J' W J of unknowns, quantities and the residual, with the priors of the unknowns
-  /// [unknowns + quantities + 1, ...]. The block of the quantities alone is not looked at.
+  /// [unknowns + quantities + 1, ...], less what is in the walls. The block of the quantities alone
+  /// is not looked at.
   Eigen::MatrixXd system;
   Eigen::Index unknowns = 0;
   std::vector<WallSums> walls;
+};
+
+/// What is found of the unknowns of one wall alone.
+struct OwnSolution {
+  Eigen::VectorXd step;        ///< [own]
+  Eigen::MatrixXd covariance;  ///< [own, own]
+  Eigen::MatrixXd response;    ///< to the quantities [own, quantities]
 };
 
 /// What remains when the walls' shape is integrated out, for the parameters that were tried.
@@ -79,10 +92,13 @@ struct ShapeSolution {
   Eigen::VectorXd step;        ///< [unknowns], mean over the parameters
   Eigen::MatrixXd covariance;  ///< [unknowns, unknowns], the spread of the means included
   Eigen::MatrixXd response;    ///< -N^-1 N_q [unknowns, quantities], mean
-  Eigen::MatrixXd normal;      ///< N of the likeliest parameters [unknowns, unknowns]
-  std::vector<double> weight;  ///< of the parameters after the data, sum 1
-  ShapeParameters mean;        ///< of the parameters, so weighted
-  std::size_t likeliest = 0;   ///< row of the parameters
+  /// N of the likeliest parameters without the walls' own unknowns [unknowns, unknowns].
+  Eigen::MatrixXd normal;
+  std::vector<OwnSolution> own;  ///< [walls], as the above
+  double promised = 0;           ///< squared length of the step of all unknowns, in sigmas
+  std::vector<double> weight;    ///< of the parameters after the data, sum 1
+  ShapeParameters mean;          ///< of the parameters, so weighted
+  std::size_t likeliest = 0;     ///< row of the parameters
   /// Deviation at the nodes, of the likeliest parameters, node (u, v) at v (cells_u + 1) + u
   /// [walls][nodes], m.
   std::vector<Eigen::VectorXd> height;

@@ -104,6 +104,9 @@ struct Estimate : Solution {
   double usual_noise = 0;  ///< that noise, rad
 };
 
+/// Row of the first shot that was used, at which the estimate's values have the rotation angles.
+std::size_t first_used_shot(const Estimate& estimate);
+
 /// Rotor states of shots [begin, end) of an estimate's series.
 RotorStates states_of_shots(const Estimate& estimate, ShotRange shots);
 

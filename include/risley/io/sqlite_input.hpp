@@ -27,9 +27,7 @@ class SqliteQuery {
   void rewind();
 
   // Values of the row, by place from 0; SQLite converts those of another kind.
-  bool is_missing(int column) const;                      ///< there is no value
   std::int64_t integer(int column) const;                 ///< whole number
-  double real(int column) const;                          ///< number
   std::string text(int column) const;                     ///< as it is stored, UTF-8 or not
   std::span<const std::uint8_t> bytes(int column) const;  ///< valid until next() or rewind()
 
@@ -62,8 +60,6 @@ class SqliteInput {
   /// Refuses views, virtual tables and computed columns, which could make more of the file than it
   /// holds. A table that is not there is left to the query. @throws FileError; Cancelled
   void require_plain_table(const std::string& name) const;
-  /// Whether a table has a column. @throws FileError; Cancelled
-  bool has_column(const std::string& table, const std::string& column) const;
   /// @param sql  of one statement. @throws FileError; Cancelled
   SqliteQuery query(const std::string& sql) const;
 
@@ -75,8 +71,5 @@ class SqliteInput {
   class Database;
   std::unique_ptr<Database> database_;
 };
-
-/// A name as SQL takes it: in quotes.
-std::string sql_name(const std::string& name);
 
 }  // namespace risley::io

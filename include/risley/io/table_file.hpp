@@ -31,9 +31,7 @@ using TableCell = std::variant<std::monostate, std::int64_t, double, std::string
 /// - .csv: a line of names, then one line per row; a cell without a value is empty, texts with
 ///   commas, quotes or line feeds stand in quotes;
 /// - .nc: NetCDF-4, one variable per column along the dimension `row`; a missing number is NaN, a
-///   missing whole number kMissingInteger, a missing text empty;
-/// - .sqlite, .sqlite3, .db: an SQLite database with the tables `results`, and `columns` (name,
-///   unit, description) and `about` (name, value).
+///   missing whole number kMissingInteger, a missing text empty.
 ///
 /// CSV has no place for units, descriptions and `about`. Numbers that are not finite count as
 /// missing.

@@ -10,7 +10,7 @@
 
 namespace risley::io {
 
-/// Whether a file is a table of TableFile's kinds: NetCDF and SQLite by their first bytes, text by
+/// Whether a file is a table of TableFile's kinds: NetCDF by its first bytes, text by
 /// its ending .csv. false also where it cannot be read.
 bool is_table(const std::string& path);
 

@@ -8,7 +8,8 @@ namespace risley::io {
 
 class OutputFile;
 
-/// Reads a whole file. @throws FileError when it is missing or cannot be read
+/// Reads a whole file. @throws FileError when it is missing, cannot be read, or is longer than any
+/// text that is read at once
 std::string read_text_file(const std::string& path);
 
 /// Writes what a file is to hold, which is then to be committed. @throws FileError

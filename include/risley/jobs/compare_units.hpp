@@ -20,6 +20,12 @@ struct CompareUnitsOptions {
   /// Probability that at least one pair of results is called changed where nothing changed, and
   /// that at least one unit is called an outlier where none is one, each.
   double false_alarm = 0.01;
+  /// Whether results that a table names are opened wherever they are, or only in its own folder and
+  /// below.
+  bool anywhere = false;
+  /// Whether a calibration, which says where beams truly go, is compared with an estimate of what
+  /// the sensor believes: they differ in a unit that never changed.
+  bool unlike = false;
 };
 
 /// Two results, of one unit or of two units of a kind.

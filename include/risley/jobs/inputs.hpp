@@ -46,6 +46,10 @@ const std::vector<std::string>& recording_endings();
 ///         is named twice; FileError for a list that cannot be read; Cancelled
 std::vector<Input> find_inputs(const InputNames& wanted, const Progress& progress = {});
 
+/// Everything that is read where an option names a path: the files of a recording or of a folder,
+/// and of a truth the columns and the mount beside it. Only what there is.
+std::vector<std::string> files_behind(const std::string& path);
+
 /// SHA-256 of every file of a recording, by path. @throws FileError, Cancelled
 std::vector<std::pair<std::string, std::string>> input_hashes(const std::string& path,
                                                               const Progress& progress = {});

@@ -20,7 +20,8 @@ enum class StatesRows {
 /// cancelled, none, and what an earlier run left stays as it is; a folder that it made for them is
 /// gone then, too. Results of an earlier run that this one has no successor for, such as the
 /// calibration when the numbers did not converge, would belong to other numbers: they stay under
-/// the names calibration.earlier.yaml and so on. A folder with a file INCOMPLETE was left by a run
+/// the names calibration.earlier.yaml and so on. Files that risley did not write are neither moved
+/// nor replaced. A folder with a file INCOMPLETE was left by a run
 /// that was stopped while it gave the files their names.
 struct ResultFiles {
   std::string folder;  ///< calibration.yaml, states.nc; empty: nothing is written
@@ -37,7 +38,16 @@ struct NamedText {
 inline constexpr const char* kCalibrationFile = "calibration.yaml";
 
 /// Its path in a result folder; empty where there is none, or no folder.
+/// @throws FileError as require_settled()
 std::optional<std::string> calibration_in(const std::string& folder);
+
+/// Refuses results that may be of different runs, or that a run is replacing.
+/// @param result  a folder of results, or a file in one  @throws FileError
+void require_settled(const std::string& result);
+
+/// Whether risley wrote a file, which says so at its beginning; a trajectory, which does not, where
+/// the mount that it came with stands beside it. Also true where there is no file.
+bool is_own_result(const std::string& file);
 
 /// The file that marks a folder whose files may be of different runs.
 inline constexpr const char* kIncomplete = "INCOMPLETE";

@@ -3,21 +3,25 @@
 #pragma once
 
 #include <list>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "risley/core/progress.hpp"
 #include "risley/estimation/estimate.hpp"
+#include "risley/io/folder_lock.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::jobs {
 
-/// A folder for results in the making, see ResultFiles. Without a name it does nothing.
+/// A folder for results in the making, see ResultFiles. One run at a time has it; files that risley
+/// did not write stay where they are. Without a name it does nothing.
 class ResultFolder {
  public:
-  /// Makes the folder, before an hour of computing. @throws FileError
+  /// Makes the folder, before an hour of computing. @throws FileError, also where another run has
+  /// it
   explicit ResultFolder(const std::string& folder);
   /// Removes what was not committed.
   ~ResultFolder();
@@ -40,11 +44,14 @@ class ResultFolder {
  private:
   std::string path(const std::string& name) const;
   void write(const std::string& name, const std::string& text);
+  /// @throws FileError where it would replace what risley did not write
+  io::OutputFile& output(const std::string& name);
   /// Results of an earlier run that this one does not replace, by name.
   std::vector<std::string> left_over() const;
 
   std::string folder_;
   bool made_ = false, committed_ = false;
+  std::optional<io::FolderLock> lock_;
   std::list<io::OutputFile> files_;
 };
 

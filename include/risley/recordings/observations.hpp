@@ -143,6 +143,7 @@ struct RecordingHeader {
   /// then right in packets that lack nothing.
   int packet_shots = 0;
   bool has_range = true;
+  bool length_unit_assumed = false;  ///< whether the file does not say in which unit ranges are
   bool has_intensity = true;
   bool cartesian = false;  ///< records hold x, y, z and not angles
   int returns_per_shot = 1;

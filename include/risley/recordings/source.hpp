@@ -42,8 +42,8 @@ class Source {
 };
 
 /// The files of which a recording consists: its own, or metadata.yaml and the bags that it names
-/// where it is a folder of ROS 2. Of what is no recording the path itself, of columns in memory
-/// none.
+/// where it is a folder of ROS 2, each with what SQLite keeps beside a database. Of what is no
+/// recording the path itself, of columns in memory none.
 std::vector<std::string> recording_files(const Source& source);
 
 }  // namespace risley::recordings

@@ -17,6 +17,8 @@ struct ScanPatternOptions {
   std::optional<Firing> firing;        ///< empty: as the sensor's sequence says
   std::vector<double> rotation_angle;  ///< [prisms] at time 0, rad; empty: the sequence's, or 0
   std::uint64_t every = 1;             ///< keeps the last of so many shots
+  /// Whether `every` counts groups of shots, one of each emitter, and keeps these whole.
+  bool whole_groups = false;
 };
 
 /// Directions that a sensor sends its shots to, free of noise.
@@ -34,7 +36,7 @@ struct ScanPattern {
 std::vector<double> start_angles(const Sensor& sensor, const ScanPatternOptions& options);
 
 /// Rows [first_row, first_row + rows) of the scan sequence with rotors at constant speed: row r is
-/// shot every (r + 1) - 1.
+/// shot every (r + 1) - 1; with whole groups of E emitters, (every (r / E + 1) - 1) E + r mod E.
 /// @throws InvalidArgument for angles or speeds that are not one per prism, a rate that is not
 ///         positive, every = 0, and for a time beyond 1e7 s
 ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::size_t rows,

@@ -27,6 +27,10 @@ struct EventServerCounts {
   std::size_t listeners = 0;         ///< browsers that get events now
 };
 
+/// What browsers call a server in Host: its address with the port, localhost too if it is loopback,
+/// and both without the port if that is the usual one.
+std::vector<std::string> host_names(const Endpoint& local);
+
 /// Shows a local page: some texts, and a stream of events ("server-sent events") at /events, by
 /// HTTP on a thread of its own. It answers GET alone, and only where Host is its own address (or
 /// localhost, if that is loopback) and Origin, if there is one, the page's. The page may load

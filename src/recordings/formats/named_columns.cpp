@@ -208,7 +208,7 @@ void NamedColumns::look_at(std::span<const Decimal> cells) {
   for (Source& source : sources_) source.samples.push_back(cells[source.cell]);
 }
 
-double NamedColumns::length_unit(std::initializer_list<Role> roles,
+double NamedColumns::length_unit(std::initializer_list<Role> roles, bool& assumed,
                                  std::vector<std::string>& warnings) const {
   std::optional<Unit> unit;
   std::size_t with_unit = 0;
@@ -232,6 +232,7 @@ double NamedColumns::length_unit(std::initializer_list<Role> roles,
     throw BadColumns{
         fmt::format("expected a unit for all of the columns {} or for none", names_of(roles))};
   }
+  assumed = true;
   if (!(whole && large)) return 1.0;
   warnings.push_back(
       fmt::format("the columns {} have no unit and hold whole numbers above 1000: they were taken "
@@ -415,7 +416,7 @@ void NamedColumns::settle(RecordingHeader& header, std::vector<std::string>& war
   header.devices.resize(1);
   header.devices.front().type = kUnknownDeviceType;
   if (cartesian_) {
-    length_per_m_ = length_unit({Role::x, Role::y, Role::z}, warnings);
+    length_per_m_ = length_unit({Role::x, Role::y, Role::z}, header.length_unit_assumed, warnings);
     length_rounding_ = rounding({Role::x, Role::y, Role::z});
   } else {
     const Role zenith = find(Role::zenith) != nullptr ? Role::zenith : Role::elevation;
@@ -424,7 +425,7 @@ void NamedColumns::settle(RecordingHeader& header, std::vector<std::string>& war
     azimuth_rounding_ = rounding({Role::azimuth});
     zenith_rounding_ = rounding({zenith});
     if (header.has_range) {
-      length_per_m_ = length_unit({Role::range}, warnings);
+      length_per_m_ = length_unit({Role::range}, header.length_unit_assumed, warnings);
       length_rounding_ = rounding({Role::range});
     }
   }

@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "risley/calibration/wall_shape.hpp"
+
+namespace risley::calibration {
+
+/// The part of one wall in normal equations when the unknowns that are its own are eliminated: many
+/// recordings have many walls, and all their unknowns in one matrix would fill the memory.
+struct WithoutOwn {
+  Eigen::MatrixXd normal;     ///< of its own unknowns [own, own]
+  Eigen::MatrixXd inverse;    ///< of the same
+  Eigen::MatrixXd from_rest;  ///< inverse times what they share with the others [own, others]
+  Eigen::MatrixXd rest;       ///< what remains of the others [others, others]
+  double log_determinant = 0;
+  bool positive = true;
+};
+
+/// @param system   symmetric, its own unknowns first
+/// @param damping  of its own unknowns, as a part of the diagonal
+WithoutOwn without_own(const Eigen::MatrixXd& system, Eigen::Index own, double damping = 0);
+
+/// Adds what belongs to some rows and columns of a whole to it.
+void add_at(const std::vector<Eigen::Index>& places, const Eigen::MatrixXd& part,
+            Eigen::MatrixXd& whole);
+
+/// What all walls and the unknowns that they share make of a linear problem.
+struct SharedSolution {
+  Eigen::VectorXd step;        ///< [unknowns]
+  Eigen::MatrixXd normal;      ///< everything else eliminated [unknowns, unknowns]
+  Eigen::MatrixXd covariance;  ///< [unknowns, unknowns]
+  Eigen::MatrixXd response;    ///< -N^-1 N_q [unknowns, quantities]
+  double log_determinant = 0;  ///< of the normal equations
+  double cost = 0;             ///< less what the step saves
+  bool positive = false;
+};
+
+/// @param system  of unknowns, quantities and the residual, every wall's own unknowns eliminated
+SharedSolution shared_solution(const Eigen::MatrixXd& system, Eigen::Index unknowns);
+
+/// The unknowns of one wall, once those that it shares are found.
+/// @param places  in the whole system, of what follows its own unknowns
+OwnSolution own_solution(const WithoutOwn& wall, const std::vector<Eigen::Index>& places,
+                         const SharedSolution& shared);
+
+/// Covariance of a wall's own unknowns and of those of the shared ones that it has to do with, in
+/// the order of its places, which has them first.
+Eigen::MatrixXd joint_covariance(const WithoutOwn& wall, const std::vector<Eigen::Index>& places,
+                                 const Eigen::MatrixXd& shared_covariance);
+
+}  // namespace risley::calibration

@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include "risley/identification/soundness.hpp"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "risley/core/error.hpp"
+#include "risley/identification/fitted_values.hpp"
+
+namespace risley::identification {
+namespace {
+
+/// A wedge of fewer sigmas is one that nobody saw.
+constexpr double kSeenSigmas = 3.0;
+/// Neighbouring residuals of noise are as good as independent. Of a train that leaves as much as
+/// the noise again, three hang together.
+constexpr double kMostCorrelated = 3.0;
+
+}  // namespace
+
+Doubt doubt_of(const Identification& found, const sensors::Sensor& sensor) {
+  for (const ParameterInfo& info : parameter_list(sensor.shape())) {
+    if (info.kind != ParameterKind::train) continue;
+    for (const int at : info.places) {
+      try {
+        check_bounds(info, sensor.train[at]);
+      } catch (const InvalidArgument& error) {
+        return {fmt::format("the train that fits best is not possible: {}", error.what()), true};
+      }
+    }
+  }
+  for (const FittedValue& value : fitted_values(found.best())) {
+    if (!value.name.starts_with("wedge_angle_") || !std::isfinite(value.sigma)) continue;
+    if (std::abs(value.value) >= kSeenSigmas * value.sigma) continue;
+    return {fmt::format("the train that fits best has a prism that the scan does not show: {} = "
+                        "{:.3g} +- {:.2g} {}",
+                        value.name, value.value, value.sigma, value.unit),
+            false};
+  }
+  if (found.correlation_time_factor > kMostCorrelated) {
+    return {fmt::format("what the best train leaves is no noise: {:.0f} neighbouring shots are off "
+                        "alike",
+                        found.correlation_time_factor),
+            false};
+  }
+  return {};
+}
+
+}  // namespace risley::identification
