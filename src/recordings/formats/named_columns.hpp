@@ -108,7 +108,8 @@ class NamedColumns {
   const std::string& name_of(const Source& source) const { return name(source.cell); }
   std::string names_of(std::initializer_list<Role> roles) const;
 
-  double length_unit(std::initializer_list<Role> roles, std::vector<std::string>& warnings) const;
+  double length_unit(std::initializer_list<Role> roles, RecordingHeader& header,
+                     std::vector<std::string>& warnings) const;
   double angle_unit(const Source& source) const;
   Rounding rounding(std::initializer_list<Role> roles) const;
   void settle_time(RecordingHeader& header, std::vector<std::string>& warnings);
