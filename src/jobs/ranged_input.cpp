@@ -53,6 +53,13 @@ RangedRecording read_ranged(const RangedInputOptions& options, std::size_t numbe
     throw EstimationError(
         fmt::format("{} holds no ranges, which a calibration on walls needs", path));
   }
+  if (input.recording.header.length_unit_assumed) {
+    throw EstimationError(fmt::format(
+        "{} does not state the unit of its ranges, which a calibration on walls cannot do without: "
+        "state it in the names of the columns, as in x_mm or x_cm",
+        path));
+  }
+  if (input.beyond_reach) throw EstimationError(fmt::format("{}: {}", path, *input.beyond_reach));
   estimation::EstimateOptions settings;
   settings.sensor = input.choice.sensor;
   settings.angle_noise = options.angle_noise;

@@ -3,6 +3,7 @@
 #include "risley/jobs/sensor_choice.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
@@ -15,6 +16,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/recordings/plausibility.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs {
@@ -204,6 +206,74 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
       choice.words, choice.sensor.name));
 }
 
+std::string span_text(double from, double to) {
+  return fmt::format("{:.0f}", degrees_from_radians(to - from));
+}
+
+/// What may have made shots that lie beyond the field of view of every sensor.
+std::string wide_words(const recordings::DirectionSpread& spread) {
+  struct Wide {
+    const char* name;
+    double azimuth_deg, zenith_deg;
+    double least;  ///< share of the azimuths that is rarely behind something
+  };
+  // Of the second generation, whose scans no built-in preset describes.
+  static constexpr std::array kWide{Wide{"Mid-360", 360.0, 59.0, 0.35},
+                                    Wide{"HAP", 120.0, 25.0, 0.8}};
+  constexpr double kMore_deg = 3.0, kLeastZenith = 0.7;
+  const double azimuth_deg = degrees_from_radians(spread.azimuth_to - spread.azimuth_from),
+               zenith_deg = degrees_from_radians(spread.zenith_to - spread.zenith_from);
+  for (const Wide& wide : kWide) {
+    const auto fits = [](double found, double field, double least) {
+      return found < field + kMore_deg && found > least * field;
+    };
+    if (!fits(azimuth_deg, wide.azimuth_deg, wide.least) ||
+        !fits(zenith_deg, wide.zenith_deg, kLeastZenith)) {
+      continue;
+    }
+    return fmt::format("those of a {} ({:.0f} x {:.0f} deg), for which there is no built-in preset",
+                       wide.name, wide.azimuth_deg, wide.zenith_deg);
+  }
+  return "merged clouds of several sensors: record or export each of them by itself";
+}
+
+/// Says why no sensor can have made the shots, where that is so.
+std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> candidates) {
+  if (shots.size() < recordings::kFewestJudged) return {};
+  if (const auto problem = recordings::not_a_scan(shots.azimuth, shots.zenith, shots.range)) {
+    return *problem;
+  }
+  double widest = 0;
+  for (const Sensor& sensor : candidates) {
+    if (!(sensor.field_of_view > 0)) return {};
+    widest = std::max(widest, sensor.field_of_view);
+  }
+  constexpr double kMargin = radians_from_degrees(10.0);
+  const recordings::DirectionSpread spread =
+      recordings::direction_spread(shots.azimuth, shots.zenith);
+  if (spread.radius < 0.5 * widest + kMargin) return {};
+  return fmt::format(
+      "directions span {} x {} deg (azimuth, zenith), more than the field of view of {}: they are "
+      "probably {}",
+      span_text(spread.azimuth_from, spread.azimuth_to),
+      span_text(spread.zenith_from, spread.zenith_to),
+      candidates.size() == 1 ? candidates.front().name : "any built-in preset", wide_words(spread));
+}
+
+/// Looks at the first shots before any sensor is. @return whether one may have made them
+bool are_possible(const FirstShots& shots, std::span<const Sensor> candidates,
+                  SensorChoice& choice) {
+  if (shots.beams == BeamSource::recorded) {
+    for (const std::uint8_t beam : shots.head.beam) choice.lines = std::max(choice.lines, beam + 1);
+  }
+  choice.impossible = impossible_words(shots.head, candidates);
+  if (choice.impossible.empty()) return true;
+  choice.chosen_by = ChosenBy::guess;
+  choice.fits = false;
+  choice.words = choice.impossible;
+  return false;
+}
+
 /// Tries the shot rates of the presets, because the recording has no times.
 SensorChoice choose_without_times(const recordings::Source& source, recordings::ReadOptions reading,
                                   std::span<const Sensor> candidates, const Progress& progress) {
@@ -218,6 +288,10 @@ SensorChoice choose_without_times(const recordings::Source& source, recordings::
                  [rate](const Sensor& sensor) { return sensor.shot_rate == rate; });
     reading.shot_rate = rate;
     shots = first_shots(source, reading, some, progress);
+    if (!are_possible(shots, candidates, choice)) {
+      choice.sensor = sensors::load_sensor(kUsualSensor);
+      return choice;
+    }
     const auto found = recognised(shots, some);
     if (!found || !found->fits || misfit_of(found->matches.front()) >= least) continue;
     least = misfit_of(found->matches.front());
@@ -296,7 +370,7 @@ std::string to_string(ChosenBy chosen_by) {
 AngleSeries first_second(const recordings::Source& source, const recordings::ReadOptions& options,
                          const Progress& progress) {
   // One shot a second, and all of the head.
-  estimation::ShotSelector selector({.rate = 1.0, .ranges = false, .rows = false});
+  estimation::ShotSelector selector({.rate = 1.0, .ranges = true, .rows = false});
   try {
     const auto reader = recordings::open_recording(source, options, progress);
     recordings::Chunk chunk;
@@ -330,8 +404,9 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
   if (given) {
     choice.sensor = *given;
     choice.words = "as asked for" + origin_of(*given);
-    if (given->train.emitters() == 1 || !has_times || !one_sensor) return choice;
+    if (!has_times || !one_sensor) return choice;
     const FirstShots shots = first_shots(source, reading, {&*given, 1}, progress);
+    if (!are_possible(shots, {&*given, 1}, choice) || given->train.emitters() == 1) return choice;
     if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);
     return choice;
   }
@@ -358,8 +433,15 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
   if (!has_times) return choose_without_times(source, reading, candidates, progress);
   const FirstShots shots =
       one_sensor ? first_shots(source, reading, candidates, progress) : FirstShots{};
+  if (!are_possible(shots, candidates, choice)) {
+    choice.sensor = named != nullptr ? *named : sensors::load_sensor(kUsualSensor);
+    return choice;
+  }
   if (named != nullptr && !device.type_inferred) {
-    return choose_by_name(shots, *named, candidates);
+    const int lines = choice.lines;
+    choice = choose_by_name(shots, *named, candidates);
+    choice.lines = lines;
+    return choice;
   }
   const auto found = recognised(shots, candidates);
   if (found && found->decided) {
@@ -375,6 +457,17 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
     guess(shots, found, candidates, choice);
   }
   return choice;
+}
+
+void require_possible(const SensorChoice& choice, const std::string& recording) {
+  if (!choice.impossible.empty()) throw FileError(recording, {}, choice.impossible);
+  const int emitters = choice.sensor.train.emitters();
+  if (choice.lines <= emitters) return;
+  throw InvalidArgument(fmt::format(
+      "{} names {} lines of emitters, but {} ({}) has {} emitter{}: option sensor names the sensor "
+      "that made it",
+      recording, choice.lines, choice.sensor.name, choice.words, emitters,
+      emitters == 1 ? "" : "s"));
 }
 
 std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {
