@@ -59,7 +59,9 @@ RangedRecording read_ranged(const RangedInputOptions& options, std::size_t numbe
         "state it in the names of the columns, as in x_mm or x_cm",
         path));
   }
-  if (input.beyond_reach) throw EstimationError(fmt::format("{}: {}", path, *input.beyond_reach));
+  if (!input.choice.beyond_reach.empty()) {
+    throw EstimationError(fmt::format("{}: {}", path, input.choice.beyond_reach));
+  }
   estimation::EstimateOptions settings;
   settings.sensor = input.choice.sensor;
   settings.angle_noise = options.angle_noise;

@@ -255,15 +255,6 @@ SensorFrameRecording open_by_stated_pose(const recordings::Source& source,
   return result;
 }
 
-/// What is wrong with ranges beyond what the sensor reaches.
-std::optional<std::string> beyond_reach(const std::vector<double>& range,
-                                        const sensors::Sensor& sensor) {
-  // The reach of the specification is that on grey walls.
-  constexpr double kOnBrightWalls = 1.5;
-  if (!(sensor.range_maximum > 0)) return std::nullopt;
-  return recordings::beyond_reach(range, kOnBrightWalls * sensor.range_maximum, sensor.name);
-}
-
 /// Opens a recording whose packets lack points: shots cannot be counted in it, but packets have
 /// their times.
 SensorFrameRecording open_with_places(const recordings::Source& source,
@@ -367,12 +358,6 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
                     result.counts.clock_resets));
   }
   result.head = selector.head();
-  result.beyond_reach = beyond_reach(result.head.range, result.choice.sensor);
-  // What no sensor reaches the reader has told.
-  if (result.beyond_reach &&
-      !recordings::beyond_reach(result.head.range, recordings::kFarthestReach, "")) {
-    result.warnings.push_back(*result.beyond_reach);
-  }
   result.reading_time = watch.seconds();
   return result;
 }

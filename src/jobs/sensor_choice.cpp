@@ -276,12 +276,12 @@ bool are_possible(const FirstShots& shots, std::span<const Sensor> candidates,
 
 /// Tries the shot rates of the presets, because the recording has no times.
 SensorChoice choose_without_times(const recordings::Source& source, recordings::ReadOptions reading,
-                                  std::span<const Sensor> candidates, const Progress& progress) {
+                                  std::span<const Sensor> candidates, FirstShots& shots,
+                                  const Progress& progress) {
   SensorChoice choice;
   std::set<double> rates;
   for (const Sensor& sensor : candidates) rates.insert(sensor.shot_rate);
   double least = std::numeric_limits<double>::infinity();
-  FirstShots shots;
   for (const double rate : rates) {
     std::vector<Sensor> some;
     std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(some),
@@ -331,6 +331,70 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   choice.warnings.push_back(fmt::format(
       "the file names a {}, but its scan is that of a {}: {}; option sensor decides which it was",
       named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits)));
+  return choice;
+}
+
+/// @param[out] shots  the first ones, where they were looked at
+SensorChoice choose(const recordings::Source& source, const recordings::ReadOptions& reading,
+                    const recordings::RecordingHeader& header, const std::optional<Sensor>& given,
+                    FirstShots& shots, const Progress& progress) {
+  SensorChoice choice;
+  const bool has_times = header.has_times || reading.shot_rate;
+  const bool one_sensor = header.devices.size() == 1;
+  if (given) {
+    choice.sensor = *given;
+    choice.words = "as asked for" + origin_of(*given);
+    if (!has_times || !one_sensor) return choice;
+    shots = first_shots(source, reading, {&*given, 1}, progress);
+    if (!are_possible(shots, {&*given, 1}, choice) || given->train.emitters() == 1) return choice;
+    if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);
+    return choice;
+  }
+  const std::vector<Sensor> candidates = type_presets();
+  const recordings::Device& device = header.devices.front();
+  const Sensor* named = nullptr;
+  if (device.type != recordings::kUnknownDeviceType) {
+    for (const Sensor& sensor : candidates) {
+      if (sensor.device_type == device.type) named = &sensor;
+    }
+    if (named == nullptr) {
+      throw InvalidArgument(
+          fmt::format("there is no built-in preset for the recording's sensor ({}): name one with "
+                      "option sensor",
+                      recordings::device_type_name(device.type)));
+    }
+  }
+  if (named != nullptr && (!has_times || !one_sensor)) {
+    choice.sensor = *named;
+    choice.chosen_by = ChosenBy::file;
+    choice.words = "named by the file";
+    return choice;
+  }
+  if (!has_times) return choose_without_times(source, reading, candidates, shots, progress);
+  if (one_sensor) shots = first_shots(source, reading, candidates, progress);
+  if (!are_possible(shots, candidates, choice)) {
+    choice.sensor = named != nullptr ? *named : sensors::load_sensor(kUsualSensor);
+    return choice;
+  }
+  if (named != nullptr && !device.type_inferred) {
+    const int lines = choice.lines;
+    choice = choose_by_name(shots, *named, candidates);
+    choice.lines = lines;
+    return choice;
+  }
+  const auto found = recognised(shots, candidates);
+  if (found && found->decided) {
+    take(*found, candidates, choice);
+    choice.chosen_by = ChosenBy::scan;
+    choice.words = "recognised from the scan: " + comparison(choice.misfits);
+    try_variants(shots, choice);
+  } else if (named != nullptr) {
+    choice.sensor = *named;
+    choice.chosen_by = ChosenBy::file;
+    choice.words = "by the rates, tags and returns of the file";
+  } else {
+    guess(shots, found, candidates, choice);
+  }
   return choice;
 }
 
@@ -398,63 +462,18 @@ std::optional<Sensor> given_sensor(const std::string& name_or_path) {
 SensorChoice choose_sensor(const recordings::Source& source, const recordings::ReadOptions& reading,
                            const recordings::RecordingHeader& header,
                            const std::optional<Sensor>& given, const Progress& progress) {
-  SensorChoice choice;
-  const bool has_times = header.has_times || reading.shot_rate;
-  const bool one_sensor = header.devices.size() == 1;
-  if (given) {
-    choice.sensor = *given;
-    choice.words = "as asked for" + origin_of(*given);
-    if (!has_times || !one_sensor) return choice;
-    const FirstShots shots = first_shots(source, reading, {&*given, 1}, progress);
-    if (!are_possible(shots, {&*given, 1}, choice) || given->train.emitters() == 1) return choice;
-    if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);
-    return choice;
-  }
-  const std::vector<Sensor> candidates = type_presets();
-  const recordings::Device& device = header.devices.front();
-  const Sensor* named = nullptr;
-  if (device.type != recordings::kUnknownDeviceType) {
-    for (const Sensor& sensor : candidates) {
-      if (sensor.device_type == device.type) named = &sensor;
-    }
-    if (named == nullptr) {
-      throw InvalidArgument(
-          fmt::format("there is no built-in preset for the recording's sensor ({}): name one with "
-                      "option sensor",
-                      recordings::device_type_name(device.type)));
-    }
-  }
-  if (named != nullptr && (!has_times || !one_sensor)) {
-    choice.sensor = *named;
-    choice.chosen_by = ChosenBy::file;
-    choice.words = "named by the file";
-    return choice;
-  }
-  if (!has_times) return choose_without_times(source, reading, candidates, progress);
-  const FirstShots shots =
-      one_sensor ? first_shots(source, reading, candidates, progress) : FirstShots{};
-  if (!are_possible(shots, candidates, choice)) {
-    choice.sensor = named != nullptr ? *named : sensors::load_sensor(kUsualSensor);
-    return choice;
-  }
-  if (named != nullptr && !device.type_inferred) {
-    const int lines = choice.lines;
-    choice = choose_by_name(shots, *named, candidates);
-    choice.lines = lines;
-    return choice;
-  }
-  const auto found = recognised(shots, candidates);
-  if (found && found->decided) {
-    take(*found, candidates, choice);
-    choice.chosen_by = ChosenBy::scan;
-    choice.words = "recognised from the scan: " + comparison(choice.misfits);
-    try_variants(shots, choice);
-  } else if (named != nullptr) {
-    choice.sensor = *named;
-    choice.chosen_by = ChosenBy::file;
-    choice.words = "by the rates, tags and returns of the file";
-  } else {
-    guess(shots, found, candidates, choice);
+  FirstShots shots;
+  SensorChoice choice = choose(source, reading, header, given, shots, progress);
+  // The reach of the specification is that on grey walls.
+  constexpr double kOnBrightWalls = 1.5;
+  const double reach = kOnBrightWalls * choice.sensor.range_maximum;
+  if (!(reach > 0) || !choice.impossible.empty() || sensor_name(choice) == "unknown") return choice;
+  choice.beyond_reach =
+      recordings::beyond_reach(shots.head.range, reach, choice.sensor.name).value_or("");
+  // What no sensor reaches the reader tells.
+  if (!choice.beyond_reach.empty() &&
+      !recordings::beyond_reach(shots.head.range, recordings::kFarthestReach, "")) {
+    choice.warnings.push_back(choice.beyond_reach);
   }
   return choice;
 }

@@ -62,18 +62,20 @@ struct LengthUnit {
 constexpr std::array kLengthUnits{LengthUnit{"millimetres", "x_mm", 1000.0},
                                   LengthUnit{"centimetres", "x_cm", 100.0}};
 
-/// The unit in which ranges are most like those of rooms and streets; nothing where none is.
-std::optional<LengthUnit> likely_unit(double median, double high, double reach) {
+/// The units in which ranges would be within reach, first that in which they are most like those of
+/// rooms and streets.
+std::vector<LengthUnit> likely_units(double median, double high, double reach) {
   constexpr double kUsual = 10.0;  // m
-  std::optional<LengthUnit> best;
-  const auto distance = [median](const LengthUnit& unit) {
-    return std::abs(std::log(median / unit.per_m / kUsual));
-  };
-  for (const LengthUnit& unit : kLengthUnits) {
-    if (high / unit.per_m > reach) continue;
-    if (!best || distance(unit) < distance(*best)) best = unit;
-  }
-  return best;
+  std::vector<LengthUnit> units;
+  std::copy_if(kLengthUnits.begin(), kLengthUnits.end(), std::back_inserter(units),
+               [&](const LengthUnit& unit) { return high / unit.per_m <= reach; });
+  std::stable_sort(units.begin(), units.end(), [&](const LengthUnit& a, const LengthUnit& b) {
+    const auto distance = [&](const LengthUnit& unit) {
+      return std::abs(std::log(median / unit.per_m / kUsual));
+    };
+    return distance(a) < distance(b);
+  });
+  return units;
 }
 
 }  // namespace
@@ -145,14 +147,17 @@ std::optional<std::string> beyond_reach(std::span<const double> range, double re
       "{:.3g} % of the ranges are beyond the {:.0f} m that {} can reach: they are {:.5g} to {:.5g} "
       "m",
       100.0 * share, reach, whose, low, high);
-  const std::optional<LengthUnit> unit = likely_unit(median, high, reach);
+  const std::vector<LengthUnit> units = likely_units(median, high, reach);
   // A few far ones are no other unit.
   constexpr double kMostAreFar = 0.1;
-  if (!unit || share < kMostAreFar) return text;
-  return text + fmt::format(
-                    "; as {} they would be {:.3g} to {:.3g} m: state the unit in the names "
-                    "of columns, as in {}, or convert them to m",
-                    unit->name, low / unit->per_m, high / unit->per_m, unit->in_a_column);
+  if (units.empty() || share < kMostAreFar) return text;
+  for (const LengthUnit& unit : units) {
+    text += fmt::format("{} {} ({:.3g} to {:.3g} m)",
+                        &unit == &units.front() ? "; they are likely" : ", or perhaps", unit.name,
+                        low / unit.per_m, high / unit.per_m);
+  }
+  return text + fmt::format(": state the unit in the names of columns, as in {}, or convert to m",
+                            units.front().in_a_column);
 }
 
 namespace {

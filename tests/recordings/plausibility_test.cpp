@@ -86,11 +86,13 @@ TEST(Plausibility, MapCoordinatesAreNone) {
 }
 
 TEST(Plausibility, RangesBeyondAllReachNameTheirUnit) {
-  EXPECT_THAT(warnings(table(scaled(1000.0))), ::testing::ElementsAre(HasSubstr("as millimetres")));
+  EXPECT_THAT(warnings(table(scaled(1000.0))),
+              ::testing::ElementsAre(HasSubstr("likely millimetres")));
   EXPECT_THAT(warnings(table(scaled(1000.0), "x_m,y_m,z_m")),
-              ::testing::ElementsAre(HasSubstr("as millimetres")));
+              ::testing::ElementsAre(HasSubstr("likely millimetres")));
   EXPECT_THAT(warnings(table(scaled(1000.0), "x_mm,y_mm,z_mm")), IsEmpty());
-  EXPECT_THAT(warnings(table(scaled(100.0))), ::testing::ElementsAre(HasSubstr("as centimetres")));
+  EXPECT_THAT(warnings(table(scaled(100.0))),
+              ::testing::ElementsAre(HasSubstr("likely centimetres")));
   // A few far ones are no unit; more of them are said.
   std::vector<double> range(kRows, 20.0);
   std::fill_n(range.begin(), kRows / 200, 5000.0);
@@ -124,7 +126,7 @@ TEST(Plausibility, EveryFormatIsJudged) {
     }
   }
   for (const std::string& bytes : {las.bytes(), ply, pcd}) {
-    EXPECT_THAT(warnings(bytes), ::testing::Contains(HasSubstr("as millimetres")))
+    EXPECT_THAT(warnings(bytes), ::testing::Contains(HasSubstr("likely millimetres")))
         << bytes.substr(0, 4);
   }
 }

@@ -77,9 +77,7 @@ struct EstimationInput {
   estimation::SelectionCounts counts;
   std::vector<std::string> warnings;  ///< of the reader, about frame, sensor and clock
   bool whole_steps = false;           ///< directions come from coordinates in whole steps
-  /// What is wrong with ranges that the sensor cannot measure; only where they were asked for.
-  std::optional<std::string> beyond_reach;
-  double reading_time = 0;  ///< s
+  double reading_time = 0;            ///< s
 };
 
 /// Reads all of a recording of one sensor in the sensor's frame.

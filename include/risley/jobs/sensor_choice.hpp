@@ -50,6 +50,7 @@ struct SensorChoice {
   /// Why no sensor of these can have made it, where that shows before any is asked for: coordinates
   /// that are none of a sensor's frame, a field of view beyond theirs. The sensor is the usual one.
   std::string impossible;
+  std::string beyond_reach;  ///< what is wrong with ranges that the sensor cannot measure, or empty
   int lines =
       0;  ///< the first shots name so many (one more than the highest), 0 when not looked at
   /// Order in which its emitters fire where beams are counted.
