@@ -27,7 +27,8 @@ struct FreeZstd {
 };
 
 [[noreturn]] void fail_length(std::size_t expected, std::string_view found) {
-  throw BadMessage{fmt::format("expected {} bytes when unpacked, found {}", expected, found)};
+  throw BadMessage{
+      fmt::format("the packed block states {} bytes when unpacked, found {}", expected, found)};
 }
 
 }  // namespace
@@ -51,7 +52,8 @@ struct Unpacker::State {
       std::size_t taken = packed.size(), made = room.size() - done;
       more = LZ4F_decompress(lz4.get(), room.data() + done, &made, packed.data(), &taken, nullptr);
       if (LZ4F_isError(more)) {
-        throw BadMessage{fmt::format("cannot be unpacked by LZ4: {}", LZ4F_getErrorName(more))};
+        throw BadMessage{
+            fmt::format("the packed block cannot be unpacked by LZ4: {}", LZ4F_getErrorName(more))};
       }
       if (taken == 0 && made == 0) fail_length(room.size(), "more");
       packed = packed.subspan(taken);
@@ -70,7 +72,8 @@ struct Unpacker::State {
         ZSTD_decompressDCtx(zstd.get(), room.data(), room.size(), packed.data(), packed.size());
     if (!ZSTD_isError(made)) return made;
     if (ZSTD_getErrorCode(made) == ZSTD_error_dstSize_tooSmall) fail_length(room.size(), "more");
-    throw BadMessage{fmt::format("cannot be unpacked by Zstandard: {}", ZSTD_getErrorName(made))};
+    throw BadMessage{fmt::format("the packed block cannot be unpacked by Zstandard: {}",
+                                 ZSTD_getErrorName(made))};
   }
 };
 

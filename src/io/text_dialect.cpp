@@ -70,6 +70,7 @@ bool is_comma_number(std::string_view field) {
 
 bool is_separator_line(std::string_view line) {
   constexpr std::string_view kStatement = "sep=";
+  if (line.ends_with('\r')) line.remove_suffix(1);
   return line.size() == kStatement.size() + 1 && line.starts_with(kStatement);
 }
 

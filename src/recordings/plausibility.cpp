@@ -25,7 +25,7 @@ namespace {
 constexpr double kNarrowest = radians_from_degrees(1.0), kNarrowestFar = radians_from_degrees(5.0);
 /// Ranges of so many shots may be anything.
 constexpr double kFewFar = 0.01;
-constexpr std::size_t kFewestRanges = 100;
+constexpr std::size_t kFewestRanges = 20;
 
 /// The value below which this share of others lies.
 double quantile(std::vector<double>& values, double share) {
@@ -108,11 +108,12 @@ DirectionSpread direction_spread(std::span<const double> azimuth, std::span<cons
 std::optional<std::string> not_a_scan(std::span<const double> azimuth,
                                       std::span<const double> zenith,
                                       std::span<const double> range) {
-  if (azimuth.size() < kFewestJudged) return std::nullopt;
+  if (azimuth.size() < kFewestRanges) return std::nullopt;
   const double radius = direction_spread(azimuth, zenith).radius;
   std::vector<double> ranges = finite(range);
   const double median = ranges.empty() ? 0.0 : quantile(ranges, 0.5);
   const bool is_far = median > kFarthestReach;
+  if (!is_far && azimuth.size() < kFewestJudged) return std::nullopt;
   if (!(radius < (is_far ? kNarrowestFar : kNarrowest))) return std::nullopt;
   const double span_deg = 2.0 * degrees_from_radians(radius);
   if (is_far) {

@@ -66,7 +66,8 @@ TEST(TextDialect, EveryDialectOfATableReadsAlike) {
       }
     }
   }
-  EXPECT_EQ(lines_of_table("sep=;\nx;y\n7,5;1\n"), (std::vector<std::string>{"#", "x,y", "7.5,1"}));
+  EXPECT_EQ(lines_of_table("sep=;\r\nx;y\r\n7,5;1\r\n"),
+            (std::vector<std::string>{"#", "x,y", "7.5,1"}));
   EXPECT_EQ(lines_of_table("x\ty\n7,5\t1,25e-3\n"),
             (std::vector<std::string>{"x\ty", "7.5\t1.25e-3"}));
   EXPECT_EQ(lines_of_table("// x y z\n3\n7,5 +1,25 -2\n0 1,5 2,5\n1 2 3\n"),

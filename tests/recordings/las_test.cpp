@@ -532,18 +532,6 @@ TEST(LasTest, CountsFarBeyondTheFileTakeNoMemory) {
   }
 }
 
-TEST(LasTest, WarnsOfCoordinatesOfAMap) {
-  LasFile file = some_file(40);
-  file.offset = {500'000.0, 5'000'000.0, 0.0};
-  EXPECT_THAT(warnings_of(read_las(file.bytes())),
-              Contains(AllOf(HasSubstr("frame of the sensor"), HasSubstr("offset of x"))));
-  file.offset = {};
-  file.scale = {0.01, 0.01, 0.01};
-  file.points[20].xyz = {50'000'000, 1, 1};
-  EXPECT_THAT(warnings_of(read_las(file.bytes())),
-              Contains(HasSubstr("point 21 is 500000 m from the origin")));
-}
-
 TEST(LasTest, KnowsTheSensorsOfOurOwnClouds) {
   LasFile file = some_file(3);
   file.system = "Livox Avia 3GGDJ6K00100101";

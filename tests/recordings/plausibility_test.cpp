@@ -101,7 +101,7 @@ TEST(Plausibility, RangesBeyondAllReachNameTheirUnit) {
   const auto some = beyond_reach(range, kFarthestReach, "all");
   ASSERT_TRUE(some);
   EXPECT_THAT(*some, ::testing::Not(HasSubstr("millimetres")));
-  EXPECT_FALSE(beyond_reach(std::vector<double>(50, 5000.0), kFarthestReach, "all"));
+  EXPECT_FALSE(beyond_reach(std::vector<double>(10, 5000.0), kFarthestReach, "all"));
 }
 
 TEST(Plausibility, EveryFormatIsJudged) {
@@ -129,6 +129,21 @@ TEST(Plausibility, EveryFormatIsJudged) {
     EXPECT_THAT(warnings(bytes), ::testing::Contains(HasSubstr("likely millimetres")))
         << bytes.substr(0, 4);
   }
+}
+
+TEST(Plausibility, FewPointsOfAMapAreEnough) {
+  las_bytes::LasFile las;
+  las.offset = {500'000.0, 5'000'000.0, 0.0};
+  for (std::size_t i = 0; i < 40; ++i) {
+    las.points.emplace_back();
+    las.points.back().gps_time = 1e-5 * static_cast<double>(i);
+    las.points.back().xyz = {static_cast<std::int32_t>(37 * i), 41, 1000};
+  }
+  const TestFolder folder;
+  put_bytes(folder.file("a.las"), las.bytes());
+  const Recording read = load_recording(folder.file("a.las"));
+  ASSERT_FALSE(read.warnings.empty());
+  EXPECT_THAT(read.warnings.front().message, HasSubstr("not coordinates of a sensor frame"));
 }
 
 TEST(Plausibility, DirectionsWithoutRangesAreJudged) {

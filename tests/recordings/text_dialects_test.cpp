@@ -80,7 +80,9 @@ TEST(TextDialects, DecimalCommasInQuotesAndBetweenBlanks) {
     plain += fmt::format("{},1.322,2.182\n", x);
   }
   const Recording wanted = load(plain);
-  for (const std::string& text : {quoted, blanks, tabs}) {
+  std::string sheet = plain;
+  for (char& c : sheet) c = c == ',' ? ';' : c == '.' ? ',' : c;
+  for (const std::string& text : {quoted, blanks, tabs, "sep=;\r\n" + sheet}) {
     EXPECT_TRUE(is_same(load(text).data.observations, wanted.data.observations)) << text;
   }
 }

@@ -636,7 +636,7 @@ TEST(InertialExplorer, TheDateDecidesBetweenSecondsOfDayAndOfWeek) {
   }
   EXPECT_THAT(fault(text("(YMD)", {"2023/11/16"}, {200'000.0})), HasSubstr("second of the day"));
   EXPECT_THAT(fault(text("(YMD)", {"2023/13/16"}, {55225.0})), HasSubstr("line 5"));
-  EXPECT_THAT(fault(text("(MDY)", {"2023/11/16"}, {55225.0})), HasSubstr("month/day/year"));
+  EXPECT_THAT(fault(text("(MDY)", {"2023/11/16"}, {55225.0})), HasSubstr("line 5"));
   EXPECT_THAT(fault(text("(day)", {"2023/11/16"}, {55225.0})), HasSubstr("(YMD)"));
 }
 

@@ -105,6 +105,17 @@ std::vector<std::string> pts_names(std::size_t columns) {
   return names;
 }
 
+bool has_directions(const TableHead& head) {
+  std::vector<NamedColumn> columns;
+  for (const std::string& name : head.layout.names) columns.push_back({name, CellType::text});
+  try {
+    const NamedColumns found(std::move(columns));
+    return true;
+  } catch (const BadColumns&) {
+    return false;
+  }
+}
+
 /// Finds the line of names: the first line that is no comment or, where that is a row of numbers,
 /// the comment before it. Names are empty when there is no such line.
 std::optional<TableHead> find_head(std::string_view bytes) {
@@ -168,7 +179,8 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   if (comment) {
     take_names(*comment);
     head.layout.delimiter = delimiter_of(lines[at]);
-    if (head.layout.names.size() != first.size()) head.layout.names.clear();
+    const bool other = head.layout.rows && !has_directions(head);  // a comment without names
+    if (other || head.layout.names.size() != first.size()) head.layout.names.clear();
   }
   if (!head.layout.names.empty() || !head.layout.rows) return head;
   head.layout.names = pts_names(first.size());
@@ -179,17 +191,6 @@ std::optional<TableHead> find_head(std::string_view bytes) {
                     fmt::join(head.layout.names, ", ")));
   }
   return head;
-}
-
-bool has_directions(const TableHead& head) {
-  std::vector<NamedColumn> columns;
-  for (const std::string& name : head.layout.names) columns.push_back({name, CellType::text});
-  try {
-    const NamedColumns found(std::move(columns));
-    return true;
-  } catch (const BadColumns&) {
-    return false;
-  }
 }
 
 NamedTextLayout read_layout(const std::string& path) {

@@ -87,8 +87,8 @@ std::vector<std::string> words_of_line(std::string_view line) {
   return words;
 }
 
-/// The units of names, one each; columns without a unit have none written. Both lines are aligned,
-/// or have commas.
+/// The units of names, one each; columns without a unit have none written. Both lines end their
+/// columns at the same places, or have commas; otherwise the units are those that are written.
 std::vector<std::string> units_of(std::string_view names_line, std::string_view units_line) {
   const std::vector<ExplorerWord> names = placed_words(names_line);
   const std::vector<ExplorerWord> written = placed_words(units_line);
@@ -99,21 +99,14 @@ std::vector<std::string> units_of(std::string_view names_line, std::string_view 
     for (const std::string_view field : fields) units.push_back(lower_case(std::string(field)));
     return units;
   }
-  // In order, each to the name whose end is the nearest of those that leave names for the others.
-  std::size_t next = 0;
-  for (std::size_t i = 0; i < written.size(); ++i) {
-    const auto distance = [&](std::size_t at) {
-      return std::max(names[at].end, written[i].end) - std::min(names[at].end, written[i].end);
-    };
-    std::size_t best = next;
-    for (std::size_t at = next; at + (written.size() - i) <= names.size(); ++at) {
-      if (distance(at) < distance(best)) best = at;
-    }
-    units.resize(best);
-    units.push_back(written[i].text);
-    next = best + 1;
-  }
+  constexpr std::size_t kApart = 2;
   units.resize(names.size());
+  std::size_t at = 0;
+  for (const ExplorerWord& unit : written) {
+    while (at < names.size() && names[at].end + kApart < unit.end) ++at;
+    if (at == names.size() || names[at].end > unit.end + kApart) return words_of_line(units_line);
+    units[at++] = unit.text;
+  }
   return units;
 }
 

@@ -225,6 +225,10 @@ std::vector<std::string> header_names(std::string_view line) {
 bool is_trajectory_csv(const FileHead& head) {
   const std::vector<std::string_view> lines = lines_of(head.bytes);
   if (lines.empty()) return false;
+  const char delimiter = csv_delimiter(lines[0]);
+  if (lines.size() > 1 && !lines[1].empty() && lines[1].find(delimiter) == lines[1].npos) {
+    return false;  // names of another kind of table
+  }
   static const std::vector<std::string> kAttitude{"roll_deg", "pitch_deg", "heading_deg",
                                                   "roll_rad", "pitch_rad", "heading_rad"};
   static const std::vector<std::string> kQuaternion{"qx", "qy", "qz", "qw"};

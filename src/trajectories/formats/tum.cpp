@@ -10,6 +10,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/text_table.hpp"
 
@@ -95,12 +96,6 @@ TumHeader read_tum_header(const std::string& path) {
   return header;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Bodies that lie on their backs, and would stand upright were the scalar the first number of the
 /// quaternion and not the last.
 void check_order(Trajectory& trajectory) {
@@ -111,7 +106,7 @@ void check_order(Trajectory& trajectory) {
     up_as_read.push_back(1 - 2 * (square(q.x()) + square(q.y())));
     up_otherwise.push_back(1 - 2 * (square(q.y()) + square(q.z())));
   }
-  const double as_read = median(std::move(up_as_read)), otherwise = median(std::move(up_otherwise));
+  const double as_read = median(up_as_read), otherwise = median(up_otherwise);
   constexpr double kUpright = 0.8;
   if (as_read > 0 || otherwise < kUpright) return;
   const auto tilt_deg = [](double cosine) {
