@@ -374,6 +374,7 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
   if (one_sensor) shots = first_shots(source, reading, candidates, progress);
   if (!are_possible(shots, candidates, choice)) {
     choice.sensor = named != nullptr ? *named : sensors::load_sensor(kUsualSensor);
+    if (named != nullptr) choice.chosen_by = ChosenBy::file;
     return choice;
   }
   if (named != nullptr && !device.type_inferred) {

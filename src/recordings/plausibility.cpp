@@ -190,10 +190,15 @@ class PlausibilityReader final : public DecoratingReader {
 
   void judge() {
     judged_ = true;
-    if (const auto problem = not_a_scan(azimuth_, zenith_, range_)) {
+    std::vector<double> ranges = finite(range_);
+    const bool far = !ranges.empty() && quantile(ranges, 0.5) > kFarthestReach;
+    // What names its sensor is in that sensor's units; it may still have been put on a map.
+    const bool named = header_.devices.front().type != kUnknownDeviceType;
+    const auto problem = named && !far ? std::nullopt : not_a_scan(azimuth_, zenith_, range_);
+    if (problem) {
       found_.push_back({{}, *problem});
-    } else if (const auto far = beyond_reach(range_, kFarthestReach, "these sensors")) {
-      found_.push_back({{}, *far});
+    } else if (const auto beyond = beyond_reach(range_, kFarthestReach, "these sensors")) {
+      found_.push_back({{}, *beyond});
     }
     azimuth_ = zenith_ = range_ = {};
   }
