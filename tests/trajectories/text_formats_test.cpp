@@ -599,7 +599,7 @@ TEST(InertialExplorer, TheDateDecidesBetweenSecondsOfDayAndOfWeek) {
     std::string all =
         "Program: Inertial Explorer Version 8.90\n\n"
         "   Date   GPSTime   Latitude  Longitude  H-Ell   Roll  Pitch  Heading\n  " +
-        unit + "  (sec)  (deg)  (deg)  (m)  (deg)  (deg)  (deg)\n";
+        unit + "     (sec)      (deg)      (deg)    (m)  (deg)  (deg)    (deg)\n";
     for (std::size_t i = 0; i < days.size(); ++i) {
       all += fmt::format("  {}  {:.2f}  47.0  8.5  480.0  1.9  -0.2  0.5\n", days[i], times[i]);
     }
@@ -615,6 +615,7 @@ TEST(InertialExplorer, TheDateDecidesBetweenSecondsOfDayAndOfWeek) {
            Case{
                "(YMD)", {"2023-11-16", "2023-11-16"}, {400825.0, 400825.05}, {400825.0, 400825.05}},
            Case{"(MDY)", {"11/16/2023", "11/16/2023"}, {55225.0, 55225.05}, {400825.0, 400825.05}},
+           Case{"     ", {"2023/11/16", "2023/11/16"}, {55225.0, 55225.05}, {400825.0, 400825.05}},
            Case{"(DMY)", {"16.11.2023", "16.11.2023"}, {55225.0, 55225.05}, {400825.0, 400825.05}},
            // Over midnight, and over the end of the week.
            Case{"(YMD)", {"2023/11/16", "2023/11/17"}, {86399.95, 0.0}, {431999.95, 432000.0}},

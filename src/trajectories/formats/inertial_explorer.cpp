@@ -214,12 +214,12 @@ void set_unit(PoseColumn& column, const std::string& unit, double sign, const st
         column.date_order = DateOrder::mdy;
       } else if (unit == "(dmy)" || unit == "(d/m/y)") {
         column.date_order = DateOrder::dmy;
-      } else if (unit != "(ymd)" && unit != "(y/m/d)") {
+      } else if (!unit.empty() && unit != "(ymd)" && unit != "(y/m/d)") {
         refuse("(YMD), (MDY) or (DMY)");
       }
       return;
     case PoseField::time:
-      if (unit != "(sec)" && unit != "(s)") refuse("(sec)");
+      if (!unit.empty() && unit != "(sec)" && unit != "(s)") refuse("(sec)");
       return;
     case PoseField::latitude:
     case PoseField::longitude:
