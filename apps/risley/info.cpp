@@ -156,6 +156,15 @@ FileOutcome inspect_poses(const InfoCommandOptions& options, const Progress& pro
   return {kDone, std::move(json), std::move(text)};
 }
 
+/// Names options in what was found as the command does, and prints it.
+void log_all_warnings(const std::string& input, InspectedRecording& found) {
+  for (recordings::ReadWarning& warning : found.warnings) {
+    warning.message = with_flags(warning.message);
+  }
+  if (found.choice) put_flags(found.choice->warnings);
+  log_warnings(input, found.warnings);
+}
+
 /// One of several.
 FileOutcome inspect_one(const std::string& input, const InfoCommandOptions& all,
                         const Progress& progress) {
@@ -165,11 +174,7 @@ FileOutcome inspect_one(const std::string& input, const InfoCommandOptions& all,
   require_no_accuracy(options);
   InspectedRecording found =
       jobs::inspect_recording({input, read_options(options.reading), {}, {}}, progress);
-  log_warnings(input, found.warnings);
-  if (found.choice) {
-    put_flags(found.choice->warnings);
-    for (const std::string& words : found.choice->warnings) spdlog::warn("{}: {}", input, words);
-  }
+  log_all_warnings(input, found);
   Json json = with_status(json::of(found), found.damage);
   json["input"] = input;
   std::string text =
@@ -212,13 +217,7 @@ ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& comm
                                      {.ranges = options.share_ranges}},
                                     bar.progress());
   }
-  log_warnings(options.input, found.warnings);
-  if (found.choice) {
-    put_flags(found.choice->warnings);
-    for (const std::string& warning : found.choice->warnings) {
-      spdlog::warn("{}: {}", options.input, warning);
-    }
-  }
+  log_all_warnings(options.input, found);
   if (found.damage) spdlog::error(found.damage->what());
   if (common.json) {
     print_json(common, with_status(json::of(found), found.damage));

@@ -68,16 +68,6 @@ std::vector<std::pair<std::string, std::size_t>> stated_names(const std::string&
   const io::YamlMap bag(whole.at("rosbag2_bagfile_information").value, path,
                         "rosbag2_bagfile_information");
   const int version = bag.integer("version", 0, kLatestVersion);
-  if (const auto* mode = bag.find("compression_mode");
-      mode != nullptr && mode->value.kind != io::YamlNode::Kind::nothing) {
-    const std::string text = lower_case(bag.text("compression_mode"));
-    if (!text.empty() && text != "none") {
-      io::fail_at(path, mode->line,
-                  fmt::format("{} = {}: rosbag2 compressed the files or the messages in them, "
-                              "expected none (`ros2 bag convert` writes an uncompressed bag)",
-                              bag.field("compression_mode"), text));
-    }
-  }
   const auto& list = bag.at("relative_file_paths");
   const std::string field = bag.field("relative_file_paths");
   if (!list.value.is_list() || list.value.items.empty()) {
@@ -104,6 +94,16 @@ std::vector<std::pair<std::string, std::size_t>> stated_names(const std::string&
     names.emplace_back(name, item.line);
   }
   return names;
+}
+
+/// A file that rosbag2 compressed as a whole, also where it was unpacked beside since.
+/// @return the file that can be read; empty where it has to be unpacked first
+std::string unpacked(const std::string& file) {
+  constexpr std::string_view kEnding = ".zstd";
+  if (!file.ends_with(kEnding)) return file;
+  std::error_code code;
+  std::string plain = file.substr(0, file.size() - kEnding.size());
+  return fs::is_regular_file(plain, code) ? plain : std::string();
 }
 
 auto key_of(const Topic& topic) {
@@ -234,7 +234,15 @@ std::vector<std::string> files_of_bag_folder(const std::string& folder) {
   std::vector<std::string> files, missing;
   std::size_t line = 0;
   for (const auto& [name, stated_in_line] : stated_names(metadata)) {
-    std::string file = (fs::path(folder) / name).string();
+    const std::string stated = (fs::path(folder) / name).string();
+    std::string file = unpacked(stated);
+    if (file.empty() && fs::is_regular_file(stated, code)) {
+      const std::string plain = stated.substr(0, stated.rfind('.'));
+      io::fail_at(metadata, stated_in_line,
+                  fmt::format("{} is compressed as a whole (Zstandard): unpack it by `unzstd {} -o "
+                              "{}`, then the folder can be read",
+                              name, stated, plain));
+    }
     if (!fs::is_regular_file(file, code)) {
       if (missing.empty()) line = stated_in_line;
       missing.push_back(name);

@@ -370,6 +370,13 @@ class McapBag final : public Bag {
     message.number = ++topic_messages_[channel.index];
     message.bytes = bytes;
     message.byte_offset = byte_offset;
+    if (topics_[channel.index].serialisation == Serialisation::cdr) {
+      try {
+        message.bytes = unpacker_.message(bytes);
+      } catch (const BadMessage& bad) {
+        fail(message, bad.what());
+      }
+    }
     return true;
   }
 

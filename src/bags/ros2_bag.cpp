@@ -14,6 +14,7 @@
 #include "risley/io/sqlite_input.hpp"
 
 #include "bags/bag_kinds.hpp"
+#include "bags/unpack.hpp"
 
 namespace risley::bags {
 namespace {
@@ -58,6 +59,11 @@ class Ros2Bag final : public Bag {
       if (blob_bytes_ > database_.file_bytes()) {  // pages that stand in several messages
         fail(fmt::format("the messages up to row {} have {} bytes, but the database only {}", id_,
                          blob_bytes_, database_.file_bytes()));
+      }
+      try {
+        message.bytes = unpacker_.message(message.bytes);
+      } catch (const BadMessage& bad) {
+        fail(message, bad.what());
       }
       return true;
     }
@@ -117,6 +123,7 @@ class Ros2Bag final : public Bag {
   }
 
   io::SqliteInput database_;
+  Unpacker unpacker_;
   std::uint64_t blob_bytes_ = 0;   ///< of the messages read so far
   bool any_read_ = false;          ///< and id_ is that of the last message
   std::vector<std::int64_t> ids_;  ///< by topic

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "bags/unpack.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <new>
 
@@ -26,7 +28,7 @@ struct FreeZstd {
 
 [[noreturn]] void fail_length(std::size_t expected, std::string_view found) {
   throw BadMessage{
-      fmt::format("the chunk states {} bytes when unpacked, found {}", expected, found)};
+      fmt::format("the packed block states {} bytes when unpacked, found {}", expected, found)};
 }
 
 }  // namespace
@@ -51,7 +53,7 @@ struct Unpacker::State {
       more = LZ4F_decompress(lz4.get(), room.data() + done, &made, packed.data(), &taken, nullptr);
       if (LZ4F_isError(more)) {
         throw BadMessage{
-            fmt::format("the chunk cannot be unpacked by LZ4: {}", LZ4F_getErrorName(more))};
+            fmt::format("the packed block cannot be unpacked by LZ4: {}", LZ4F_getErrorName(more))};
       }
       if (taken == 0 && made == 0) fail_length(room.size(), "more");
       packed = packed.subspan(taken);
@@ -70,8 +72,8 @@ struct Unpacker::State {
         ZSTD_decompressDCtx(zstd.get(), room.data(), room.size(), packed.data(), packed.size());
     if (!ZSTD_isError(made)) return made;
     if (ZSTD_getErrorCode(made) == ZSTD_error_dstSize_tooSmall) fail_length(room.size(), "more");
-    throw BadMessage{
-        fmt::format("the chunk cannot be unpacked by Zstandard: {}", ZSTD_getErrorName(made))};
+    throw BadMessage{fmt::format("the packed block cannot be unpacked by Zstandard: {}",
+                                 ZSTD_getErrorName(made))};
   }
 };
 
@@ -90,6 +92,25 @@ void Unpacker::unpack(std::string_view packing, std::span<const std::uint8_t> pa
   const std::size_t made =
       packing == kLz4 ? state_->unpack_lz4(packed, room) : state_->unpack_zstd(packed, room);
   if (made != room.size()) fail_length(room.size(), fmt::format("{}", made));
+}
+
+std::span<const std::uint8_t> Unpacker::message(std::span<const std::uint8_t> bytes) {
+  constexpr std::array<std::uint8_t, 4> kZstdMark{0x28, 0xB5, 0x2F, 0xFD};
+  constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
+  if (bytes.size() < kZstdMark.size() ||
+      !std::equal(kZstdMark.begin(), kZstdMark.end(), bytes.begin())) {
+    return bytes;
+  }
+  const unsigned long long size = ZSTD_getFrameContentSize(bytes.data(), bytes.size());
+  if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size > kMostBytes ||
+      size > most_per_byte(kZstd) * bytes.size()) {
+    throw BadMessage{
+        fmt::format("is compressed (Zstandard): expected it to state its size, at most {} bytes",
+                    std::min(kMostBytes, most_per_byte(kZstd) * bytes.size()))};
+  }
+  message_.resize(static_cast<std::size_t>(size));
+  unpack(kZstd, bytes, message_);
+  return message_;
 }
 
 }  // namespace risley::bags

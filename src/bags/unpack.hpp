@@ -1,16 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// LZ4 frames and Zstandard, as chunks of MCAP are packed.
+// LZ4 frames and Zstandard, as chunks of MCAP and messages of rosbag2 are packed.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace risley::bags {
 
-/// Unpacks chunks, keeping what the libraries need from one to the next.
+/// Unpacks chunks and messages, keeping what the libraries need from one to the next.
 class Unpacker {
  public:
   Unpacker();
@@ -27,7 +28,14 @@ class Unpacker {
   void unpack(std::string_view packing, std::span<const std::uint8_t> packed,
               std::span<std::uint8_t> room);
 
+  /// A message of ROS 2 as it was before rosbag2 compressed it by Zstandard (compression_mode:
+  /// MESSAGE), told by its first bytes, with which plain CDR never begins; others as they are.
+  /// @return bytes that are valid until the next call
+  /// @throws BadMessage as unpack()
+  std::span<const std::uint8_t> message(std::span<const std::uint8_t> bytes);
+
  private:
+  std::vector<std::uint8_t> message_;
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -107,7 +107,7 @@ std::string normalized_header(std::string_view text) {
   return header;
 }
 
-LineReader::LineReader(const std::string& path)
+LineReader::LineReader(const std::string& path, LinesOf lines_of)
     : path_(path), file_(nullptr, &std::fclose), buffer_(kReadBlock) {
   std::error_code code;
   if (std::filesystem::is_directory(path, code)) {
@@ -118,12 +118,22 @@ LineReader::LineReader(const std::string& path)
   std::setvbuf(file_.get(), nullptr, _IONBF, 0);
   file_size_ = std::filesystem::file_size(path, code);
   if (code) file_size_ = 0;
+  refill();
+  const TextEncoding encoding = encoding_of({buffer_.data(), end_});
+  if (encoding != TextEncoding::utf8) {
+    decoder_.emplace(encoding);
+    decoder_->append({buffer_.data(), end_}, decoded_);
+    buffer_.resize(std::max(buffer_.size(), decoded_.size()));
+    std::copy(decoded_.begin(), decoded_.end(), buffer_.begin());
+    end_ = decoded_.size();
+  }
+  if (lines_of == LinesOf::table) dialect_ = dialect_of({buffer_.data(), end_});
 }
 
 double LineReader::fraction_read() const {
   if (file_size_ == 0) return at_end_ ? 1.0 : 0.0;
-  const double consumed = static_cast<double>(bytes_read_ - (end_ - begin_));
-  return std::min(1.0, consumed / static_cast<double>(file_size_));
+  const double consumed = static_cast<double>(bytes_read_) - static_cast<double>(end_ - begin_);
+  return std::clamp(consumed / static_cast<double>(file_size_), 0.0, 1.0);
 }
 
 void LineReader::require_length(std::size_t length) const {
@@ -133,19 +143,31 @@ void LineReader::require_length(std::size_t length) const {
       fmt::format("expected a line of at most {} bytes, found a longer one", kLongestLine));
 }
 
-void LineReader::refill() {
-  std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
-  end_ -= begin_;
-  begin_ = 0;
-  const std::size_t count =
-      std::fread(buffer_.data() + end_, 1, buffer_.size() - end_, file_.get());
+std::size_t LineReader::read_bytes(char* to, std::size_t most) {
+  const std::size_t count = std::fread(to, 1, most, file_.get());
   if (count == 0 && std::ferror(file_.get()) != 0) {
     throw FileError(path_, {.byte_offset = bytes_read_, .line = {}},
                     fmt::format("cannot be read: {}", std::strerror(errno)));
   }
   at_end_ = count == 0;
-  end_ += count;
   bytes_read_ += count;
+  return count;
+}
+
+void LineReader::refill() {
+  std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+  end_ -= begin_;
+  begin_ = 0;
+  if (!decoder_) {
+    end_ += read_bytes(buffer_.data() + end_, buffer_.size() - end_);
+    return;
+  }
+  raw_.resize((buffer_.size() - end_) / 2);  // two bytes become three at most
+  raw_.resize(read_bytes(raw_.data(), raw_.size()));
+  decoded_.clear();
+  decoder_->append(raw_, decoded_);
+  std::copy(decoded_.begin(), decoded_.end(), buffer_.begin() + static_cast<std::ptrdiff_t>(end_));
+  end_ += decoded_.size();
 }
 
 bool LineReader::next(std::string_view& line) {
@@ -174,6 +196,7 @@ bool LineReader::next(std::string_view& line) {
   if (line_number_++ == 0 && line.starts_with(kByteOrderMark)) {
     line.remove_prefix(kByteOrderMark.size());
   }
+  line = dialect_.plain(line, plain_);
   return true;
 }
 

@@ -14,6 +14,7 @@
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
+#include "risley/recordings/plausibility.hpp"
 #include "risley/sensors/preset.hpp"
 
 #include "jobs/packet_recording.hpp"
@@ -176,8 +177,14 @@ IdentifiedRecording identify_recording(const IdentifyRecordingOptions& options,
   const estimation::AngleSeries series = read(options, result, progress.stage("reading"));
   result.reading_time = reading.seconds();
   const Stopwatch solving;
-  result.identification =
-      identification::identify(series, options.identify, progress.stage("identifying"));
+  try {
+    result.identification =
+        identification::identify(series, options.identify, progress.stage("identifying"));
+  } catch (const EstimationError& error) {
+    const bool is_scan = !recordings::not_a_scan(series.azimuth, series.zenith, {});
+    if (is_scan || result.warnings.empty()) throw;
+    throw EstimationError(fmt::format("{}: {}", result.warnings.front(), error.what()));
+  }
   result.solving_time = solving.seconds();
   find_like(result);
   const std::string name =

@@ -37,12 +37,15 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   for (const std::string& words : input.words) result.warnings.push_back({{}, words});
   result.time_uncertainty = input.time_uncertainty;
   if (input.choice) result.choice = std::move(input.choice);
-  if (result.choice || result.header.devices.size() != 1 || result.audit.shots == 0) return result;
-  try {
-    result.choice = choose_sensor(options.recording, options.reading, result.header, {},
-                                  progress.stage("recognising"));
-  } catch (const InvalidArgument&) {  // no preset of that type: the header names it all the same
+  if (!result.choice && result.header.devices.size() == 1 && result.audit.shots > 0) {
+    try {
+      result.choice = choose_sensor(options.recording, options.reading, result.header, {},
+                                    progress.stage("recognising"));
+    } catch (const InvalidArgument&) {  // no preset of that type: the header names it all the same
+    }
   }
+  if (!result.choice) return result;
+  for (const std::string& words : result.choice->warnings) result.warnings.push_back({{}, words});
   return result;
 }
 

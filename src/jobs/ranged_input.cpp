@@ -30,36 +30,6 @@ void require_recordings(const std::vector<recordings::Source>& recordings) {
   }
 }
 
-/// Ranges that the sensor cannot have measured are in another unit, or of another sensor.
-void require_within_reach(const estimation::PackedSeries& series, const sensors::Sensor& sensor,
-                          const std::string& path) {
-  constexpr double kMostBeyond = 0.01, kMostBelow = 0.5;  // parts of all shots with a return
-  std::size_t returns = 0, beyond = 0, below = 0;
-  double longest = 0;
-  estimation::AngleSeries rows;
-  for (std::size_t begin = 0; begin < series.size();) {
-    const std::size_t end = std::min(series.size(), begin + std::size_t{65536});
-    series.rows({begin, end}, rows);
-    for (const double range : rows.range) {
-      if (!(range > 0)) continue;
-      ++returns;
-      if (range > sensor.range_maximum) ++beyond;
-      if (range < sensor.range_minimum) ++below;
-      longest = std::max(longest, range);
-    }
-    begin = end;
-  }
-  const auto part = [&](std::size_t count) {
-    return static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(returns, 1));
-  };
-  if (part(beyond) <= kMostBeyond && part(below) <= kMostBelow) return;
-  throw EstimationError(fmt::format(
-      "{}: {:.0f} % of its ranges, up to {:.6g} m, lie outside the {:g} to {:g} m that a {} "
-      "measures: check the unit of the ranges, and the sensor",
-      path, 100 * (part(beyond) + part(below)), longest, sensor.range_minimum, sensor.range_maximum,
-      sensor.name));
-}
-
 }  // namespace
 
 void check_ranged_input(const RangedInputOptions& options) {
@@ -84,7 +54,9 @@ RangedRecording read_ranged(const RangedInputOptions& options, std::size_t numbe
     throw EstimationError(
         fmt::format("{} holds no ranges, which a calibration on walls needs", path));
   }
-  require_within_reach(input.series, input.choice.sensor, path);
+  if (!input.choice.beyond_reach.empty()) {
+    throw EstimationError(fmt::format("{}: {}", path, input.choice.beyond_reach));
+  }
   estimation::EstimateOptions settings;
   settings.sensor = input.choice.sensor;
   settings.angle_noise = options.angle_noise;

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -18,6 +19,7 @@
 #include "risley/estimation/stored_pose.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/parallel/parallel.hpp"
+#include "risley/recordings/plausibility.hpp"
 
 #include "jobs/open_input.hpp"
 #include "jobs/packet_recording.hpp"
@@ -171,6 +173,27 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
 
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
+/// Asks for times, after what is wrong with the shots themselves.
+/// @throws FileError, recordings::MissingTimes
+void require_times(const recordings::Source& source, const recordings::ReadOptions& reading,
+                   const recordings::RecordingHeader& header, const Progress& progress) {
+  try {
+    recordings::require_times(header);
+  } catch (const recordings::MissingTimes& missing) {
+    constexpr double kAnyRate = 1e5;  // Hz
+    recordings::ReadOptions counted = reading;
+    counted.shot_rate = kAnyRate;
+    const estimation::AngleSeries shots = first_second(source, counted, progress);
+    if (const auto problem = recordings::not_a_scan(shots.azimuth, shots.zenith, shots.range)) {
+      throw FileError(source.name(), {}, *problem);
+    }
+    const auto problem =
+        recordings::beyond_reach(shots.range, recordings::kFarthestReach, "these sensors");
+    if (!problem) throw;
+    throw recordings::MissingTimes(fmt::format("{}. Besides, {}", *problem, missing.what()));
+  }
+}
+
 /// Opens a recording, chooses its sensor, and turns it back by the pose that it states where its
 /// points were moved by it.
 /// @param[in,out] reading  as asked for; on return with the pose
@@ -181,8 +204,9 @@ SensorFrameRecording open_by_stated_pose(const recordings::Source& source,
   progress.check();
   SensorFrameRecording result{
       open_input(source, reading, progress), {}, {}, reading.extrinsics.has_value()};
-  recordings::require_times(result.reader->header());
+  require_times(source, reading, result.reader->header(), progress);
   result.choice = choose_sensor(source, reading, result.reader->header(), given, progress);
+  require_possible(result.choice, source.name());
   result.warnings = result.choice.warnings;
   const recordings::RecordingHeader& header = result.reader->header();
   if (reading.extrinsics || header.devices.size() != 1) return result;

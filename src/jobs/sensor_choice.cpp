@@ -3,6 +3,7 @@
 #include "risley/jobs/sensor_choice.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
@@ -16,6 +17,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
 #include "risley/jobs/compare_results.hpp"
+#include "risley/recordings/plausibility.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::jobs {
@@ -201,20 +203,92 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
       choice.words, choice.sensor.name));
 }
 
+std::string span_text(double from, double to) {
+  return fmt::format("{:.0f}", degrees_from_radians(to - from));
+}
+
+/// What may have made shots that lie beyond the field of view of every sensor.
+std::string wide_words(const recordings::DirectionSpread& spread) {
+  struct Wide {
+    const char* name;
+    double azimuth_deg, zenith_deg;
+    double least;  ///< share of the azimuths that is rarely behind something
+  };
+  // Of the second generation, whose scans no built-in preset describes.
+  static constexpr std::array kWide{Wide{"Mid-360", 360.0, 59.0, 0.35},
+                                    Wide{"HAP", 120.0, 25.0, 0.8}};
+  constexpr double kMore_deg = 3.0, kLeastZenith = 0.7;
+  const double azimuth_deg = degrees_from_radians(spread.azimuth_to - spread.azimuth_from),
+               zenith_deg = degrees_from_radians(spread.zenith_to - spread.zenith_from);
+  for (const Wide& wide : kWide) {
+    const auto fits = [](double found, double field, double least) {
+      return found < field + kMore_deg && found > least * field;
+    };
+    if (!fits(azimuth_deg, wide.azimuth_deg, wide.least) ||
+        !fits(zenith_deg, wide.zenith_deg, kLeastZenith)) {
+      continue;
+    }
+    return fmt::format("those of a {} ({:.0f} x {:.0f} deg), for which there is no built-in preset",
+                       wide.name, wide.azimuth_deg, wide.zenith_deg);
+  }
+  return "merged clouds of several sensors: record or export each of them by itself";
+}
+
+/// Says why no sensor can have made the shots, where that is so.
+std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> candidates) {
+  if (shots.size() < recordings::kFewestJudged) return {};
+  if (const auto problem = recordings::not_a_scan(shots.azimuth, shots.zenith, shots.range)) {
+    return *problem;
+  }
+  double widest = 0;
+  for (const Sensor& sensor : candidates) {
+    if (!(sensor.field_of_view > 0)) return {};
+    widest = std::max(widest, sensor.field_of_view);
+  }
+  constexpr double kMargin = radians_from_degrees(10.0);
+  const recordings::DirectionSpread spread =
+      recordings::direction_spread(shots.azimuth, shots.zenith);
+  if (spread.radius < 0.5 * widest + kMargin) return {};
+  return fmt::format(
+      "directions span {} x {} deg (azimuth, zenith), more than the field of view of {}: they are "
+      "probably {}",
+      span_text(spread.azimuth_from, spread.azimuth_to),
+      span_text(spread.zenith_from, spread.zenith_to),
+      candidates.size() == 1 ? candidates.front().name : "any built-in preset", wide_words(spread));
+}
+
+/// Looks at the first shots before any sensor is. @return whether one may have made them
+bool are_possible(const FirstShots& shots, std::span<const Sensor> candidates,
+                  SensorChoice& choice) {
+  if (shots.beams == BeamSource::recorded) {
+    for (const std::uint8_t beam : shots.head.beam) choice.lines = std::max(choice.lines, beam + 1);
+  }
+  choice.impossible = impossible_words(shots.head, candidates);
+  if (choice.impossible.empty()) return true;
+  choice.chosen_by = ChosenBy::guess;
+  choice.fits = false;
+  choice.words = choice.impossible;
+  return false;
+}
+
 /// Tries the shot rates of the presets, because the recording has no times.
 SensorChoice choose_without_times(const recordings::Source& source, recordings::ReadOptions reading,
-                                  std::span<const Sensor> candidates, const Progress& progress) {
+                                  std::span<const Sensor> candidates, FirstShots& shots,
+                                  const Progress& progress) {
   SensorChoice choice;
   std::set<double> rates;
   for (const Sensor& sensor : candidates) rates.insert(sensor.shot_rate);
   double least = std::numeric_limits<double>::infinity();
-  FirstShots shots;
   for (const double rate : rates) {
     std::vector<Sensor> some;
     std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(some),
                  [rate](const Sensor& sensor) { return sensor.shot_rate == rate; });
     reading.shot_rate = rate;
     shots = first_shots(source, reading, some, progress);
+    if (!are_possible(shots, candidates, choice)) {
+      choice.sensor = sensors::load_sensor(kUsualSensor);
+      return choice;
+    }
     const auto found = recognised(shots, some);
     if (!found || !found->fits || misfit_of(found->matches.front()) >= least) continue;
     least = misfit_of(found->matches.front());
@@ -257,6 +331,71 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   return choice;
 }
 
+/// @param[out] shots  the first ones, where they were looked at
+SensorChoice choose(const recordings::Source& source, const recordings::ReadOptions& reading,
+                    const recordings::RecordingHeader& header, const std::optional<Sensor>& given,
+                    FirstShots& shots, const Progress& progress) {
+  SensorChoice choice;
+  const bool has_times = header.has_times || reading.shot_rate;
+  const bool one_sensor = header.devices.size() == 1;
+  if (given) {
+    choice.sensor = *given;
+    choice.words = "as asked for" + origin_of(*given);
+    if (!has_times || !one_sensor) return choice;
+    shots = first_shots(source, reading, {&*given, 1}, progress);
+    if (!are_possible(shots, {&*given, 1}, choice) || given->train.emitters() == 1) return choice;
+    if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);
+    return choice;
+  }
+  const std::vector<Sensor> candidates = type_presets();
+  const recordings::Device& device = header.devices.front();
+  const Sensor* named = nullptr;
+  if (device.type != recordings::kUnknownDeviceType) {
+    for (const Sensor& sensor : candidates) {
+      if (sensor.device_type == device.type) named = &sensor;
+    }
+    if (named == nullptr) {
+      throw InvalidArgument(
+          fmt::format("there is no built-in preset for the recording's sensor ({}): name one with "
+                      "option sensor",
+                      recordings::device_type_name(device.type)));
+    }
+  }
+  if (named != nullptr && (!has_times || !one_sensor)) {
+    choice.sensor = *named;
+    choice.chosen_by = ChosenBy::file;
+    choice.words = "named by the file";
+    return choice;
+  }
+  if (!has_times) return choose_without_times(source, reading, candidates, shots, progress);
+  if (one_sensor) shots = first_shots(source, reading, candidates, progress);
+  if (!are_possible(shots, candidates, choice)) {
+    choice.sensor = named != nullptr ? *named : sensors::load_sensor(kUsualSensor);
+    if (named != nullptr) choice.chosen_by = ChosenBy::file;
+    return choice;
+  }
+  if (named != nullptr && !device.type_inferred) {
+    const int lines = choice.lines;
+    choice = choose_by_name(shots, *named, candidates);
+    choice.lines = lines;
+    return choice;
+  }
+  const auto found = recognised(shots, candidates);
+  if (found && found->decided) {
+    take(*found, candidates, choice);
+    choice.chosen_by = ChosenBy::scan;
+    choice.words = "recognised from the scan: " + comparison(choice.misfits);
+    try_variants(shots, choice);
+  } else if (named != nullptr) {
+    choice.sensor = *named;
+    choice.chosen_by = ChosenBy::file;
+    choice.words = "by the rates, tags and returns of the file";
+  } else {
+    guess(shots, found, candidates, choice);
+  }
+  return choice;
+}
+
 }  // namespace
 
 std::string sensor_name(const recordings::RecordingHeader& header) {
@@ -293,7 +432,7 @@ std::string to_string(ChosenBy chosen_by) {
 AngleSeries first_second(const recordings::Source& source, const recordings::ReadOptions& options,
                          const Progress& progress) {
   // One shot a second, and all of the head.
-  estimation::ShotSelector selector({.rate = 1.0, .ranges = false, .rows = false});
+  estimation::ShotSelector selector({.rate = 1.0, .ranges = true, .rows = false});
   try {
     const auto reader = recordings::open_recording(source, options, progress);
     recordings::Chunk chunk;
@@ -321,57 +460,31 @@ std::optional<Sensor> given_sensor(const std::string& name_or_path) {
 SensorChoice choose_sensor(const recordings::Source& source, const recordings::ReadOptions& reading,
                            const recordings::RecordingHeader& header,
                            const std::optional<Sensor>& given, const Progress& progress) {
-  SensorChoice choice;
-  const bool has_times = header.has_times || reading.shot_rate;
-  const bool one_sensor = header.devices.size() == 1;
-  if (given) {
-    choice.sensor = *given;
-    choice.words = "as asked for" + origin_of(*given);
-    if (given->train.emitters() == 1 || !has_times || !one_sensor) return choice;
-    const FirstShots shots = first_shots(source, reading, {&*given, 1}, progress);
-    if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);
-    return choice;
-  }
-  const std::vector<Sensor> candidates = type_presets();
-  const recordings::Device& device = header.devices.front();
-  const Sensor* named = nullptr;
-  if (device.type != recordings::kUnknownDeviceType) {
-    for (const Sensor& sensor : candidates) {
-      if (sensor.device_type == device.type) named = &sensor;
-    }
-    if (named == nullptr) {
-      throw InvalidArgument(
-          fmt::format("there is no built-in preset for the recording's sensor ({}): name one with "
-                      "option sensor",
-                      recordings::device_type_name(device.type)));
-    }
-  }
-  if (named != nullptr && (!has_times || !one_sensor)) {
-    choice.sensor = *named;
-    choice.chosen_by = ChosenBy::file;
-    choice.words = "named by the file";
-    return choice;
-  }
-  if (!has_times) return choose_without_times(source, reading, candidates, progress);
-  const FirstShots shots =
-      one_sensor ? first_shots(source, reading, candidates, progress) : FirstShots{};
-  if (named != nullptr && !device.type_inferred) {
-    return choose_by_name(shots, *named, candidates);
-  }
-  const auto found = recognised(shots, candidates);
-  if (found && found->decided) {
-    take(*found, candidates, choice);
-    choice.chosen_by = ChosenBy::scan;
-    choice.words = "recognised from the scan: " + comparison(choice.misfits);
-    try_variants(shots, choice);
-  } else if (named != nullptr) {
-    choice.sensor = *named;
-    choice.chosen_by = ChosenBy::file;
-    choice.words = "by the rates, tags and returns of the file";
-  } else {
-    guess(shots, found, candidates, choice);
+  FirstShots shots;
+  SensorChoice choice = choose(source, reading, header, given, shots, progress);
+  // The reach of the specification is that on grey walls.
+  constexpr double kOnBrightWalls = 1.5;
+  const double reach = kOnBrightWalls * choice.sensor.range_maximum;
+  if (!(reach > 0) || !choice.impossible.empty() || sensor_name(choice) == "unknown") return choice;
+  choice.beyond_reach =
+      recordings::beyond_reach(shots.head.range, reach, choice.sensor.name).value_or("");
+  // What no sensor reaches the reader tells.
+  if (!choice.beyond_reach.empty() &&
+      !recordings::beyond_reach(shots.head.range, recordings::kFarthestReach, "")) {
+    choice.warnings.push_back(choice.beyond_reach);
   }
   return choice;
+}
+
+void require_possible(const SensorChoice& choice, const std::string& recording) {
+  if (!choice.impossible.empty()) throw FileError(recording, {}, choice.impossible);
+  const int emitters = choice.sensor.train.emitters();
+  if (choice.lines <= emitters) return;
+  throw InvalidArgument(fmt::format(
+      "{} names {} lines of emitters, but {} ({}) has {} emitter{}: option sensor names the sensor "
+      "that made it",
+      recording, choice.lines, choice.sensor.name, choice.words, emitters,
+      emitters == 1 ? "" : "s"));
 }
 
 std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {

@@ -4,15 +4,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/bags/bag.hpp"
+#include "risley/io/file_head.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/memory_reader.hpp"
@@ -45,24 +43,20 @@ std::string shown(std::string_view head) {
 }
 
 std::string read_head(const std::string& path) {
-  namespace fs = std::filesystem;
-  std::error_code code;
-  const fs::file_status status = fs::status(path, code);
-  if (status.type() == fs::file_type::not_found) throw FileError(path, {}, "no such file");
-  if (status.type() != fs::file_type::regular) {
-    throw FileError(path, {}, "is not a regular file, expected a recording");
-  }
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw FileError(path, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
-  std::string head(kHeadBytes, '\0');
-  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
-  if (stream.bad()) throw FileError(path, {}, "cannot be read");
-  head.resize(static_cast<std::size_t>(stream.gcount()));
+  std::string head = io::read_file_head(path, kHeadBytes, "a recording");
   if (head.empty()) {
     throw FileError(path, {0, {}},
                     fmt::format("is empty, expected a recording ({})", known_formats()));
   }
   return head;
+}
+
+/// @throws FileError with what a file of no known kind is
+[[noreturn]] void refuse_unknown(const std::string& path, std::string_view head,
+                                 const std::string& expected) {
+  const auto other = io::stands_for_another(path, head);
+  throw FileError(path, {0, {}},
+                  other ? *other : fmt::format("{}; it begins with {}", expected, shown(head)));
 }
 
 /// The file that tells the kind of a recording: itself, or the first of a folder of bags.
@@ -75,15 +69,12 @@ std::string told_by(const std::string& path) {
 std::unique_ptr<Reader> open_as_it_is(const std::string& path, const Progress& progress) {
   const std::string first = told_by(path), head = read_head(first);
   if (first != path && !bags::bag_kind(head)) {
-    throw FileError(first, {0, {}},
-                    fmt::format("is not a ROS 2 bag; it begins with {}", shown(head)));
+    refuse_unknown(first, head, "is not a ROS 2 bag");
   }
   for (const Format* format : all_formats()) {
     if (format->recognises(head)) return format->open(path, progress);
   }
-  throw FileError(path, {0, {}},
-                  fmt::format("is of no known kind: expected {}; it begins with {}",
-                              known_formats(), shown(head)));
+  refuse_unknown(path, head, fmt::format("is of no known kind: expected {}", known_formats()));
 }
 
 }  // namespace
@@ -97,7 +88,7 @@ std::unique_ptr<Reader> open_recording(const Source& source, const ReadOptions& 
   if (options.shot_rate) reader = with_counted_times(std::move(reader), path, options);
   if (options.packet_places) reader = with_packet_places(std::move(reader), options);
   if (options.extrinsics) reader = in_sensor_frame(std::move(reader), *options.extrinsics);
-  return within_time_span(std::move(reader), path);
+  return with_plausibility(within_time_span(std::move(reader), path));
 }
 
 bool is_recording_folder(const std::string& path) { return bags::is_bag_folder(path); }

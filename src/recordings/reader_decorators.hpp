@@ -58,4 +58,7 @@ std::unique_ptr<Reader> in_sensor_frame(std::unique_ptr<Reader> reader, const Ex
 /// @param path  for errors
 std::unique_ptr<Reader> within_time_span(std::unique_ptr<Reader> reader, const std::string& path);
 
+/// Warns where the first shots cannot be those of a sensor in its own frame, see plausibility.hpp.
+std::unique_ptr<Reader> with_plausibility(std::unique_ptr<Reader> reader);
+
 }  // namespace risley::recordings

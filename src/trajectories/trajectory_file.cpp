@@ -3,10 +3,7 @@
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 
 #include <fmt/format.h>
@@ -14,6 +11,7 @@
 #include "risley/bags/bag.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
+#include "risley/io/file_head.hpp"
 
 #include "trajectories/formats/format.hpp"
 #include "trajectories/formats/ros_bag.hpp"
@@ -24,8 +22,15 @@ namespace {
 /// In the order in which they are tried.
 const std::vector<const Format*>& formats() {
   static const std::vector<const Format*> all{
-      &kInertialExplorerFormat, &kPospacFormat, &kRtklibFormat, &kNamedCsvFormat,
-      &kOpenmmsFormat,          &kTumFormat,    &kRosBagFormat, &kSbetFormat,
+      &kInertialExplorerFormat,
+      &kPospacFormat,
+      &kRtklibFormat,
+      &kNamedCsvFormat,
+      &kOpenmmsFormat,
+      &kTumFormat,
+      &kKittiFormat,
+      &kRosBagFormat,
+      &kSbetFormat,
   };
   return all;
 }
@@ -33,7 +38,7 @@ const std::vector<const Format*>& formats() {
 std::string known_formats() {
   std::string names;
   for (const Format* format : formats()) {
-    if (format == &kRtklibFormat) continue;
+    if (format == &kRtklibFormat || format == &kKittiFormat) continue;
     names += fmt::format("{}{}", names.empty() ? "" : ", ", format->name);
   }
   return names;
@@ -43,25 +48,15 @@ std::string known_formats() {
 FileHead read_file_head(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code code;
-  const fs::file_status status = fs::status(path, code);
-  if (status.type() == fs::file_type::not_found) throw FileError(path, {}, "no such file");
-  if (status.type() == fs::file_type::directory) {
+  if (fs::is_directory(path, code)) {
     FileHead head = read_file_head(bags::files_of_bag_folder(path).front());
     if (kRosBagFormat.recognises(head)) return head;
     throw FileError(path, {}, "is a folder whose first file is not a ROS 2 bag");
   }
-  if (status.type() != fs::file_type::regular) {
-    throw FileError(path, {}, "is not a regular file, expected a trajectory");
-  }
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw FileError(path, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
   FileHead head;
+  head.bytes = io::read_file_head(path, kHeadBytes, "a trajectory");
   head.name = lower_case(fs::path(path).filename().string());
   head.size = fs::file_size(path, code);
-  head.bytes.resize(kHeadBytes);
-  stream.read(head.bytes.data(), static_cast<std::streamsize>(head.bytes.size()));
-  if (stream.bad()) throw FileError(path, {}, "cannot be read");
-  head.bytes.resize(static_cast<std::size_t>(stream.gcount()));
   return head;
 }
 
@@ -109,8 +104,11 @@ Trajectory load_trajectory(const std::string& path, const Progress& progress,
                     "holds accuracies (SMRMSG) and no poses; expected the SBET that belongs to it");
   }
   if (head.has_ending(".out")) return kSbetFormat.read(path, progress);  // says what is wrong
-  throw FileError(path, {0, {}},
-                  fmt::format("is not a trajectory of a known kind: expected {}", known_formats()));
+  const auto other = io::stands_for_another(path, head.bytes);
+  throw FileError(
+      path, {0, {}},
+      other ? *other
+            : fmt::format("is not a trajectory of a known kind: expected {}", known_formats()));
 }
 
 const std::vector<WritableTrajectory>& writable_trajectories() {

@@ -34,6 +34,17 @@ class NamedFormatsTest(CommandTest):
             for azimuth, zenith in cls.angles:
                 file.write(f"{azimuth:.5f};{zenith:.5f}\n")
 
+    def test_info_counts_every_warning_that_it_prints(self):
+        with open(self.folder / "mm.csv", "w", encoding="ascii") as file:
+            file.write("x,y,z\n")
+            for row in range(2000):
+                file.write(f"{7541.123 + row:.3f},{1322.5 - 3 * row % 997:.3f},{2.25 * row:.3f}\n")
+        done = self.expect(0, "info", "mm.csv")
+        printed = done.stderr.count("warning: ")
+        self.assertGreaterEqual(printed, 2)  # its unit and a guess of the sensor
+        self.assertRegex(done.stdout, rf"(?m)^warnings +{printed}$")
+        self.assertEqual(len(self.expect_json(0, "info", "mm.csv")["warnings"]), printed)
+
     def test_info_works_without_times(self):
         info = self.expect_json(0, "info", "angles.csv")
         self.assertEqual(info["format"], "named-csv")

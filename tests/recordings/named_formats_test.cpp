@@ -451,6 +451,53 @@ TEST(Ply, TextAndBothByteOrders) {
   }
 }
 
+TEST(Ply, ListsOfVerticesAreSteppedOver) {
+  const Scene scene;
+  // A list before, between and behind what is used, of one to three numbers.
+  const auto header = [](const char* format) {
+    return fmt::format(
+        "ply\nformat {} 1.0\nelement vertex {}\nproperty list uchar uint view\nproperty double x\n"
+        "property double y\nproperty list ushort float weights\nproperty double z\n"
+        "property uchar scalar_Intensity\nproperty list uchar uchar marks\nend_header\n",
+        format, Scene::kRows);
+  };
+  std::string text = header("ascii");
+  std::string little = header("binary_little_endian"), big = header("binary_big_endian");
+  for (std::size_t i = 0; i < Scene::kRows; ++i) {
+    const auto& p = scene.points[i];
+    const std::size_t count = i % 3 + 1;
+    text += i % 2 == 0 ? "2 7 8 " : "0 ";
+    text += fmt::format("{:.6f} {:.6f} {}{} {:.6f} {} 1 9\n", p[0], p[1], count,
+                        std::string(" 0.5 0.5 0.5").substr(0, 4 * count), p[2], scene.intensity[i]);
+    for (const bool is_big : {false, true}) {
+      std::string& bytes = is_big ? big : little;
+      const auto add = [&](double value, char kind, std::size_t size) {
+        bytes += number_bytes(value, kind, size, is_big);
+      };
+      add(i % 2 == 0 ? 2 : 0, 'u', 1);
+      for (std::size_t k = 0; i % 2 == 0 && k < 2; ++k) add(7, 'u', 4);
+      add(p[0], 'f', 8);
+      add(p[1], 'f', 8);
+      add(static_cast<double>(count), 'u', 2);
+      for (std::size_t k = 0; k < count; ++k) add(0.5, 'f', 4);
+      add(p[2], 'f', 8);
+      add(scene.intensity[i], 'u', 1);
+      add(1, 'u', 1);
+      add(9, 'u', 1);
+    }
+  }
+  expect_scene(read_text(kPlyFormat, text));
+  expect_scene(read_text(kPlyFormat, little));
+  expect_scene(read_text(kPlyFormat, big));
+  const Outcome cut = read_text(kPlyFormat, little.substr(0, little.size() - 5));
+  EXPECT_TRUE(cut.error);
+  EXPECT_EQ(cut.rows().size(), Scene::kRows - 1);
+  const Outcome longer = read_text(kPlyFormat, text.substr(0, text.size() - 3) + "3 9\n");
+  ASSERT_TRUE(longer.error);
+  EXPECT_EQ(longer.rows().size(), Scene::kRows - 1);
+  EXPECT_EQ(longer.error->place().line, Scene::kRows + 11);
+}
+
 TEST(Ply, RefusesDamagedHeaders) {
   const std::string good = ply_header("binary_little_endian", "float");
   const auto with = [&good](const std::string& from, const std::string& to) {
@@ -461,7 +508,6 @@ TEST(Ply, RefusesDamagedHeaders) {
   EXPECT_THAT(with("element vertex 1500", "element vertex -1"), HasSubstr("whole number"));
   EXPECT_THAT(with("element vertex", "element points"), HasSubstr("vertex"));
   EXPECT_THAT(with("property float x", "property quad x"), HasSubstr("quad"));
-  EXPECT_THAT(with("property float x", "property list uchar float x"), HasSubstr("list"));
   EXPECT_THAT(with("binary_little_endian", "binary"), HasSubstr("ascii"));
   EXPECT_THAT(with("end_header\n", "end"), HasSubstr("end of the file"));
   EXPECT_THAT(with("element camera 1", "element camera 9000000000000000000"),
@@ -643,6 +689,30 @@ TEST(Npz, StoredDeflatedAndZip64) {
           npy("'<f4'", "(1500, 3)", scene_bytes(scene, true, 'f', 4, 1.0, false, false), true));
       expect_scene(read_text(kNpzFormat, zip(members, deflate_them, zip64)));
     }
+  }
+}
+
+TEST(Npz, TimesOfAnArrayOfTheirOwnAreUsed) {
+  const Scene scene;
+  std::string times;
+  for (std::size_t i = 0; i < Scene::kRows; ++i) {
+    times += number_bytes(1.6e9 + 1e-5 * static_cast<double>(i), 'f', 8, false);
+  }
+  for (const char* name : {"timestamps", "times", "ts", "stamps", "timestamp", "t"}) {
+    SCOPED_TRACE(name);
+    const Outcome outcome = read_text(
+        kNpzFormat, zip({{"points.npy", npy("'<f8'", "(1500, 3)",
+                                            scene_bytes(scene, false, 'f', 8, 1.0, false, false))},
+                         {std::string(name) + ".npy",
+                          npy("'<f8'", name[0] == 't' ? "(1500,)" : "(1500, 1)", times)},
+                         {"intensities.npy", npy("'|u1'", "(1500,)", std::string(1500, '\7'))}},
+                        false));
+    ASSERT_FALSE(outcome.error);
+    EXPECT_TRUE(outcome.recording.header.has_times);
+    ASSERT_EQ(outcome.rows().size(), Scene::kRows);
+    EXPECT_NEAR(static_cast<double>(outcome.rows().time_ns[1000] - outcome.rows().time_ns[0]), 1e7,
+                500);
+    EXPECT_EQ(outcome.rows().intensity[3], 7);
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Inertial Explorer, POSPac, OpenMMS, named CSV, TUM and RTKLIB.
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -492,6 +493,174 @@ TEST(Tum, BodiesAreForwardLeftUp) {
   EXPECT_NEAR(t.attitude[1].norm(), 1, 1e-15);
   EXPECT_EQ(t.velocity_frame->name, "none");
   EXPECT_EQ(read("0.1 1 2 3 0 0 0 1\n0.2 1 2 3 0 0 0 1\n").time_scale, TimeScale::unknown);
+}
+
+/// A drive along x that turns by 0.02 rad a record, upright; w first or last.
+std::string tum_drive(const std::string& head, bool w_first) {
+  std::string text = head;
+  for (int i = 0; i < 40; ++i) {
+    const double half = 0.01 * i, w = std::cos(half), z = std::sin(half);
+    text += fmt::format("{:.2f} {:.2f} 0 0 ", 1.7e9 + 0.05 * i, 0.05 * i);
+    text += w_first ? fmt::format("{:.9f} 0 0 {:.9f}\n", w, z)
+                    : fmt::format("0 0 {:.9f} {:.9f}\n", z, w);
+  }
+  return text;
+}
+
+TEST(Tum, TheHeaderDecidesTheOrderOfTheQuaternion) {
+  const Trajectory wanted = read(tum_drive("", false));
+  EXPECT_THAT(wanted.warnings, IsEmpty());
+  for (const char* head :
+       {"# timestamp tx ty tz qw qx qy qz\n", "#time, x, y, z, q_w, q_x, q_y, q_z\n",
+        "# made by hand\n# TIME X Y Z QW QX QY QZ\n", "timestamp x y z qw qx qy qz\n"}) {
+    const Trajectory t = read(tum_drive(head, true));
+    EXPECT_THAT(t.warnings, IsEmpty());
+    ASSERT_EQ(t.size(), wanted.size());
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      EXPECT_LT(t.attitude[i].angularDistance(wanted.attitude[i]), 1e-8) << head;
+    }
+  }
+  // Without one, a body that lies on its back says so.
+  const Trajectory t = read(tum_drive("", true));
+  ASSERT_EQ(t.warnings.size(), 1U);
+  EXPECT_THAT(t.warnings[0].message, HasSubstr("qw qx qy qz"));
+  EXPECT_THAT(read(tum_drive("# timestamp tx ty tz qx qy qz qw\n", true)).warnings, IsEmpty());
+}
+
+TEST(Tum, DecimalCommasAndUtf16) {
+  const std::string text = tum_drive("# timestamp tx ty tz qw qx qy qz\n", true);
+  std::string commas = text, wide = "\xFF\xFE";
+  std::replace(commas.begin(), commas.end(), '.', ',');
+  for (const char c : commas) wide += {c, '\0'};
+  const Trajectory wanted = read(text);
+  for (const std::string& other : {commas, wide}) {
+    const Trajectory t = read(other);
+    ASSERT_EQ(t.size(), wanted.size());
+    EXPECT_EQ(t.time_ns, wanted.time_ns);
+    EXPECT_EQ(t.position, wanted.position);
+  }
+}
+
+TEST(TrajectoryCsv, EurocIsRead) {
+  const Trajectory wanted = read(tum_drive("", false));
+  for (const char* names :
+       {"#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],"
+        "q_RS_z []",
+        "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+        "q_RS_z []"}) {
+    std::string text = std::string(names) + "\n";
+    for (int i = 0; i < 40; ++i) {
+      const double half = 0.01 * i;
+      text += fmt::format("{},{:.2f},0,0,{:.9f},0,0,{:.9f}\n",
+                          1'700'000'000'000'000'000 + 50'000'000LL * i, 0.05 * i, std::cos(half),
+                          std::sin(half));
+    }
+    const Trajectory t = read(text, "data.csv");
+    EXPECT_EQ(t.format, "trajectory-csv");
+    ASSERT_EQ(t.size(), wanted.size());
+    EXPECT_EQ(t.time_ns, wanted.time_ns);
+    EXPECT_EQ(t.position, wanted.position);
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      EXPECT_LT(t.attitude[i].angularDistance(wanted.attitude[i]), 1e-8);
+    }
+  }
+}
+
+TEST(TrajectoryCsv, NamesWithUnitsInBrackets) {
+  const std::string rows =
+      "400825.000;47.0;8.5;480.0;1.9;-0.2;359.5\n400825.050;47.00000225;8.5;480.0;1.8;-0.3;359.5\n";
+  const std::string good =
+      "Timestamp [s];Lat [deg];Lon [deg];Ellipsoidal height [m];Roll [deg];Pitch [deg];Heading "
+      "[deg]\n";
+  const Trajectory t = read(good + rows, "ins.csv");
+  ASSERT_EQ(t.size(), 2U);
+  EXPECT_EQ(t.frame, Frame::geocentric);
+  EXPECT_EQ(t.time_ns[0], 400'825'000'000'000);
+  EXPECT_EQ(read(replaced(good, "Timestamp [s]", "Timestamp (s)") + rows, "ins.csv").size(), 2U);
+  // What may be one thing or another is not guessed.
+  const std::string yaw = replaced(good, "Heading", "Yaw"),
+                    altitude = replaced(good, "Ellipsoidal height", "Alt");
+  EXPECT_THAT(fault(yaw + rows, "ins.csv"), HasSubstr("heading_deg"));
+  EXPECT_THAT(fault(altitude + rows, "ins.csv"), HasSubstr("ellipsoidal_height_m"));
+  EXPECT_THAT(fault(replaced(yaw, "Ellipsoidal height", "Alt") + rows, "ins.csv"),
+              AllOf(HasSubstr("heading_deg"), HasSubstr("ellipsoidal_height_m")));
+}
+
+TEST(Kitti, IsRefusedBecauseItHasNoTimes) {
+  const std::string text = "1 0 0 0.0 0 1 0 0 0 0 1 0\n0 -1 0 0.05 1 0 0 0 0 0 1 0\n";
+  EXPECT_THAT(fault(text), AllOf(HasSubstr("KITTI"), HasSubstr("time x y z qx qy qz qw")));
+  EXPECT_THAT(fault(replaced(text, "0 -1 0 0.05", "0 -2 0 0.05")), HasSubstr("known kind"));
+}
+
+TEST(InertialExplorer, TheDateDecidesBetweenSecondsOfDayAndOfWeek) {
+  // 2023-11-16 is a Thursday, day 4 of GPS week 2288.
+  const auto text = [](const std::string& unit, const std::vector<std::string>& days,
+                       const std::vector<double>& times) {
+    std::string all =
+        "Program: Inertial Explorer Version 8.90\n\n"
+        "   Date   GPSTime   Latitude  Longitude  H-Ell   Roll  Pitch  Heading\n  " +
+        unit + "     (sec)      (deg)      (deg)    (m)  (deg)  (deg)    (deg)\n";
+    for (std::size_t i = 0; i < days.size(); ++i) {
+      all += fmt::format("  {}  {:.2f}  47.0  8.5  480.0  1.9  -0.2  0.5\n", days[i], times[i]);
+    }
+    return all;
+  };
+  struct Case {
+    std::string unit;
+    std::vector<std::string> days;
+    std::vector<double> times, wanted;
+  };
+  for (const auto& [unit, days, times, wanted] : {
+           Case{"(YMD)", {"2023/11/16", "2023/11/16"}, {55225.0, 55225.05}, {400825.0, 400825.05}},
+           Case{
+               "(YMD)", {"2023-11-16", "2023-11-16"}, {400825.0, 400825.05}, {400825.0, 400825.05}},
+           Case{"(MDY)", {"11/16/2023", "11/16/2023"}, {55225.0, 55225.05}, {400825.0, 400825.05}},
+           Case{"     ", {"2023/11/16", "2023/11/16"}, {55225.0, 55225.05}, {400825.0, 400825.05}},
+           Case{"(DMY)", {"16.11.2023", "16.11.2023"}, {55225.0, 55225.05}, {400825.0, 400825.05}},
+           // Over midnight, and over the end of the week.
+           Case{"(YMD)", {"2023/11/16", "2023/11/17"}, {86399.95, 0.0}, {431999.95, 432000.0}},
+           Case{"(YMD)", {"2023/11/18", "2023/11/19"}, {86399.95, 0.0}, {604799.95, 604800.0}},
+           Case{"(YMD)", {"2023/11/18", "2023/11/19"}, {604799.95, 0.0}, {604799.95, 604800.0}},
+           // On a Sunday both are the same, until it ends.
+           Case{"(YMD)", {"2023/11/12", "2023/11/12"}, {100.0, 100.05}, {100.0, 100.05}},
+           Case{"(YMD)", {"2023/11/12", "2023/11/13"}, {86399.95, 0.0}, {86399.95, 86400.0}},
+           Case{"(YMD)", {"2023/11/12", "2023/11/13"}, {86399.95, 86400.0}, {86399.95, 86400.0}},
+       }) {
+    SCOPED_TRACE(days[1] + " " + fmt::to_string(times[1]));
+    const Trajectory t = read(text(unit, days, times));
+    ASSERT_EQ(t.size(), 2U);
+    EXPECT_EQ(t.time_scale, TimeScale::gps_second_of_week);
+    EXPECT_EQ(t.gps_week, 2288);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_NEAR(1e-9 * static_cast<double>(t.time_ns[i]), wanted[i], 1e-6);
+    }
+  }
+  EXPECT_THAT(fault(text("(YMD)", {"2023/11/16"}, {200'000.0})), HasSubstr("second of the day"));
+  EXPECT_THAT(fault(text("(YMD)", {"2023/13/16"}, {55225.0})), HasSubstr("line 5"));
+  EXPECT_THAT(fault(text("(MDY)", {"2023/11/16"}, {55225.0})), HasSubstr("line 5"));
+  EXPECT_THAT(fault(text("(day)", {"2023/11/16"}, {55225.0})), HasSubstr("(YMD)"));
+}
+
+TEST(InertialExplorer, ColumnsWithoutAUnit) {
+  const auto text = [](const std::string& units, const std::string& names) {
+    return "Program: Inertial Explorer Version 8.90\n\n" + names + "\n" + units +
+           "\n  400825.000   47.0        8.5   480.0     1    1.9   -0.2      0.5     3\n";
+  };
+  const std::string names =
+      "     GPSTime   Latitude  Longitude  H-Ell  Q  Roll  Pitch  Heading  NS";
+  for (const std::string units :
+       {"       (sec)      (deg)      (deg)    (m)     (deg) (deg)   (deg)    ",
+        "       (sec)      (deg)      (deg)    (m)     (deg)  (deg)    (deg)"}) {
+    const Trajectory t = read(text(units, names));
+    ASSERT_EQ(t.size(), 1U);
+    EXPECT_EQ(t.time_ns[0], 400'825'000'000'000);
+    EXPECT_NEAR(
+        degrees_from_radians(roll_pitch_heading(t.frame, t.position[0], t.attitude[0]).heading),
+        0.5, 1e-9);
+  }
+  EXPECT_THAT(
+      fault(text("       (sec)      (deg)               (m)     (deg)  (deg)    (deg)", names)),
+      HasSubstr("longitude"));
 }
 
 TEST(Tum, WhatIsNoRotationIsRefused) {

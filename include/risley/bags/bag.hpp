@@ -49,6 +49,7 @@ bool is_bag_folder(const std::string& folder);
 /// in the folder itself.
 /// @throws FileError without such a file, with the names of files that are missing, for a name that
 ///         leads out of the folder or stands twice, and for files that rosbag2 compressed
+///         where they do not lie unpacked beside
 std::vector<std::string> files_of_bag_folder(const std::string& folder);
 
 /// The messages that are known here, told by type in ROS 2 and by type's md5 in ROS 1.

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/output_file.hpp"
+#include "risley/io/text_dialect.hpp"
 
 /// @file
 /// Tables in text files: lines, fields, numbers.
@@ -24,11 +26,14 @@ namespace risley::io {
 /// recognised by.
 std::string normalized_header(std::string_view text);
 
-/// Reads a file line by line in large blocks, in constant memory.
+/// What lines are of: tables come in plain dialect (TextDialect), other text as it is.
+enum class LinesOf : std::uint8_t { text, table };
+
+/// Reads a file line by line in large blocks, in constant memory; UTF-16 as UTF-8.
 class LineReader {
  public:
   /// @throws FileError when the file is missing or cannot be read
-  explicit LineReader(const std::string& path);
+  explicit LineReader(const std::string& path, LinesOf lines_of = LinesOf::text);
 
   /// The next line without its line end (LF or CR LF) and, in line 1, without a byte order mark;
   /// it lives until the next call. false at the end of the file.
@@ -41,6 +46,7 @@ class LineReader {
 
  private:
   void refill();
+  std::size_t read_bytes(char* to, std::size_t most);
   void require_length(std::size_t length) const;
 
   std::string path_;
@@ -49,6 +55,9 @@ class LineReader {
   std::size_t begin_ = 0, end_ = 0;  ///< unread part of the buffer
   bool at_end_ = false, has_line_end_ = true;
   std::uint64_t line_number_ = 0, bytes_read_ = 0, file_size_ = 0;
+  std::optional<TextDecoder> decoder_;  ///< of what is no UTF-8
+  TextDialect dialect_;
+  std::string raw_, decoded_, plain_;  ///< bytes of the file, their text, a line in plain dialect
 };
 
 /// What is wrong with one line; its reader adds the file and the line.

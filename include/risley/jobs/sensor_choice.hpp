@@ -47,6 +47,12 @@ struct SensorChoice {
   /// The sensor and the next best one, where the shots were asked.
   std::vector<PresetMisfit> misfits;
   std::vector<std::string> warnings;
+  /// Why no sensor of these can have made it, where that shows before any is asked for: coordinates
+  /// that are none of a sensor's frame, a field of view beyond theirs. The sensor is the usual one.
+  std::string impossible;
+  std::string beyond_reach;  ///< what is wrong with ranges that the sensor cannot measure, or empty
+  int lines =
+      0;  ///< the first shots name so many (one more than the highest), 0 when not looked at
   /// Order in which its emitters fire where beams are counted.
   estimation::FiringOrder order;
   /// The recording's roll about the optical axis, rad; 0 where it is not known or small. And where
@@ -60,7 +66,8 @@ struct SensorChoice {
 /// the rotors, how far the prisms bend and emitters together. Where times are missing, those of
 /// the presets' shot rates are tried, and the answer is a guess; so is the preset with the smallest
 /// field of view that holds the shots, where that is all there is. A type that the file names and
-/// the shots contradict is kept, with a warning.
+/// the shots contradict is kept, with a warning. Before any is asked, the shots must be those of a
+/// scan.
 /// @param header  of the recording
 /// @param given   sensor that was asked for
 /// @throws FileError, InvalidArgument, Cancelled
@@ -68,6 +75,10 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
                            const recordings::RecordingHeader& header,
                            const std::optional<sensors::Sensor>& given,
                            const Progress& progress = {});
+
+/// @throws InvalidArgument when the recording names more lines than the sensor has emitters
+/// @throws FileError when no sensor can have made the recording
+void require_possible(const SensorChoice& choice, const std::string& recording);
 
 /// Commercial name of the sensor that made a recording; of several, each once.
 std::string sensor_name(const recordings::RecordingHeader& header);

@@ -143,9 +143,10 @@ struct RecordingHeader {
   /// then right in packets that lack nothing.
   int packet_shots = 0;
   bool has_range = true;
-  bool length_unit_assumed = false;  ///< whether the file does not say in which unit ranges are
   bool has_intensity = true;
   bool cartesian = false;  ///< records hold x, y, z and not angles
+  /// Nothing says in which unit coordinates or ranges stand: the likely one was taken.
+  bool length_unit_assumed = false;
   int returns_per_shot = 1;
   std::uint32_t frame_duration_ms = 50;
   /// Format-specific details a writer of the same format needs to write the same bytes again

@@ -127,10 +127,18 @@ std::optional<CapturedDatagram> CaptureFile::next() {
       return std::nullopt;
     }
     if (result != 1) {
-      throw FileError(path_, {datagram.offset, {}},
-                      fmt::format("the capture is cut off or damaged in the record that begins "
-                                  "here: {}",
-                                  ::pcap_geterr(capture_.get())));
+      const std::string_view reason = ::pcap_geterr(capture_.get());
+      // libpcap reads captures of several interfaces where all have one type of link.
+      const bool mixed = reason.find("different from") != reason.npos;
+      throw FileError(
+          path_, {datagram.offset, {}},
+          fmt::format("{}: {}{}",
+                      mixed ? "the capture holds interfaces that cannot be read together"
+                            : "the capture is cut off or damaged in the record that begins here",
+                      reason,
+                      mixed ? "; write those of the sensor into a file of their own, as `tshark -r "
+                              "IN -Y \"frame.interface_id == 0\" -w OUT` does"
+                            : ""));
     }
     position_ = static_cast<std::uint64_t>(::ftello(::pcap_file(capture_.get())));
     constexpr std::int64_t kSecond = 1'000'000'000;

@@ -31,30 +31,42 @@ double value_at(const std::uint8_t* bytes) {
   return static_cast<double>(io::load<T>(bytes));
 }
 
+template <class T>
+double swapped_value_at(const std::uint8_t* bytes) {
+  std::array<std::uint8_t, sizeof(T)> swapped;
+  std::reverse_copy(bytes, bytes + sizeof(T), swapped.begin());
+  return value_at<T>(swapped.data());
+}
+
 /// How a datatype of a PointField is read.
 struct Datatype {
   std::size_t bytes = 0;  ///< 0 for an unknown one
   double (*value)(const std::uint8_t* bytes) = nullptr;
 };
 
-Datatype datatype_of(std::uint8_t code) {
+template <class T>
+Datatype datatype(bool big_endian) {
+  return {sizeof(T), big_endian ? swapped_value_at<T> : value_at<T>};
+}
+
+Datatype datatype_of(std::uint8_t code, bool big_endian) {
   switch (code) {
     case 1:
-      return {1, value_at<std::int8_t>};
+      return datatype<std::int8_t>(big_endian);
     case 2:
-      return {1, value_at<std::uint8_t>};
+      return datatype<std::uint8_t>(big_endian);
     case 3:
-      return {2, value_at<std::int16_t>};
+      return datatype<std::int16_t>(big_endian);
     case 4:
-      return {2, value_at<std::uint16_t>};
+      return datatype<std::uint16_t>(big_endian);
     case kInt32:
-      return {4, value_at<std::int32_t>};
+      return datatype<std::int32_t>(big_endian);
     case kUint32:
-      return {4, value_at<std::uint32_t>};
+      return datatype<std::uint32_t>(big_endian);
     case kFloat32:
-      return {4, value_at<float>};
+      return datatype<float>(big_endian);
     case kFloat64:
-      return {8, value_at<double>};
+      return datatype<double>(big_endian);
     default:
       return {};
   }
@@ -93,9 +105,6 @@ double step_of(const CloudTime& time, double largest) {
 }  // namespace
 
 std::size_t count_points(const CloudLayout& layout, std::span<const std::uint8_t> data) {
-  if (layout.big_endian) {
-    throw BadMessage{"the point cloud is big-endian, expected a little-endian one"};
-  }
   if (layout.width == 0 || layout.height == 0) return 0;
   const std::uint64_t row_bytes = std::uint64_t{layout.width} * layout.point_step;
   if (layout.height > 1 && layout.row_step < row_bytes) {
@@ -123,7 +132,7 @@ CloudField find_field(const CloudLayout& layout, std::initializer_list<std::stri
   };
   const auto field = std::find_if(layout.fields.begin(), layout.fields.end(), is_meant);
   if (field == layout.fields.end()) return {};
-  const Datatype type = datatype_of(field->datatype);
+  const Datatype type = datatype_of(field->datatype, layout.big_endian);
   if (type.bytes == 0) {
     throw BadMessage{fmt::format("expected a datatype in [1, 8] for the field {}, found {}",
                                  field->name, field->datatype)};

@@ -23,8 +23,6 @@ namespace las {
 namespace {
 
 constexpr std::size_t kPointsLookedAt = 8192;
-constexpr double kFarthest = 10e3;  // none of these sensors sees a twentieth of it
-constexpr std::string_view kAxes = "xyz";
 
 /// Whether a point is a further return of the shot of the point before it.
 bool is_further_return(const Point& point, const Point& before) {
@@ -50,7 +48,6 @@ class LasReader final : public Reader {
       const std::uint8_t returns = std::max(point.return_number, point.number_of_returns);
       header_.returns_per_shot = std::max<int>(header_.returns_per_shot, returns);
     }
-    warn_of_maps();
   }
 
   bool read(Chunk& chunk, std::size_t max_rows) override {
@@ -183,12 +180,51 @@ class LasReader final : public Reader {
                            times == 1 ? fmt::format("have {} s", first) : "share one"));
       return;
     }
-    if (adjusted) header_.time_reference = TimeReference::utc;
+    const bool fit = times_fit(adjusted);
+    if (adjusted && fit) header_.time_reference = TimeReference::utc;
     if (backwards > 0) {
       warn({}, fmt::format("GPS times go back {} times in the first {} shots: the points are not "
                            "in the order of firing, which an estimation needs",
                            backwards, shots));
     }
+  }
+
+  /// Whether the times of the first points can be what the header says they are; says what they may
+  /// be instead. Times that cannot are kept as they are, without an origin.
+  bool times_fit(bool adjusted) {
+    constexpr double kWeek = 604'800, kOther = 1e9;  // s
+    const auto [first, last] =
+        std::minmax_element(ahead_.begin(), ahead_.end(),
+                            [](const Point& a, const Point& b) { return a.gps_time < b.gps_time; });
+    if (first == ahead_.end()) return true;
+    const double low = first->gps_time, high = last->gps_time;
+    constexpr double kUnix = 1.55e9;  // GPS time comes so far in 2029
+    const char* const counted_since = low >= kUnix ? "Unix time" : "GPS time that is not adjusted";
+    std::string found;
+    if (adjusted && low >= 0 && high <= kWeek) {
+      found =
+          "the header says that times are adjusted GPS time, which would be of September 2011; "
+          "they "
+          "look like seconds of the GPS week: clear bit 0 of the global encoding";
+    } else if (adjusted && low >= kOther) {
+      found = fmt::format(
+          "the header says that times are adjusted GPS time, which would be of 2043 or later; they "
+          "look like {}: subtract 1e9 s from GPS time, and write it so",
+          counted_since);
+    } else if (!adjusted && low > kWeek) {
+      found = fmt::format(
+          "the header says that times are seconds of the GPS week, of which there are 604800; they "
+          "look like {}",
+          low < kOther ? "adjusted GPS time: set bit 0 of the global encoding"
+                       : fmt::format("{}: subtract 1e9 s from GPS time, and set bit 0 of the "
+                                     "global encoding",
+                                     counted_since));
+    }
+    if (found.empty()) return true;
+    warn({}, fmt::format("GPS times of {:.3f} to {:.3f} s do not fit the header: {}. They are read "
+                         "as they are, without an origin",
+                         low, high, found));
+    return false;
   }
 
   void learn_intensity() {
@@ -205,23 +241,6 @@ class LasReader final : public Reader {
     intensity_divisor_ = all_257 && !all_256 ? kIntensityFactor + 1 : kIntensityFactor;
   }
 
-  void warn_of_maps() {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (std::abs(file_.offset[axis]) > kFarthest) {
-        warn_of_map(fmt::format("the offset of {} is {} m", kAxes[axis], file_.offset[axis]));
-        return;
-      }
-    }
-  }
-
-  void warn_of_map(const std::string& reason) {
-    map_reported_ = true;
-    warn({},
-         fmt::format("points must be in the frame of the sensor, with the sensor at the origin; "
-                     "these look like map coordinates: {}. Export them without georeferencing",
-                     reason));
-  }
-
   void set_row(Observations& rows, std::size_t row, const Point& point) {
     const bool further = row_ > 0 && is_further_return(point, last_);
     rows.time_ns[row] = header_.has_times ? time_ns(point) : next_shot_ - (further ? 1 : 0);
@@ -232,9 +251,6 @@ class LasReader final : public Reader {
     rows.tag[row] = point.tag;
     rows.beam[row] = point.beam;
     rows.device[row] = 0;
-    if (rows.range[row] > kFarthest && !map_reported_) {
-      warn_of_map(fmt::format("point {} is {:.0f} m from the origin", row_ + 1, rows.range[row]));
-    }
     last_ = point;
     ++row_;
   }
@@ -269,7 +285,7 @@ class LasReader final : public Reader {
   std::optional<FileError> pending_;
   double step_ = 0;  ///< m
   unsigned intensity_divisor_ = 1;
-  bool map_reported_ = false, intensity_reported_ = false;
+  bool intensity_reported_ = false;
   Point last_;
   std::uint64_t row_ = 0;
   std::int64_t next_shot_ = 0;

@@ -98,9 +98,12 @@ NamedColumns::Role NamedColumns::role_of(std::string_view base) {
       {Role::azimuth, {"azimuth", "phi", "yaw"}},
       {Role::zenith, {"zenith", "theta"}},
       {Role::elevation, {"elevation", "pitch", "altitude"}},
-      {Role::time, {"time", "timestamp", "time_stamp", "t", "offset_time", "gps_time", "gpstime"}},
+      {Role::time,
+       {"time", "timestamp", "time_stamp", "t", "ts", "stamp", "offset_time", "gps_time",
+        "gpstime"}},
       {Role::index, {"index", "shot", "shot_number", "row"}},
-      {Role::intensity, {"intensity", "reflectivity", "reflectance", "i"}},
+      {Role::intensity,
+       {"intensity", "intensities", "reflectivity", "reflectivities", "reflectance", "i"}},
       {Role::return_number, {"return_number", "returnnumber", "return", "returnnum"}},
       {Role::tag, {"tag"}},
       {Role::beam, {"line", "beam", "ring", "laser_id", "laserid"}},
@@ -110,7 +113,9 @@ NamedColumns::Role NamedColumns::role_of(std::string_view base) {
       return named.role;
     }
   }
-  return Role::none;
+  // Arrays of many are often called by their plural.
+  const bool plural = base.size() > 2 && base.ends_with('s');
+  return plural ? role_of(base.substr(0, base.size() - 1)) : Role::none;
 }
 
 NamedColumns::Meaning NamedColumns::meaning_of(std::string_view name) {
@@ -208,11 +213,12 @@ void NamedColumns::look_at(std::span<const Decimal> cells) {
   for (Source& source : sources_) source.samples.push_back(cells[source.cell]);
 }
 
-double NamedColumns::length_unit(std::initializer_list<Role> roles, bool& assumed,
+double NamedColumns::length_unit(std::initializer_list<Role> roles, RecordingHeader& header,
                                  std::vector<std::string>& warnings) const {
   std::optional<Unit> unit;
   std::size_t with_unit = 0;
-  bool whole = true, large = false;
+  bool whole = true;
+  double largest = 0;
   for (const Role role : roles) {
     const Source& source = *find(role);
     if (source.meaning.unit) {
@@ -225,20 +231,24 @@ double NamedColumns::length_unit(std::initializer_list<Role> roles, bool& assume
     }
     const auto [low, high] = extent(source.samples);
     whole = whole && all_whole(source.samples);
-    large = large || std::fmax(-low, high) > 1000.0;
+    largest = std::fmax(largest, std::fmax(-low, high));
   }
   if (with_unit == roles.size()) return unit->per_si;
   if (with_unit > 0) {
     throw BadColumns{
         fmt::format("expected a unit for all of the columns {} or for none", names_of(roles))};
   }
-  assumed = true;
-  if (!(whole && large)) return 1.0;
-  warnings.push_back(
-      fmt::format("the columns {} have no unit and hold whole numbers above 1000: they were taken "
-                  "as millimetres; state the unit in their names, as in x_m or x_mm",
-                  names_of(roles)));
-  return 1000.0;
+  constexpr double kFewMetres = 20.0, kMillimetres = 1000.0;
+  header.length_unit_assumed = true;
+  if (!whole || largest < kFewMetres) return 1.0;
+  const bool large = largest > kMillimetres;
+  warnings.push_back(fmt::format(
+      "the columns {} have no unit and hold whole numbers up to {}: they were taken as "
+      "{}, so that the largest is {:.4g} m ({:.4g} m if they are centimetres); state the "
+      "unit in their names, as in {}_m, _cm or _mm",
+      names_of(roles), largest, large ? "millimetres" : "metres",
+      large ? largest / 1000.0 : largest, largest / 100.0, names_of({*roles.begin()})));
+  return large ? 1000.0 : 1.0;
 }
 
 double NamedColumns::angle_unit(const Source& source) const {
@@ -416,7 +426,7 @@ void NamedColumns::settle(RecordingHeader& header, std::vector<std::string>& war
   header.devices.resize(1);
   header.devices.front().type = kUnknownDeviceType;
   if (cartesian_) {
-    length_per_m_ = length_unit({Role::x, Role::y, Role::z}, header.length_unit_assumed, warnings);
+    length_per_m_ = length_unit({Role::x, Role::y, Role::z}, header, warnings);
     length_rounding_ = rounding({Role::x, Role::y, Role::z});
   } else {
     const Role zenith = find(Role::zenith) != nullptr ? Role::zenith : Role::elevation;
@@ -425,7 +435,7 @@ void NamedColumns::settle(RecordingHeader& header, std::vector<std::string>& war
     azimuth_rounding_ = rounding({Role::azimuth});
     zenith_rounding_ = rounding({zenith});
     if (header.has_range) {
-      length_per_m_ = length_unit({Role::range}, header.length_unit_assumed, warnings);
+      length_per_m_ = length_unit({Role::range}, header, warnings);
       length_rounding_ = rounding({Role::range});
     }
   }

@@ -108,8 +108,7 @@ class NamedColumns {
   const std::string& name_of(const Source& source) const { return name(source.cell); }
   std::string names_of(std::initializer_list<Role> roles) const;
 
-  /// @param[out] assumed  whether no column names it
-  double length_unit(std::initializer_list<Role> roles, bool& assumed,
+  double length_unit(std::initializer_list<Role> roles, RecordingHeader& header,
                      std::vector<std::string>& warnings) const;
   double angle_unit(const Source& source) const;
   Rounding rounding(std::initializer_list<Role> roles) const;

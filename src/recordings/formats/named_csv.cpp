@@ -2,15 +2,17 @@
 // SPDX-License-Identifier: MIT
 // Texts with named columns in any order and unit, as scripts, CloudCompare, ParaView and
 // spreadsheets write them. Columns are separated by commas, semicolons, tabs or blanks. The header
-// line may begin with # or //, and comment lines may stand before it.
+// line may begin with # or //, and comment lines may stand before it. A line with the number of
+// rows may stand before the rows or before the names; rows behind it need no names (PTS).
 #include <algorithm>
-#include <fstream>
 #include <memory>
 #include <optional>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/file_head.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/named_text.hpp"
@@ -84,6 +86,36 @@ struct HeadLines {
   std::vector<std::string_view> lines;
 };
 
+/// The number of rows that a line states by itself.
+std::optional<std::uint64_t> stated_rows(std::string_view line) {
+  try {
+    return count_field(line, "");
+  } catch (const BadRow&) {
+    return std::nullopt;
+  }
+}
+
+/// What columns hold that follow a number of rows without names, as laser scanners export PTS.
+std::vector<std::string> pts_names(std::size_t columns) {
+  std::vector<std::string> names{"x", "y", "z", "intensity", "red", "green", "blue"};
+  constexpr std::size_t kCoordinates = 3, kWithIntensity = 4, kWithColour = 6;
+  if (columns == kWithColour) names.erase(names.begin() + kCoordinates);
+  if (columns != kCoordinates && columns != kWithIntensity && columns != names.size()) return {};
+  names.resize(columns);
+  return names;
+}
+
+bool has_directions(const TableHead& head) {
+  std::vector<NamedColumn> columns;
+  for (const std::string& name : head.layout.names) columns.push_back({name, CellType::text});
+  try {
+    const NamedColumns found(std::move(columns));
+    return true;
+  } catch (const BadColumns&) {
+    return false;
+  }
+}
+
 /// Finds the line of names: the first line that is no comment or, where that is a row of numbers,
 /// the comment before it. Names are empty when there is no such line.
 std::optional<TableHead> find_head(std::string_view bytes) {
@@ -91,12 +123,24 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   const std::vector<std::string_view> lines = HeadLines(bytes).lines;
   std::optional<std::size_t> comment;
   std::size_t at = 0;
-  for (; at < lines.size(); ++at) {
-    if (lines[at].empty()) continue;
-    if (!is_comment(lines[at])) break;
-    comment = at;
-  }
+  const auto skip_comments = [&] {
+    for (; at < lines.size(); ++at) {
+      if (lines[at].empty()) continue;
+      if (!is_comment(lines[at])) break;
+      comment = at;
+    }
+  };
   TableHead head;
+  const auto take_count = [&] {
+    const auto rows = at + 1 < lines.size() ? stated_rows(lines[at]) : std::nullopt;
+    if (!rows) return;
+    head.layout.rows = rows;
+    head.layout.rows_line = at + 1;
+    ++at;
+    skip_comments();
+  };
+  skip_comments();
+  take_count();
   const auto take_names = [&](std::size_t line) {
     const std::string_view text = without_comment_mark(lines[line]);
     head.layout.delimiter = delimiter_of(text);
@@ -120,11 +164,12 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   if (at + 1 == lines.size() && bytes.size() >= kHeadBytes) return std::nullopt;
   const auto first = row_of(at, delimiter_of(lines[at]));
   if (!all_numbers(first)) {
-    take_names(at);
-    head.layout.first_row_line = at + 2;
-    head.has_row = at + 1 < lines.size() && !is_comment(lines[at + 1]) &&
-                   row_of(at + 1, head.layout.delimiter).size() <= head.layout.names.size() &&
-                   all_numbers(row_of(at + 1, head.layout.delimiter));
+    take_names(at++);
+    take_count();
+    head.layout.first_row_line = at + 1;
+    head.has_row = at < lines.size() && !is_comment(lines[at]) &&
+                   row_of(at, head.layout.delimiter).size() <= head.layout.names.size() &&
+                   all_numbers(row_of(at, head.layout.delimiter));
     return head;
   }
   if (first.size() < 2) return std::nullopt;
@@ -134,28 +179,22 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   if (comment) {
     take_names(*comment);
     head.layout.delimiter = delimiter_of(lines[at]);
-    if (head.layout.names.size() != first.size()) head.layout.names.clear();
+    const bool other = head.layout.rows && !has_directions(head);  // a comment without names
+    if (other || head.layout.names.size() != first.size()) head.layout.names.clear();
+  }
+  if (!head.layout.names.empty() || !head.layout.rows) return head;
+  head.layout.names = pts_names(first.size());
+  if (!head.layout.names.empty()) {
+    head.layout.names_line = head.layout.rows_line;
+    head.layout.warnings.push_back(
+        fmt::format("the columns have no names: behind a number of rows they were taken as {}",
+                    fmt::join(head.layout.names, ", ")));
   }
   return head;
 }
 
-bool has_directions(const TableHead& head) {
-  std::vector<NamedColumn> columns;
-  for (const std::string& name : head.layout.names) columns.push_back({name, CellType::text});
-  try {
-    const NamedColumns found(std::move(columns));
-    return true;
-  } catch (const BadColumns&) {
-    return false;
-  }
-}
-
 NamedTextLayout read_layout(const std::string& path) {
-  std::string bytes(kHeadBytes, '\0');
-  std::ifstream stream(path, std::ios::binary);
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  const auto head = find_head(bytes);
+  const auto head = find_head(io::read_file_head(path, kHeadBytes, "a recording"));
   if (!head) {
     throw FileError(path, {.byte_offset = {}, .line = 1},
                     "expected a line with the names of the columns, found none");

@@ -17,9 +17,9 @@ NamedTextReader::NamedTextReader(const std::string& path, std::string_view forma
     : TextTableReader(path, std::string(format)),
       layout_(std::move(layout)),
       columns_(find_columns()) {
-  set_column_count(layout_.names.size(), layout_.delimiter);
+  set_column_count(layout_.names.size(), layout_.delimiter, layout_.lists);
   begin_rows_at(layout_.first_row_line);
-  if (layout_.rows) set_row_count(*layout_.rows);
+  if (layout_.rows) set_row_count(*layout_.rows, layout_.rows_line);
   look_ahead(kNamedRowsLookedAt, [&](Fields fields) {
     read_cells(fields);
     columns_.look_at(cells_);

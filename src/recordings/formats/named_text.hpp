@@ -16,10 +16,12 @@ namespace risley::recordings {
 /// Where the rows of a text stand and what its columns are called.
 struct NamedTextLayout {
   std::vector<std::string> names;
+  std::vector<bool> lists;  ///< columns of any number of fields, that first; empty without any
   char delimiter = kBlanks;
   std::uint64_t names_line = 1, first_row_line = 2;  ///< from 1
   std::optional<std::uint64_t> rows;                 ///< where the file tells their number
-  std::vector<std::string> warnings;                 ///< of what stands before the rows
+  std::uint64_t rows_line = 0;        ///< where it does so and nothing may follow them, otherwise 0
+  std::vector<std::string> warnings;  ///< of what stands before the rows
 };
 
 /// Reads rows of numbers whose columns have names.

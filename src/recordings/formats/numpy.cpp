@@ -52,7 +52,9 @@ struct Member {
   std::uint64_t begin = 0;
 
   bool is_column() const {
-    return header.shape.size() == 1 && !header.is_structured() && !header.fields.empty();
+    const bool one_wide = header.shape.size() == 2 && header.shape[1] == 1;
+    return (header.shape.size() == 1 || one_wide) && !header.is_structured() &&
+           !header.fields.empty();
   }
 };
 
@@ -136,7 +138,7 @@ BinaryTable npz_table(const std::string& path) {
       if (!member.is_column()) continue;
       const auto as_long = static_cast<std::size_t>(
           std::count_if(members.begin(), members.end(), [&](const Member& other) {
-            return other.is_column() && other.header.shape == member.header.shape;
+            return other.is_column() && other.header.shape[0] == member.header.shape[0];
           }));
       if (as_long > most) {
         most = as_long;

@@ -163,6 +163,7 @@ PcapReader::PcapReader(const std::string& path, const Progress& progress) : file
 
 void PcapReader::look_through(const Progress& progress) {
   Chunk chunk;
+  std::optional<FileError> damage;
   try {
     for (std::size_t count = 0; const auto datagram = file_.next(); ++count) {
       constexpr std::size_t kSometimes = 1024;
@@ -180,7 +181,8 @@ void PcapReader::look_through(const Progress& progress) {
         named_[datagram->from.address].firmware = *firmware;
       }
     }
-  } catch (const FileError&) {  // who reads comes to it again
+  } catch (const FileError& error) {  // who reads comes to it again
+    damage.emplace(error);
   }
   for (const Seen& seen : seen_) {
     if (seen.has_points) add_device(seen);
@@ -200,6 +202,7 @@ void PcapReader::look_through(const Progress& progress) {
     }
   }
   if (!header_.devices.empty()) return;
+  if (damage) throw FileError(*damage);
   throw FileError(file_.path(), {},
                   cut_ > 0
                       ? fmt::format("holds no whole packet of a Livox sensor of the first "

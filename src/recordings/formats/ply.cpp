@@ -1,9 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Polygon files: the vertices are shots in their order; faces and other elements are stepped over.
+// Polygon files: the vertices are shots in their order; faces and other elements are stepped over,
+// and so are lists among the properties of vertices.
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -124,18 +128,20 @@ PlyHeader read_ply_header(const std::string& path) {
       std::find_if(header.elements.begin(), header.elements.end(),
                    [](const PlyElement& element) { return element.name == "vertex"; });
   if (vertices == header.elements.end()) lines.fail("expected an element vertex, found none");
-  if (vertices->has_list()) {
-    throw FileError(path, {.byte_offset = {}, .line = vertices->line},
-                    "expected vertices of single numbers, found a list among their properties");
-  }
   header.elements.erase(vertices + 1, header.elements.end());
   return header;
 }
 
+/// The name of a column that no reader takes for a quantity.
+std::string name_of_list(const std::string& name) { return fmt::format("list {}", name); }
+
 NamedTextLayout text_layout(const PlyHeader& header) {
   NamedTextLayout layout;
   const PlyElement& vertices = header.elements.back();
-  for (const PlyProperty& property : vertices.properties) layout.names.push_back(property.name);
+  for (const PlyProperty& property : vertices.properties) {
+    layout.lists.push_back(property.length.has_value());
+    layout.names.push_back(property.length ? name_of_list(property.name) : property.name);
+  }
   layout.names_line = vertices.line;
   layout.rows = vertices.count;
   layout.first_row_line = header.data_line;
@@ -178,6 +184,64 @@ std::uint64_t end_of(const PlyElement& element, std::uint64_t offset, io::BlockI
   return offset;
 }
 
+/// The records of vertices without the lists among their properties.
+class WithoutLists final : public ByteSource {
+ public:
+  WithoutLists(std::unique_ptr<ByteSource> all, std::vector<PlyProperty> properties)
+      : all_(std::move(all)), properties_(std::move(properties)) {}
+
+  std::size_t read(std::uint8_t* bytes, std::size_t count) override {
+    std::size_t done = 0;
+    while (done < count) {
+      if (given_ == record_.size() && !next_record()) break;
+      const std::size_t piece = std::min(count - done, record_.size() - given_);
+      std::copy_n(record_.begin() + static_cast<std::ptrdiff_t>(given_), piece, bytes + done);
+      given_ += piece;
+      done += piece;
+    }
+    return done;
+  }
+  std::uint64_t file_offset() const override { return all_->file_offset(); }
+
+ private:
+  /// @return false at the end or at damage
+  bool next_record() {
+    record_.clear();
+    given_ = 0;
+    for (const PlyProperty& property : properties_) {
+      if (property.length ? take_list(property) : take_number(property)) continue;
+      record_.clear();
+      return false;
+    }
+    return true;
+  }
+
+  bool take_number(const PlyProperty& property) {
+    const std::size_t before = record_.size();
+    record_.resize(before + property.type.bytes);
+    return all_->read(record_.data() + before, property.type.bytes) == property.type.bytes;
+  }
+
+  bool take_list(const PlyProperty& property) {
+    std::array<std::uint8_t, 8> number{};
+    if (all_->read(number.data(), property.length->bytes) < property.length->bytes) return false;
+    const Decimal length = property.length->cell(number.data());
+    if (length.value < 0.0) {
+      problem_ = fmt::format("found a list of {} numbers", length.value);
+      return false;
+    }
+    // More than any file has ends with it, too.
+    const double bytes = length.value * static_cast<double>(property.type.bytes);
+    const auto wanted = static_cast<std::uint64_t>(std::min(bytes, 0x1p62));
+    return all_->skip(wanted) == wanted;
+  }
+
+  std::unique_ptr<ByteSource> all_;
+  std::vector<PlyProperty> properties_;
+  std::vector<std::uint8_t> record_;  ///< a vertex
+  std::size_t given_ = 0;             ///< of it
+};
+
 BinaryTable binary_table(const std::string& path, const PlyHeader& header) {
   io::BlockInput file(path);
   std::uint64_t begin = header.data_offset;
@@ -189,12 +253,26 @@ BinaryTable binary_table(const std::string& path, const PlyHeader& header) {
   table.rows = vertices.count;
   table.columns_offset = vertices.offset;
   std::size_t offset = 0;
+  std::string lists;
   for (const PlyProperty& property : vertices.properties) {
+    if (property.length) {
+      lists += fmt::format("{}{}", lists.empty() ? "" : ", ", property.name);
+      continue;
+    }
     table.columns.push_back({property.name, property.type, 0, offset});
     offset += property.type.bytes;
   }
-  table.lanes.push_back(
-      {[=] { return std::make_unique<FileSource>(path, begin, UINT64_MAX); }, offset});
+  if (lists.empty()) {
+    table.lanes.push_back(
+        {[=] { return std::make_unique<FileSource>(path, begin, UINT64_MAX); }, offset});
+  } else {
+    table.warnings.push_back(fmt::format("lists of the vertices were not used: {}", lists));
+    table.lanes.push_back({[=, properties = vertices.properties] {
+                             return std::make_unique<WithoutLists>(
+                                 std::make_unique<FileSource>(path, begin, UINT64_MAX), properties);
+                           },
+                           offset});
+  }
   return table;
 }
 

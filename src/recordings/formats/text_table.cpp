@@ -9,6 +9,8 @@
 namespace risley::recordings {
 namespace {
 
+constexpr std::size_t kMostListFields = 65536;  // no line is longer
+
 /// Digits after the point of a plain decimal fraction, 0 for anything else.
 int decimals_of(std::string_view field) {
   const auto point = field.find('.');
@@ -22,7 +24,7 @@ int decimals_of(std::string_view field) {
 }  // namespace
 
 TextTableReader::TextTableReader(const std::string& path, std::string format)
-    : path_(path), lines_(path) {
+    : path_(path), lines_(path, io::LinesOf::table) {
   header_.format = std::move(format);
   header_.devices.resize(1);
   std::string_view line;
@@ -45,8 +47,31 @@ void TextTableReader::refuse_header(const std::string& expected) const {
 
 bool TextTableReader::split(std::string_view line, std::span<std::string_view> fields,
                             std::size_t& count) const {
-  count = io::split_fields(line, delimiter_, fields);
-  return count == fields.size();
+  if (lists_.empty()) {
+    count = io::split_fields(line, delimiter_, fields);
+    return count == fields.size();
+  }
+  // A list counts as the field that states its length.
+  const std::vector<std::string_view> all = fields_of(line, delimiter_);
+  std::size_t at = 0;
+  for (count = 0; count < fields.size() && at < all.size(); ++count) {
+    fields[count] = all[at++];
+    if (!lists_[count]) continue;
+    at += static_cast<std::size_t>(
+        integer_field(fields[count], "list", 0, static_cast<std::int64_t>(kMostListFields)));
+  }
+  if (at == all.size()) return count == fields.size();
+  count = at < all.size() ? count + all.size() - at : count - 1;
+  return false;
+}
+
+void TextTableReader::require_no_more_rows() {
+  for (std::string_view line; lines_.next(line);) {
+    if (trimmed(line).empty()) continue;
+    fail(lines_.line_number(), fmt::format("expected the end of the rows that line {} counts, "
+                                           "found one more: \"{}\"",
+                                           all_stated_in_, printable(line)));
+  }
 }
 
 void TextTableReader::begin_rows_at(std::uint64_t line) {
@@ -68,6 +93,7 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
     std::string_view line;
     while (!finished_ && chunk.observations.size() + chunk.imu.size() < max_rows) {
       if (rows_left_ == 0U) {
+        if (all_stated_in_ > 0) require_no_more_rows();
         finished_ = true;
         break;
       }

@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -41,8 +42,8 @@ using io::trimmed;
 /// counts only when it is certainly whole: it has all fields, and the last one is a decimal
 /// fraction with as many decimals as that of the line before; otherwise it is dropped with a
 /// warning. Any other line that is not a sound row is damage: the rows before it are returned, then
-/// FileError is thrown. Where the header tells the number of rows, fewer are damage and lines
-/// behind them are not read.
+/// FileError is thrown. Where the header tells the number of rows, fewer are damage, and so are
+/// more unless the format has other things behind them, which are not read.
 class TextTableReader : public Reader {
  public:
   bool read(Chunk& chunk, std::size_t max_rows) final;
@@ -56,13 +57,20 @@ class TextTableReader : public Reader {
 
   const std::string& table_header() const { return table_header_; }  ///< normalised
   /// How a row is built; to be called once by the constructor of the derived class.
-  void set_column_count(std::size_t columns, char delimiter = ',') {
+  /// @param lists  columns of any number of fields, which their first field states; empty without
+  void set_column_count(std::size_t columns, char delimiter = ',', std::vector<bool> lists = {}) {
     fields_.resize(columns);
     delimiter_ = delimiter;
+    const bool any = std::find(lists.begin(), lists.end(), true) != lists.end();
+    if (any) lists_ = std::move(lists);
   }
   /// Steps over lines, so that the rows begin at this one (from 1).
   void begin_rows_at(std::uint64_t line);
-  void set_row_count(std::uint64_t rows) { rows_left_ = rows; }
+  /// @param stated_in  line that states them where they are all that follows, otherwise 0
+  void set_row_count(std::uint64_t rows, std::uint64_t stated_in) {
+    rows_left_ = rows;
+    all_stated_in_ = stated_in;
+  }
   /// @throws FileError at line 1: what was expected there
   [[noreturn]] void refuse_header(const std::string& expected) const;
 
@@ -81,10 +89,12 @@ class TextTableReader : public Reader {
 
  private:
   bool split(std::string_view line, std::span<std::string_view> fields, std::size_t& count) const;
+  void require_no_more_rows();
 
   char delimiter_ = ',';
+  std::vector<bool> lists_;
   std::optional<std::uint64_t> rows_left_;  ///< where the header tells the number of rows
-  std::uint64_t header_lines_ = 1;
+  std::uint64_t all_stated_in_ = 0, header_lines_ = 1;
   LineReader lines_;
   std::string table_header_;
   std::vector<std::string_view> fields_;
@@ -97,7 +107,7 @@ class TextTableReader : public Reader {
 template <class Function>
 void TextTableReader::look_ahead(std::size_t max_rows, Function&& function) const {
   try {
-    LineReader lines(path_);
+    LineReader lines(path_, io::LinesOf::table);
     std::string_view line;
     std::vector<std::string_view> fields(fields_.size());
     std::size_t count = 0;

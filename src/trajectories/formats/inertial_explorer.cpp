@@ -30,6 +30,8 @@ struct ExplorerName {
 constexpr std::array kExplorerNames{
     ExplorerName{"week", PoseField::gps_week},
     ExplorerName{"gpsweek", PoseField::gps_week},
+    ExplorerName{"date", PoseField::date},
+    ExplorerName{"gpsdate", PoseField::date},
     ExplorerName{"gpstime", PoseField::time},
     ExplorerName{"corrtime", PoseField::time},
     ExplorerName{"latitude", PoseField::latitude},
@@ -53,9 +55,15 @@ constexpr std::array kExplorerNames{
 
 constexpr std::size_t kLongestHeader = 200;  // lines
 
+/// A name or unit and where it ends in its line.
+struct ExplorerWord {
+  std::string text;
+  std::size_t end = 0;
+};
+
 /// Names or units of a line: words, of which one in parentheses may have blanks.
-std::vector<std::string> words_of_line(std::string_view line) {
-  std::vector<std::string> words;
+std::vector<ExplorerWord> placed_words(std::string_view line) {
+  std::vector<ExplorerWord> words;
   for (std::size_t i = 0; i < line.size();) {
     if (line[i] == ' ' || line[i] == '\t' || line[i] == ',') {
       ++i;
@@ -67,10 +75,39 @@ std::vector<std::string> words_of_line(std::string_view line) {
     } else {
       end = std::min(line.find_first_of(" \t,", i), line.size());
     }
-    words.push_back(lower_case(std::string(line.substr(i, end - i))));
+    words.push_back({lower_case(std::string(line.substr(i, end - i))), end});
     i = end;
   }
   return words;
+}
+
+std::vector<std::string> words_of_line(std::string_view line) {
+  std::vector<std::string> words;
+  for (ExplorerWord& word : placed_words(line)) words.push_back(std::move(word.text));
+  return words;
+}
+
+/// The units of names, one each; columns without a unit have none written. Both lines end their
+/// columns at the same places, or have commas; otherwise the units are those that are written.
+std::vector<std::string> units_of(std::string_view names_line, std::string_view units_line) {
+  const std::vector<ExplorerWord> names = placed_words(names_line);
+  const std::vector<ExplorerWord> written = placed_words(units_line);
+  std::vector<std::string> units;
+  if (written.size() >= names.size()) return words_of_line(units_line);
+  const std::vector<std::string_view> fields = io::fields_of(units_line, ',');
+  if (fields.size() == names.size()) {
+    for (const std::string_view field : fields) units.push_back(lower_case(std::string(field)));
+    return units;
+  }
+  constexpr std::size_t kApart = 2;
+  units.resize(names.size());
+  std::size_t at = 0;
+  for (const ExplorerWord& unit : written) {
+    while (at < names.size() && names[at].end + kApart < unit.end) ++at;
+    if (at == names.size() || names[at].end > unit.end + kApart) return words_of_line(units_line);
+    units[at++] = unit.text;
+  }
+  return units;
 }
 
 bool has_word(const std::vector<std::string>& words, std::string_view word) {
@@ -122,15 +159,15 @@ std::optional<double> scaling_of(std::string_view line) {
 
 ExplorerHeader read_explorer_header(const std::string& path) {
   ExplorerHeader header;
-  io::LineReader lines(path);
+  io::LineReader lines(path, io::LinesOf::table);
   std::string_view line;
   std::string before;
   bool in_scaling = false;
   while (lines.next(line) && lines.line_number() <= kLongestHeader) {
     const std::string_view text = io::trimmed(line);
-    if (!before.empty() && are_explorer_names(before, line)) {
+    if (are_explorer_names(before, line)) {
       header.names = words_of_line(before);
-      header.units = words_of_line(line);
+      header.units = units_of(before, line);
       header.names_line = lines.line_number() - 1;
       return header;
     }
@@ -154,7 +191,7 @@ ExplorerHeader read_explorer_header(const std::string& path) {
         }
       }
     }
-    before = text;
+    before = line;
   }
   throw FileError(
       path, {},
@@ -166,13 +203,23 @@ ExplorerHeader read_explorer_header(const std::string& path) {
 void set_unit(PoseColumn& column, const std::string& unit, double sign, const std::string& path,
               std::uint64_t line) {
   const auto refuse = [&](std::string_view expected) {
-    throw FileError(path, {{}, line},
-                    fmt::format("column {} has the unit {}, expected {}", column.name,
-                                io::printable(unit), expected));
+    throw FileError(
+        path, {{}, line},
+        fmt::format("column {} has {}, expected {}", column.name,
+                    unit.empty() ? "no unit" : "the unit " + io::printable(unit), expected));
   };
   switch (column.field) {
+    case PoseField::date:
+      if (unit == "(mdy)" || unit == "(m/d/y)") {
+        column.date_order = DateOrder::mdy;
+      } else if (unit == "(dmy)" || unit == "(d/m/y)") {
+        column.date_order = DateOrder::dmy;
+      } else if (!unit.empty() && unit != "(ymd)" && unit != "(y/m/d)") {
+        refuse("(YMD), (MDY) or (DMY)");
+      }
+      return;
     case PoseField::time:
-      if (unit != "(sec)" && unit != "(s)") refuse("(sec)");
+      if (!unit.empty() && unit != "(sec)" && unit != "(s)") refuse("(sec)");
       return;
     case PoseField::latitude:
     case PoseField::longitude:

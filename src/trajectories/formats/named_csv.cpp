@@ -121,33 +121,161 @@ const std::vector<std::string>& all_csv_names() {
   return all;
 }
 
+/// Other names of the same, as receivers and data sets write them.
+struct CsvAlias {
+  std::string_view written, base;
+};
+constexpr std::array kCsvAliases{
+    CsvAlias{"timestamp", "time"},
+    CsvAlias{"time_stamp", "time"},
+    CsvAlias{"t", "time"},
+    CsvAlias{"lat", "latitude"},
+    CsvAlias{"lon", "longitude"},
+    CsvAlias{"long", "longitude"},
+    CsvAlias{"lng", "longitude"},
+    CsvAlias{"ellipsoid_height", "ellipsoidal_height"},
+    CsvAlias{"tx", "x"},
+    CsvAlias{"ty", "y"},
+    CsvAlias{"tz", "z"},
+    CsvAlias{"q_x", "qx"},
+    CsvAlias{"q_y", "qy"},
+    CsvAlias{"q_z", "qz"},
+    CsvAlias{"q_w", "qw"},
+    CsvAlias{"p_rs_r_x", "x"},
+    CsvAlias{"p_rs_r_y", "y"},
+    CsvAlias{"p_rs_r_z", "z"},
+    CsvAlias{"q_rs_x", "qx"},
+    CsvAlias{"q_rs_y", "qy"},
+    CsvAlias{"q_rs_z", "qz"},
+    CsvAlias{"q_rs_w", "qw"},
+    CsvAlias{"v_rs_r_x", "velocity_x"},
+    CsvAlias{"v_rs_r_y", "velocity_y"},
+    CsvAlias{"v_rs_r_z", "velocity_z"},
+};
+constexpr std::string_view kEurocPosition = "p_rs_r_x";
+
+/// Units as they stand in brackets.
+struct CsvUnitAlias {
+  std::string_view written, suffix;
+};
+constexpr std::array kCsvUnitAliases{
+    CsvUnitAlias{"", ""},
+    CsvUnitAlias{"s", "_s"},
+    CsvUnitAlias{"sec", "_s"},
+    CsvUnitAlias{"seconds", "_s"},
+    CsvUnitAlias{"ms", "_ms"},
+    CsvUnitAlias{"us", "_us"},
+    CsvUnitAlias{"ns", "_ns"},
+    CsvUnitAlias{"deg", "_deg"},
+    CsvUnitAlias{"degrees", "_deg"},
+    CsvUnitAlias{"\xC2\xB0", "_deg"},
+    CsvUnitAlias{"rad", "_rad"},
+    CsvUnitAlias{"m", "_m"},
+    CsvUnitAlias{"m/s", "_m_per_s"},
+    CsvUnitAlias{"m s^-1", "_m_per_s"},
+};
+
+/// "Lat [deg]" as latitude_deg, "#timestamp [ns]" as time_ns; what is not known as it is, in lower
+/// case.
+std::string csv_name(std::string_view written) {
+  while (written.starts_with('#') || written.starts_with('"')) written.remove_prefix(1);
+  while (written.ends_with('"')) written.remove_suffix(1);
+  const std::string name = lower_case(std::string(io::trimmed(written)));
+  std::string base = name;
+  std::string_view suffix;
+  const auto open = name.find_first_of("[(");
+  if (open != name.npos && open > 0 && (name.ends_with(']') || name.ends_with(')'))) {
+    const std::string_view unit =
+        io::trimmed(std::string_view(name).substr(open + 1, name.size() - open - 2));
+    const auto known = std::find_if(kCsvUnitAliases.begin(), kCsvUnitAliases.end(),
+                                    [&](const CsvUnitAlias& one) { return one.written == unit; });
+    if (known == kCsvUnitAliases.end()) return name;
+    suffix = known->suffix;
+    base = io::trimmed(name.substr(0, open));
+  } else {
+    for (const CsvUnitName& unit : kCsvUnits) {
+      if (unit.suffix.size() <= suffix.size() || !name.ends_with(unit.suffix)) continue;
+      suffix = unit.suffix;
+    }
+    base.resize(name.size() - suffix.size());
+  }
+  std::replace(base.begin(), base.end(), ' ', '_');
+  for (const CsvAlias& alias : kCsvAliases) {
+    if (alias.written == base) base = alias.base;
+  }
+  return base + std::string(suffix);
+}
+
+char csv_delimiter(std::string_view header) { return header.find(',') != header.npos ? ',' : '\t'; }
+
 std::vector<std::string> header_names(std::string_view line) {
   std::vector<std::string> names;
-  for (const std::string_view field : io::fields_of(line, ',')) {
-    std::string name = lower_case(std::string(field));
-    if (name.size() > 2 && name.starts_with('"') && name.ends_with('"')) {
-      name = name.substr(1, name.size() - 2);
-    }
-    names.push_back(std::move(name));
+  for (const std::string_view field : io::fields_of(line, csv_delimiter(line))) {
+    names.push_back(csv_name(field));
+  }
+  // EuRoC counts nanoseconds, whether its header says so or not.
+  if (lower_case(std::string(line)).find(kEurocPosition) != std::string::npos) {
+    std::replace(names.begin(), names.end(), std::string("time"), std::string("time_ns"));
   }
   return names;
 }
 
-/// Two or more of a header's names are those of an attitude, or nearly so.
+/// Two or more of a header's names are those of an attitude or of a place on the globe, or nearly
+/// so.
 bool is_trajectory_csv(const FileHead& head) {
   const std::vector<std::string_view> lines = lines_of(head.bytes);
-  if (lines.empty() || lines[0].find(',') == std::string_view::npos) return false;
+  if (lines.empty()) return false;
+  const char delimiter = csv_delimiter(lines[0]);
+  if (lines.size() > 1 && !lines[1].empty() && lines[1].find(delimiter) == lines[1].npos) {
+    return false;  // names of another kind of table
+  }
   static const std::vector<std::string> kAttitude{"roll_deg", "pitch_deg", "heading_deg",
                                                   "roll_rad", "pitch_rad", "heading_rad"};
   static const std::vector<std::string> kQuaternion{"qx", "qy", "qz", "qw"};
   int found = 0;
-  for (const std::string& name : header_names(lines[0])) {
+  const std::vector<std::string> names = header_names(lines[0]);
+  // A cloud may have the place of each point, too.
+  const bool has_points = std::any_of(names.begin(), names.end(), [](const std::string& name) {
+    return name == "x" || name.starts_with("x_") || name.starts_with("range") ||
+           name.starts_with("azimuth");
+  });
+  for (const std::string& name : names) {
     const bool is_quaternion =
         std::find(kQuaternion.begin(), kQuaternion.end(), name) != kQuaternion.end();
     const bool without_unit = name == "roll" || name == "pitch" || name == "heading";
-    if (is_quaternion || without_unit || !near_miss(name, kAttitude).empty()) ++found;
+    const bool is_place =
+        !has_points && (name.starts_with("latitude") || name.starts_with("longitude"));
+    if (is_place || is_quaternion || without_unit || !near_miss(name, kAttitude).empty()) ++found;
   }
   return found >= 2;
+}
+
+/// Names that may mean one thing or another: what they would have to be called.
+void refuse_ambiguous(const std::string& path, const std::vector<PoseColumn>& columns,
+                      const std::vector<std::string>& unknown) {
+  std::vector<std::string> names, remedies;
+  const auto look_for = [&](PoseField field, std::initializer_list<std::string_view> bases,
+                            const char* remedy) {
+    if (has_field(columns, field)) return;
+    for (const std::string& name : unknown) {
+      const std::string_view base = std::string_view(name).substr(0, name.rfind('_'));
+      const bool meant = std::find(bases.begin(), bases.end(), base) != bases.end() ||
+                         std::find(bases.begin(), bases.end(), name) != bases.end();
+      if (!meant) continue;
+      names.push_back(io::printable(name));
+      remedies.emplace_back(remedy);
+      return;
+    }
+  };
+  look_for(PoseField::height, {"alt", "altitude", "height", "h", "elevation"},
+           "call a height above the ellipsoid ellipsoidal_height_m (one above the geoid has to be "
+           "converted)");
+  look_for(PoseField::heading, {"yaw", "azimuth"},
+           "call an angle that counts clockwise from north heading_deg");
+  if (names.empty() || !has_field(columns, PoseField::latitude)) return;
+  throw FileError(path, {{}, 1},
+                  fmt::format("is a trajectory, but does not say what {} is: {}",
+                              fmt::join(names, " or "), fmt::join(remedies, ", ")));
 }
 
 /// Columns by a header. @throws FileError at its line
@@ -156,6 +284,7 @@ PoseTable csv_table(const std::string& path, std::string_view header,
   const auto refuse = [&](const std::string& problem) { throw FileError(path, {{}, 1}, problem); };
   PoseTable table;
   table.first_row = 2;
+  table.delimiter = csv_delimiter(header);
   table.contents.format = "trajectory-csv";
   const CsvName* time = nullptr;
   std::vector<std::string> unknown;
@@ -182,6 +311,7 @@ PoseTable csv_table(const std::string& path, std::string_view header,
     }
     table.columns.push_back(std::move(column));
   }
+  refuse_ambiguous(path, table.columns, unknown);
   for (const std::string& name : unknown) {
     const bool lacks_unit = csv_column(name + "_deg") || csv_column(name + "_m") ||
                             csv_column(name + "_s") || csv_column(name + "_m_per_s");
@@ -260,7 +390,7 @@ Trajectory read_trajectory_csv(const std::string& path, const Progress& progress
   std::vector<TrajectoryWarning> warnings;
   PoseTable table;
   {
-    io::LineReader lines(path);
+    io::LineReader lines(path, io::LinesOf::table);
     std::string_view header;
     if (!lines.next(header)) throw FileError(path, {{}, 1}, "expected a header line");
     table = csv_table(path, header, warnings);

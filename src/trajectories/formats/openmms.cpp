@@ -65,7 +65,7 @@ Trajectory read_openmms(const std::string& path, const Progress& progress) {
                    {PoseField::velocity_1, "east velocity"},
                    {PoseField::velocity_2, "north velocity"},
                    {PoseField::velocity_3, "up velocity"}};
-  io::LineReader lines(path);
+  io::LineReader lines(path, io::LinesOf::table);
   std::string_view line;
   if (lines.next(line) && !is_openmms_row(line)) table.first_row = 2;
   return read_pose_table(path, table, progress);

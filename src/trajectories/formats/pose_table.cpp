@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -44,6 +45,32 @@ double sexagesimal_degrees(std::span<const std::string_view> fields, const std::
   return fields[0].starts_with('-') ? -size : size;
 }
 
+/// Days from the beginning of GPS time, a Sunday, to a date.
+std::int64_t gps_day(std::string_view field, const PoseColumn& column) {
+  std::string text(field);
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '/' || c == '.'; }, '-');
+  std::array<std::string_view, 3> parts;
+  if (io::split_fields(text, '-', parts) == parts.size()) {
+    const std::size_t year_at = column.date_order == DateOrder::ymd ? 0 : 2;
+    const std::size_t month_at = column.date_order == DateOrder::mdy ? 0 : 1;
+    const std::size_t day_at = 3 - year_at - month_at;
+    const auto number = [&](std::size_t at, std::int64_t low, std::int64_t high) {
+      return io::integer_field(parts[at], column.name, low, high);
+    };
+    using namespace std::chrono;
+    const year_month_day date{year(static_cast<int>(number(year_at, 1980, 2200))),
+                              month(static_cast<unsigned>(number(month_at, 1, 12))),
+                              std::chrono::day(static_cast<unsigned>(number(day_at, 1, 31)))};
+    constexpr sys_days kFirst = year(1980) / 1 / 6;
+    if (date.ok() && sys_days(date) >= kFirst) return (sys_days(date) - kFirst).count();
+  }
+  constexpr std::array kOrders{"year/month/day", "month/day/year", "day/month/year"};
+  throw BadRow{fmt::format("expected a date {} since 1980 in column {}, found \"{}\"",
+                           kOrders[static_cast<std::size_t>(column.date_order)], column.name,
+                           io::printable(field))};
+}
+
 /// Digits behind the point of a field.
 std::size_t decimals_in(std::string_view field) {
   const auto point = field.find('.');
@@ -59,7 +86,7 @@ class RowReader {
     std::array<double, kPoseFields> values{};
     PoseRow row;
     std::size_t at = 0;
-    std::optional<std::int64_t> week;
+    std::optional<std::int64_t> week, day;
     for (const PoseColumn& column : table_.columns) {
       const std::size_t place = at;
       at += column.sexagesimal ? 3 : 1;
@@ -68,6 +95,8 @@ class RowReader {
         row.time_ns = time_ns(fields[place], column);
       } else if (column.field == PoseField::gps_week) {
         week = io::integer_field(fields[place], column.name, 0, 20000);
+      } else if (column.field == PoseField::date) {
+        day = gps_day(fields[place], column);
       } else if (column.sexagesimal) {
         values[static_cast<std::size_t>(column.field)] =
             column.scale * sexagesimal_degrees(fields.subspan(place, 3), column.name);
@@ -97,6 +126,7 @@ class RowReader {
       }
       row.attitude = table_.left_up ? right_down_from_left_up(*unit) : *unit;
     }
+    if (day) place_in_week(*day, row.time_ns, week);
     if (week) {
       if (!first_week_) first_week_ = *week;
       constexpr std::int64_t kWeek_ns = 604'800'000'000'000;
@@ -108,6 +138,30 @@ class RowReader {
   std::optional<std::int64_t> first_week() const { return first_week_; }
 
  private:
+  /// Makes a second of the day, or of the week, one of the week, as the first date behind a Sunday
+  /// tells; on a Sunday both are the same.
+  void place_in_week(std::int64_t day, std::int64_t& time_ns, std::optional<std::int64_t>& week) {
+    constexpr std::int64_t kDay_ns = 86'400'000'000'000, kDays = 7;
+    constexpr std::int64_t kLate_ns = 60'000'000'000;  // dates of UTC change so much later at most
+    const std::int64_t before_ns = day % kDays * kDay_ns;
+    const auto is_of_day = [](std::int64_t time) { return time >= 0 && time < kDay_ns + kLate_ns; };
+    const bool in_day = is_of_day(time_ns), in_week = is_of_day(time_ns - before_ns);
+    if (!in_day && !in_week && seconds_ != Seconds::of_week) {
+      throw BadRow{
+          fmt::format("expected a second of the day, or one of the GPS week on day {} of "
+                      "it, as the date says, found {} s",
+                      day % kDays, 1e-9 * static_cast<double>(time_ns))};
+    }
+    if (seconds_ == Seconds::untold && before_ns > 0) {
+      seconds_ = in_week ? Seconds::of_week : Seconds::of_day;
+    }
+    if (first_day_ < 0) first_day_ = day;
+    const bool of_day = seconds_ == Seconds::of_day;
+    if (of_day) time_ns += before_ns;
+    // Times of the week run on beyond its end without the date.
+    if (!week) week = (of_day ? day : first_day_) / kDays;
+  }
+
   static std::string_view without_plus(std::string_view field) {
     if (field.starts_with('+')) field.remove_prefix(1);
     return field;
@@ -129,6 +183,8 @@ class RowReader {
 
   const PoseTable& table_;
   std::optional<std::int64_t> first_week_;
+  enum class Seconds : std::uint8_t { untold, of_day, of_week } seconds_ = Seconds::untold;
+  std::int64_t first_day_ = -1;  ///< of a table with dates
 };
 
 }  // namespace
@@ -185,7 +241,7 @@ std::vector<std::string_view> lines_of(std::string_view head) {
 Trajectory read_pose_table(const std::string& path, const PoseTable& table,
                            const Progress& progress,
                            const std::vector<TrajectoryWarning>& warnings) {
-  io::LineReader lines(path);
+  io::LineReader lines(path, io::LinesOf::table);
   std::string_view line;
   while (lines.line_number() + 1 < table.first_row && lines.next(line)) {
   }

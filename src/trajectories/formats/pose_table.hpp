@@ -18,6 +18,7 @@ enum class PoseField : std::uint8_t {
   unused,
   time,
   gps_week,
+  date,  ///< of the time; decides whether that is the second of the day or of the week
   latitude,
   longitude,
   height,
@@ -43,6 +44,9 @@ enum class PoseField : std::uint8_t {
   count,
 };
 
+/// In which order a date has year, month and day.
+enum class DateOrder : std::uint8_t { ymd, mdy, dmy };
+
 /// One column of a table.
 struct PoseColumn {
   PoseField field = PoseField::unused;
@@ -50,6 +54,7 @@ struct PoseColumn {
   double scale = 1;          ///< SI units per unit of the file; of angles rad
   int time_decimals = 0;     ///< of a time: 0 for seconds, 9 for nanoseconds
   bool sexagesimal = false;  ///< degrees, minutes and seconds in three fields
+  DateOrder date_order = DateOrder::ymd;
 };
 
 /// A table of poses in a text file.

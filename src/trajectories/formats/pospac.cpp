@@ -75,7 +75,7 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
   table.contents.format = "pospac";
   table.contents.time_scale = TimeScale::gps_second_of_week;
   table.contents.velocity_axes = VelocityAxes::east_north_up;
-  io::LineReader lines(path);
+  io::LineReader lines(path, io::LinesOf::table);
   std::string_view line;
   std::string names, units;
   while (lines.next(line)) {

@@ -1,0 +1,25 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// The beginning of a file, which tells what it is.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace risley::io {
+
+/// The first bytes of a regular file; of a text they are as LineReader reads tables: UTF-8 in plain
+/// dialect.
+/// @param expected  "a recording", for messages
+/// @throws FileError when the file is missing, another kind of file or cannot be read
+std::string read_file_head(const std::string& path, std::size_t bytes, std::string_view expected);
+
+/// Where a file is not what its name says but something that stands for it: what it is and how one
+/// gets at the file. Whole files that were compressed, pointers of Git LFS and git-annex, pages of
+/// the web that were saved in a file's place.
+/// @param head  as read_file_head() gives it
+std::optional<std::string> stands_for_another(const std::string& path, std::string_view head);
+
+}  // namespace risley::io
