@@ -15,6 +15,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/free_parameters.hpp"
@@ -882,6 +883,27 @@ std::int64_t order_shift(const std::vector<std::uint8_t>& of, const std::vector<
 }
 
 }  // namespace
+
+double rows_between_jumps(const CountedShots& shots, int emitters) {
+  constexpr std::size_t kFewest = 500, kMost = 100'000;  // pairs
+  constexpr double kJump = 4.0;                          // of the usual step
+  const auto turn = static_cast<std::size_t>(std::max(emitters, 1));
+  std::vector<double> steps;
+  for (std::size_t i = 0, next = 0; i < shots.rows.size() && steps.size() < kMost; ++i) {
+    // The next shot of the same emitter, where the file has it.
+    while (next < shots.rows.size() && shots.rows[next] < shots.rows[i] + turn) ++next;
+    if (next == shots.rows.size() || shots.rows[next] != shots.rows[i] + turn) continue;
+    const AngleSeries& s = shots.series;
+    const double azimuth = std::remainder(s.azimuth[next] - s.azimuth[i], kTwoPi);
+    steps.push_back(std::hypot(azimuth * std::sin(s.zenith[i]), s.zenith[next] - s.zenith[i]));
+  }
+  if (steps.size() < kFewest) return std::numeric_limits<double>::infinity();
+  std::vector<double> sorted = steps;
+  const double limit = kJump * median(sorted);
+  const auto jumps = static_cast<double>(
+      std::count_if(steps.begin(), steps.end(), [limit](double step) { return step > limit; }));
+  return static_cast<double>(steps.size() * turn) / jumps;
+}
 
 ShotCount find_slips(const CountedShots& counted, const sensors::Sensor& sensor,
                      const Progress& progress) {

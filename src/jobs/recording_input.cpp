@@ -171,6 +171,41 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
 
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
+/// The sensor whose rate counts the shots of a recording whose times are all the same, where it is
+/// known.
+std::optional<sensors::Sensor> sensor_to_count_by(const recordings::RecordingHeader& header,
+                                                  const recordings::ReadOptions& reading,
+                                                  const std::optional<sensors::Sensor>& given) {
+  if (!header.all_times_equal || reading.shot_rate || header.devices.size() != 1) {
+    return std::nullopt;
+  }
+  const recordings::Device& device = header.devices.front();
+  if (given || device.type == recordings::kUnknownDeviceType) return given;
+  return preset_of_type(device.type);
+}
+
+/// What a recording without times lacks: only their rate, or shots.
+/// @throws recordings::MissingTimes, or EstimationError where shots were removed
+[[noreturn]] void refuse_without_times(recordings::Reader& reader, const std::string& name) {
+  UntimedShots shots;
+  recordings::Chunk chunk;
+  try {
+    while (!shots.enough() && reader.read(chunk)) shots.add(chunk.observations);
+  } catch (const FileError&) {  // what is wrong here comes first
+  }
+  const std::string words = shots.removed_words();
+  if (!words.empty()) throw EstimationError(fmt::format("{}: {}", name, words));
+  recordings::require_times(reader.header());
+  throw EstimationError(fmt::format("{}: has no times", name));
+}
+
+/// @throws EstimationError where shots are missing all over a recording whose shots were counted
+void require_all_shots(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
+                       const std::string& name) {
+  const auto words = removed_shots_words(shots, sensor.train.emitters());
+  if (!words.empty()) throw EstimationError(fmt::format("{}: {}", name, words));
+}
+
 /// Opens a recording, chooses its sensor, and turns it back by the pose that it states where its
 /// points were moved by it.
 /// @param[in,out] reading  as asked for; on return with the pose
@@ -181,9 +216,22 @@ SensorFrameRecording open_by_stated_pose(const recordings::Source& source,
   progress.check();
   SensorFrameRecording result{
       open_input(source, reading, progress), {}, {}, reading.extrinsics.has_value()};
-  recordings::require_times(result.reader->header());
+  if (const auto sensor = sensor_to_count_by(result.reader->header(), reading, given)) {
+    result.warnings.push_back(fmt::format(
+        "all times of the recording are the same: shots were counted at the {:.6g} shots "
+        "per second of {}",
+        sensor->shot_rate, sensor->name));
+    reading.shot_rate = sensor->shot_rate;
+    result.reader = open_input(source, reading, progress);
+  }
+  if (!result.reader->header().has_times) refuse_without_times(*result.reader, source.name());
   result.choice = choose_sensor(source, reading, result.reader->header(), given, progress);
-  result.warnings = result.choice.warnings;
+  result.warnings.insert(result.warnings.end(), result.choice.warnings.begin(),
+                         result.choice.warnings.end());
+  if (result.choice.times_at_fault) {
+    reading.shot_rate = result.choice.sensor.shot_rate;
+    result.reader = open_input(source, reading, progress);
+  }
   const recordings::RecordingHeader& header = result.reader->header();
   if (reading.extrinsics || header.devices.size() != 1) return result;
   const recordings::Device& device = header.devices.front();
@@ -275,6 +323,7 @@ SensorFrameRecording open_in_sensor_frame(const recordings::Source& source,
   }
   const auto shots = counted_shots(source, reading, sensor, progress);
   if (!shots) return result;
+  require_all_shots(*shots, sensor, source.name());
   reading.shot_rate = shots->shot_rate;
   reading.emitters = sensor.train.emitters();
   estimation::ShotCount count = count_of(*shots, sensor, progress);
@@ -297,11 +346,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   SensorFrameRecording input =
       open_in_sensor_frame(source, options.reading, given_sensor(options.sensor), progress);
   recordings::Reader& reader = *input.reader;
-  if (reader.header().devices.size() > 1) {
-    throw InvalidArgument(
-        fmt::format("{} holds {} sensors, an estimation needs the recording of one", source.name(),
-                    reader.header().devices.size()));
-  }
+  recordings::require_one_device(reader.header(), source.name());
   EstimationInput result;
   result.whole_steps = reader.header().cartesian && !input.turned_back && !input.cut_mended;
   estimation::SelectionOptions selection = options.selection;
@@ -327,6 +372,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
   result.choice = std::move(input.choice);
   result.counts = selector.counts();
+  add_left_out_words(result.counts, result.warnings);
   if (result.counts.clock_resets > 0) {
     result.warnings.push_back(
         fmt::format("the clock of the recording jumps back {} times: the pieces share their "
@@ -336,6 +382,49 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   result.head = selector.head();
   result.reading_time = watch.seconds();
   return result;
+}
+
+std::string removed_shots_words(const estimation::CountedShots& shots, int emitters) {
+  const double rows = estimation::rows_between_jumps(shots, emitters);
+  // Where a packet is missing now and then, rotors can be followed from one to the next.
+  constexpr double kFewest = 1000;
+  if (rows >= kFewest) return {};
+  return fmt::format(
+      "shots without a return were removed from this file, which has no times: about every {:.0f} "
+      "rows the beam jumps, and how many shots are missing there, so when each was fired, is lost. "
+      "Directions and ranges hold all the same: they can be looked at, converted, and made a "
+      "cloud. "
+      "An estimation needs the recording with times of single shots, or with shots without a "
+      "return "
+      "kept as 0 0 0, or what it was exported from (LVX, a capture, or a bag of CustomMsg)",
+      rows);
+}
+
+std::string UntimedShots::removed_words() {
+  const estimation::CountedShots shots{selector_.take_series(), selector_.rows(), 0, false};
+  std::string words;
+  // Of known sensors, whose shots follow each other smoothly one turn of their emitters apart.
+  for (const int emitters : {1, 4, 6}) {
+    words = removed_shots_words(shots, emitters);
+    if (words.empty()) break;
+  }
+  return words;
+}
+
+void add_left_out_words(const estimation::SelectionCounts& counts,
+                        std::vector<std::string>& words) {
+  if (counts.out_of_order > 0) {
+    words.push_back(fmt::format(
+        "{} of {} shots are a little earlier than the shot before and were left out: packets came "
+        "late",
+        counts.out_of_order, counts.rows));
+  }
+  if (counts.equal_times > 0) {
+    words.push_back(fmt::format(
+        "{} of {} shots have the time of the shot before, so that nobody knows when they were "
+        "fired, and were left out: option shot_rate counts shots, where none is missing",
+        counts.equal_times, counts.rows));
+  }
 }
 
 std::string warning_text(const recordings::ReadWarning& warning) {

@@ -185,6 +185,14 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
     }
   } else {
     choice.sensor = sensors::load_sensor(kUsualSensor);
+    if (shots.head.size() >= kFewestInField) {
+      choice.warnings.emplace_back(
+          "the shots fill more than the field of view of any built-in sensor: the recording is of "
+          "a "
+          "sensor that has no preset, or of several whose points were put together; record or "
+          "export "
+          "them one by one");
+    }
     if (!found) {
       choice.fits = false;
       call_it_a_guess(choice, "because nothing tells");
@@ -233,9 +241,28 @@ SensorChoice choose_without_times(const recordings::Source& source, recordings::
   return choice;
 }
 
+/// Whether counted shots show one of some sensors of one shot rate better than the times show
+/// another sensor: the times are at fault then.
+/// @param count  gives the first shots as counted at that rate
+template <class Count>
+bool is_at_fault_by_count(std::span<const Sensor> some, const Sensor& by_times, double misfit,
+                          Count&& count, SensorChoice& choice) {
+  const auto found = recognised(count(), some);
+  if (!found || !found->fits || misfit_of(found->matches.front()) >= misfit) return false;
+  take(*found, some, choice);
+  choice.times_at_fault = true;
+  choice.warnings.push_back(fmt::format(
+      "the times of the recording are at fault: by them its scan would be that of a {}; counted at "
+      "{:.6g} shots per second it is that of a {}",
+      by_times.model, choice.sensor.shot_rate, choice.sensor.model));
+  return true;
+}
+
 /// What the type that a file names says, and whether the shots contradict it.
+/// @param count  gives the first shots as counted at the rate of that type
+template <class Count>
 SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
-                            std::span<const Sensor> candidates) {
+                            std::span<const Sensor> candidates, Count&& count) {
   SensorChoice choice;
   choice.sensor = named;
   const auto alone = recognised(shots, {&named, 1});
@@ -248,6 +275,10 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   if (!found || !found->decided) return choice;
   const SensorMatch& best = found->matches.front();
   if (candidates[best.candidate].name == named.name) return choice;
+  if (is_at_fault_by_count({&named, 1}, candidates[best.candidate], misfit_of(best), count,
+                           choice)) {
+    return choice;
+  }
   choice.fits = false;
   choice.misfits = {{candidates[best.candidate].name, misfit_of(best)}};
   for (const SensorMatch& match : found->matches) {
@@ -358,10 +389,29 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
   if (!has_times) return choose_without_times(source, reading, candidates, progress);
   const FirstShots shots =
       one_sensor ? first_shots(source, reading, candidates, progress) : FirstShots{};
+  const auto count = [&] {
+    if (reading.shot_rate) return FirstShots{};  // they are counted already
+    recordings::ReadOptions counting = reading;
+    counting.shot_rate = named->shot_rate;
+    return first_shots(source, counting, {named, 1}, progress);
+  };
   if (named != nullptr && !device.type_inferred) {
-    return choose_by_name(shots, *named, candidates);
+    return choose_by_name(shots, *named, candidates, count);
   }
   const auto found = recognised(shots, candidates);
+  const Sensor* const best =
+      found && found->decided ? &candidates[found->matches.front().candidate] : nullptr;
+  if (named != nullptr && best != nullptr &&
+      best->shot_rate != named->shot_rate) {  // the rate within packets and messages is another one
+    std::vector<Sensor> some;
+    std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(some),
+                 [&](const Sensor& sensor) { return sensor.shot_rate == named->shot_rate; });
+    choice.chosen_by = ChosenBy::scan;
+    choice.words = "recognised from the scan, where shots are counted";
+    if (is_at_fault_by_count(some, *best, misfit_of(found->matches.front()), count, choice)) {
+      return choice;
+    }
+  }
   if (found && found->decided) {
     take(*found, candidates, choice);
     choice.chosen_by = ChosenBy::scan;
@@ -373,6 +423,16 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
     choice.words = "by the rates, tags and returns of the file";
   } else {
     guess(shots, found, candidates, choice);
+    if (choice.fits == false && one_sensor && !reading.shot_rate && header.packet_shots == 0) {
+      SensorChoice counted = choose_without_times(source, reading, candidates, progress);
+      if (counted.fits != true) return choice;
+      choice = std::move(counted);
+      choice.times_at_fault = true;
+      choice.warnings.push_back(fmt::format(
+          "the times of the recording are at fault: by them no built-in preset describes its scan; "
+          "counted at {:.6g} shots per second, {} does",
+          choice.sensor.shot_rate, choice.sensor.name));
+    }
   }
   return choice;
 }

@@ -22,6 +22,11 @@ struct CountedShots {
   bool in_turn = false;           ///< the file names no emitters: they were taken to fire in turn
 };
 
+/// How many rows stand between two places where the beam of an emitter jumps by several times what
+/// it moves from one of its shots to the next; infinite where it does not, or there are too few
+/// shots to tell. @param emitters  of the sensor, which fire in turn
+double rows_between_jumps(const CountedShots& shots, int emitters);
+
 /// What the rotors say of the count of a recording's shots.
 struct ShotCount {
   /// The rotors could be followed; otherwise nothing is known.

@@ -47,6 +47,9 @@ struct SensorChoice {
   /// The sensor and the next best one, where the shots were asked.
   std::vector<PresetMisfit> misfits;
   std::vector<std::string> warnings;
+  /// The times of the recording do not describe its scan, and shots that are counted at the rate of
+  /// the sensor do.
+  bool times_at_fault = false;
   /// Order in which its emitters fire where beams are counted.
   estimation::FiringOrder order;
   /// The recording's roll about the optical axis, rad; 0 where it is not known or small. And where
@@ -60,7 +63,8 @@ struct SensorChoice {
 /// the rotors, how far the prisms bend and emitters together. Where times are missing, those of
 /// the presets' shot rates are tried, and the answer is a guess; so is the preset with the smallest
 /// field of view that holds the shots, where that is all there is. A type that the file names and
-/// the shots contradict is kept, with a warning.
+/// the shots contradict is kept, with a warning. Where shots contradict it, or no preset describes
+/// them, they are counted, too, to see whether the times are at fault.
 /// @param header  of the recording
 /// @param given   sensor that was asked for
 /// @throws FileError, InvalidArgument, Cancelled

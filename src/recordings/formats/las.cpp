@@ -164,19 +164,19 @@ class LasReader final : public Reader {
                    file_.point_format));
       return;
     }
-    std::size_t shots = 0, times = 0, backwards = 0;
+    std::size_t shots = 0, times = 0;
     double first = 0, last = 0;
     for (std::size_t i = 0; i < ahead_.size(); ++i) {
       const double time = ahead_[i].gps_time;
       if (i > 0 && is_further_return(ahead_[i], ahead_[i - 1])) continue;
       ++shots;
       if (times == 0 || time != last) ++times;
-      if (times > 1 && time < last) ++backwards;
       if (i == 0) first = time;
       last = time;
     }
     if ((times == 1 && shots > 1) || (times > 0 && shots / times >= kShotsOfOneTime)) {
       header_.has_times = false;
+      header_.all_times_equal = times == 1;
       warn({}, fmt::format("GPS times are not those of single shots: {} of the first {} shots {}; "
                            "points are taken to be in the order of firing",
                            times == 1 ? "all" : fmt::format("{} on average", shots / times), shots,
@@ -184,11 +184,6 @@ class LasReader final : public Reader {
       return;
     }
     if (adjusted) header_.time_reference = TimeReference::utc;
-    if (backwards > 0) {
-      warn({}, fmt::format("GPS times go back {} times in the first {} shots: the points are not "
-                           "in the order of firing, which an estimation needs",
-                           backwards, shots));
-    }
   }
 
   void learn_intensity() {
