@@ -402,13 +402,7 @@ std::string removed_shots_words(const estimation::CountedShots& shots, int emitt
 
 std::string UntimedShots::removed_words() {
   const estimation::CountedShots shots{selector_.take_series(), selector_.rows(), 0, false};
-  std::string words;
-  // Of known sensors, whose shots follow each other smoothly one turn of their emitters apart.
-  for (const int emitters : {1, 4, 6}) {
-    words = removed_shots_words(shots, emitters);
-    if (words.empty()) break;
-  }
-  return words;
+  return removed_shots_words(shots, estimation::emitters_in_turn(shots));
 }
 
 void add_left_out_words(const estimation::SelectionCounts& counts,

@@ -241,20 +241,22 @@ SensorChoice choose_without_times(const recordings::Source& source, recordings::
   return choice;
 }
 
-/// Whether counted shots show one of some sensors of one shot rate better than the times show
-/// another sensor: the times are at fault then.
-/// @param count  gives the first shots as counted at that rate
+/// Whether counted shots show one of some sensors of one shot rate better than the times do: these
+/// are at fault then.
+/// @param misfit  of what the times show, rad
+/// @param count   gives the first shots as counted at that rate
 template <class Count>
-bool is_at_fault_by_count(std::span<const Sensor> some, const Sensor& by_times, double misfit,
-                          Count&& count, SensorChoice& choice) {
+bool is_at_fault_by_count(std::span<const Sensor> some, double misfit, Count&& count,
+                          SensorChoice& choice) {
   const auto found = recognised(count(), some);
   if (!found || !found->fits || misfit_of(found->matches.front()) >= misfit) return false;
   take(*found, some, choice);
   choice.times_at_fault = true;
-  choice.warnings.push_back(fmt::format(
-      "the times of the recording are at fault: by them its scan would be that of a {}; counted at "
-      "{:.6g} shots per second it is that of a {}",
-      by_times.model, choice.sensor.shot_rate, choice.sensor.model));
+  choice.warnings.push_back(
+      fmt::format("the times of the recording are at fault: by them its scan is not that of a {}, "
+                  "and counted at "
+                  "{:.6g} shots per second it is",
+                  choice.sensor.model, choice.sensor.shot_rate));
   return true;
 }
 
@@ -269,16 +271,18 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   if (alone) take(*alone, {&named, 1}, choice);
   choice.chosen_by = ChosenBy::file;
   choice.words = "named by the file";
+  if (!alone || !alone->fits) {
+    const double misfit =
+        alone ? misfit_of(alone->matches.front()) : std::numeric_limits<double>::infinity();
+    if (is_at_fault_by_count({&named, 1}, misfit, count, choice)) return choice;
+  }
   const bool by_lines = alone && alone->decided && !alone->matches.front().residual;
   if (!alone || by_lines) return choice;
   const auto found = recognised(shots, candidates);
   if (!found || !found->decided) return choice;
   const SensorMatch& best = found->matches.front();
   if (candidates[best.candidate].name == named.name) return choice;
-  if (is_at_fault_by_count({&named, 1}, candidates[best.candidate], misfit_of(best), count,
-                           choice)) {
-    return choice;
-  }
+  if (is_at_fault_by_count({&named, 1}, misfit_of(best), count, choice)) return choice;
   choice.fits = false;
   choice.misfits = {{candidates[best.candidate].name, misfit_of(best)}};
   for (const SensorMatch& match : found->matches) {
@@ -408,9 +412,7 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
                  [&](const Sensor& sensor) { return sensor.shot_rate == named->shot_rate; });
     choice.chosen_by = ChosenBy::scan;
     choice.words = "recognised from the scan, where shots are counted";
-    if (is_at_fault_by_count(some, *best, misfit_of(found->matches.front()), count, choice)) {
-      return choice;
-    }
+    if (is_at_fault_by_count(some, misfit_of(found->matches.front()), count, choice)) return choice;
   }
   if (found && found->decided) {
     take(*found, candidates, choice);
@@ -423,7 +425,7 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
     choice.words = "by the rates, tags and returns of the file";
   } else {
     guess(shots, found, candidates, choice);
-    if (choice.fits == false && one_sensor && !reading.shot_rate && header.packet_shots == 0) {
+    if (choice.fits != true && one_sensor && !reading.shot_rate && header.packet_shots == 0) {
       SensorChoice counted = choose_without_times(source, reading, candidates, progress);
       if (counted.fits != true) return choice;
       choice = std::move(counted);

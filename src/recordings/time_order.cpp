@@ -69,7 +69,7 @@ class Judge {
       result.order = RowOrder::begins_anew;
       result.step_ns = mean_step();
     } else if (in_packets ? short_runs && fills_gaps(in_packets)
-                          : short_runs || sorted || fills_gaps(in_packets)) {
+                          : short_runs || sorted || fills_gaps(in_packets) || interleave()) {
       result.order = RowOrder::mixed;
     } else if (!in_packets && overlaps()) {
       result.order = RowOrder::overlapping;
@@ -145,6 +145,23 @@ class Judge {
     constexpr double kFewClose = 0.05;
     return after < before &&
            static_cast<double>(close) < kFewClose * static_cast<double>(sorted.size());
+  }
+
+  /// Whether the runs together are the even shots of emitters that fire in turn, whose lines no
+  /// column names.
+  bool interleave() const {
+    constexpr double kStep_ns = 12'500.0 / 3.0, kSameRate = 0.01, kSameStep = 0.3, kMost = 0.9;
+    std::vector<std::int64_t> sorted;
+    for (std::size_t i = 0; i < which_.size(); ++i) sorted.push_back(time(i));
+    std::sort(sorted.begin(), sorted.end());
+    double even = 0;
+    for (std::size_t i = 1; i < sorted.size(); ++i) {
+      const auto step = static_cast<double>(sorted[i] - sorted[i - 1]);
+      even += std::abs(step / kStep_ns - 1.0) < kSameStep ? 1 : 0;
+    }
+    const auto steps = static_cast<double>(sorted.size() - 1);
+    const double mean = static_cast<double>(sorted.back() - sorted.front()) / steps;
+    return std::abs(mean / kStep_ns - 1.0) < kSameRate && even > kMost * steps;
   }
 
   /// Whether most runs begin within the time of the run before.
