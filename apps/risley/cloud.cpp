@@ -107,7 +107,7 @@ FileOutcome make_one(const FileJob& job, const CloudCommandOptions& options,
                      const cloud::CloudOptions& settings, const jobs::Provenance& provenance,
                      const Progress& progress) {
   jobs::RecordingCloud made =
-      jobs::cloud_of_recording({job.input, read_options(options.reading), options.calibration,
+      jobs::cloud_of_recording({job.input, read_options(options.reading, job), options.calibration,
                                 job.output, options.platform, settings, provenance},
                                progress);
   cloud::CloudSummary& s = made.summary;
@@ -182,6 +182,7 @@ Run declare_cloud(CLI::App& verb) {
          "Write, for every point, the loadings of the errors that all points share, from which "
          "covariances between points follow");
   add_reading_options(verb, o.reading);
+  add_every_device(verb, o.reading);
   add_platform_options(verb, o.platform);
   verb.add_option(
       "--crs", o.platform.crs,
@@ -233,8 +234,9 @@ Run declare_cloud(CLI::App& verb) {
       if (options->format.empty()) options->format = cloud::cloud_formats().front().name;
       ending = cloud::find_cloud_format("", options->format).ending;
     }
-    const FileJobs files = file_jobs(options->many, options->output, folder, ending);
+    FileJobs files = file_jobs(options->many, options->output, folder, ending);
     read_options(options->reading);  // wrong options are told before anything is read
+    split_by_device(options->reading, files);
     for (const auto& [name, page] : {std::pair{"--distribution", options->distribution},
                                      std::pair{"--report", options->report}}) {
       if (page.empty() || files.jobs.size() == 1) continue;

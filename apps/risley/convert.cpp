@@ -113,10 +113,10 @@ FileOutcome convert(const FileJob& job, const ConvertOptions& options, const Pro
         fmt::format("--accuracy goes with a trajectory, and {} is none", job.input));
   }
   if (options.format.empty()) refuse_point_clouds(job.output);
-  jobs::ConvertRecordingOptions wanted{job.input, read_options(options.reading), job.output,
+  jobs::ConvertRecordingOptions wanted{job.input, read_options(options.reading, job), job.output,
                                        options.format, std::nullopt};
   if (!options.sensor_type.empty()) wanted.sensor_type = sensor_types().at(options.sensor_type);
-  const jobs::ConvertedRecording done = jobs::convert_recording(wanted, progress);
+  jobs::ConvertedRecording done = jobs::convert_recording(wanted, progress);
   log_warnings(job.input, done.warnings);
   const std::uint64_t written = done.observations - done.left_out;
   if (done.left_out > 0) {
@@ -162,11 +162,13 @@ Run declare_convert(CLI::App& verb) {
                   "Convert a ROS bag as a trajectory: the poses of this topic")
       ->type_name("NAME");
   add_reading_options(verb, options->reading);
+  add_every_device(verb, options->reading);
   return [options, &verb](const CommonOptions& common) {
     const bool folder = output_is_folder(options->many, options->output);
-    const FileJobs files =
+    FileJobs files =
         file_jobs(options->many, options->output, folder, folder ? ending_of(options->format) : "");
     read_options(options->reading);  // wrong options are told before anything is read
+    split_by_device(options->reading, files);
     FileWork work;
     work.label = "converting";
     work.counted = "observations";

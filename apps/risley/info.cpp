@@ -89,6 +89,7 @@ void print_audit(const InspectedRecording& found) {
   table.add({"zenith", range_text(audit.zenith, kDegreesPerRadian, 3, "deg")});
   table.add({"range", header.has_range ? range_text(audit.range, 1.0, 3, "m") : "not recorded"});
   if (audit.imu > 0) table.add({"inertial samples", grouped(audit.imu)});
+  if (header.devices.size() > 1) table.add({"sensors", recordings::devices_words(header)});
   for (const recordings::Device& device : header.devices) {
     if (!device.serial.empty()) table.add({"serial", device.serial});
     if (!device.hub_serial.empty()) table.add({"through the hub", device.hub_serial});

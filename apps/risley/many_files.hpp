@@ -26,8 +26,9 @@ CLI::Option* add_many_options(CLI::App& verb, ManyWishes& wishes, const std::str
 /// One input with its output.
 struct FileJob {
   std::string input;
-  std::string output;  ///< empty: none
-  std::string place;   ///< of its results below a folder, unlike that of any other job
+  std::string output;       ///< empty: none
+  std::string place;        ///< of its results below a folder, unlike that of any other job
+  std::string device = {};  ///< of the input's, where each has a job
 };
 
 /// What came of it.

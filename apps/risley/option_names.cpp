@@ -25,6 +25,7 @@ constexpr OptionName kNames[] = {
     {"crs", "--crs"},
     {"data_port", "--data-port"},
     {"datum", "--datum"},
+    {"device", "--device"},
     {"duration", "--duration-s"},
     {"extrinsics", "--extrinsics"},
     {"find_time", "--find-s"},

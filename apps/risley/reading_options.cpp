@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -44,6 +46,10 @@ recordings::Extrinsics extrinsics_from(const std::string& text) {
 }  // namespace
 
 void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
+  verb.add_option("--device", wishes.device,
+                  "One sensor of a recording of several: its serial number, its topic, or its "
+                  "number in the list that info gives, from 0 (default: the only one)")
+      ->type_name("SERIAL|TOPIC|INDEX");
   verb.add_option("--shot-rate-hz", wishes.shot_rate_hz,
                   "Shots per second, Hz, of a recording without times or with bad ones: times are "
                   "then counted from the shots, and shots without a return keep their places "
@@ -56,16 +62,49 @@ void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
       ->type_name("YAW,PITCH,ROLL");
 }
 
+void add_every_device(CLI::App& verb, ReadingWishes& wishes) {
+  verb.add_flag(
+          "--every-device", wishes.every_device,
+          "Write one file for each sensor of a recording of several, with the sensor's serial "
+          "number, or its number, added to its name")
+      ->excludes("--device");
+}
+
+void split_by_device(const ReadingWishes& wishes, FileJobs& jobs) {
+  if (!wishes.every_device) return;
+  std::vector<FileJob> split;
+  for (const FileJob& job : jobs.jobs) {
+    const auto devices = recordings::open_recording(job.input, {}, cancellable())->header().devices;
+    for (std::size_t i = 0; i < devices.size(); ++i) {
+      FileJob one = job;
+      if (devices.size() > 1) {
+        one.device = std::to_string(i);
+        const std::string name = "-" + (devices[i].serial.empty() ? one.device : devices[i].serial);
+        const std::filesystem::path output(job.output);
+        one.output =
+            (output.parent_path() / output.stem()).string() + name + output.extension().string();
+        one.place += name;
+        jobs.many = true;
+      }
+      split.push_back(std::move(one));
+    }
+  }
+  jobs.jobs = std::move(split);
+}
+
 void require_no_reading_options(const ReadingWishes& wishes, std::string_view what) {
-  if (wishes.shot_rate_hz || !wishes.extrinsics_deg.empty()) {
-    throw InvalidArgument(fmt::format("{} is for recordings, not {}",
-                                      wishes.shot_rate_hz ? "--shot-rate-hz" : "--extrinsics",
-                                      what));
+  const char* const given = wishes.shot_rate_hz              ? "--shot-rate-hz"
+                            : !wishes.extrinsics_deg.empty() ? "--extrinsics"
+                            : !wishes.device.empty()         ? "--device"
+                                                             : nullptr;
+  if (given != nullptr) {
+    throw InvalidArgument(fmt::format("{} is for recordings, not {}", given, what));
   }
 }
 
-recordings::ReadOptions read_options(const ReadingWishes& wishes) {
+recordings::ReadOptions read_options(const ReadingWishes& wishes, const FileJob& job) {
   recordings::ReadOptions options;
+  options.device = job.device.empty() ? wishes.device : job.device;
   if (wishes.shot_rate_hz) check_positive(*wishes.shot_rate_hz, "--shot-rate-hz", "Hz");
   options.shot_rate = wishes.shot_rate_hz;
   if (!wishes.extrinsics_deg.empty()) options.extrinsics = extrinsics_from(wishes.extrinsics_deg);

@@ -9,23 +9,35 @@
 #include "risley/recordings/reader.hpp"
 
 #include "command.hpp"
+#include "many_files.hpp"
 
 namespace risley::app {
 
 /// How every verb that reads recordings is told to read them, as typed.
 struct ReadingWishes {
+  std::string device;  ///< SERIAL, TOPIC or INDEX; empty: not told
   std::optional<double> shot_rate_hz;
   std::string extrinsics_deg;  ///< YAW,PITCH,ROLL; empty: not told
+  bool every_device = false;   ///< of a verb that makes one file of each
 };
 
-/// Declares --shot-rate-hz and --extrinsics.
+/// Declares --device, --shot-rate-hz and --extrinsics.
 void add_reading_options(CLI::App& verb, ReadingWishes& wishes);
+
+/// Declares --every-device, too.
+void add_every_device(CLI::App& verb, ReadingWishes& wishes);
+
+/// Gives every sensor of recordings of several a job of its own where that was asked for; the
+/// serial number, or the number of the sensor, is added to the names of outputs.
+/// @throws FileError
+void split_by_device(const ReadingWishes& wishes, FileJobs& jobs);
 
 /// @param what  is read instead of recordings, in words
 /// @throws InvalidArgument when any of these options was given
 void require_no_reading_options(const ReadingWishes& wishes, std::string_view what);
 
+/// @param job  whose device is meant, where it names one
 /// @throws InvalidArgument naming the option
-recordings::ReadOptions read_options(const ReadingWishes& wishes);
+recordings::ReadOptions read_options(const ReadingWishes& wishes, const FileJob& job = {});
 
 }  // namespace risley::app

@@ -6,10 +6,13 @@
 
 #include "risley/jobs/recording_input.hpp"
 
+#include "option_names.hpp"
+
 namespace risley::app {
 
-void log_warnings(const std::string& file, const std::vector<recordings::ReadWarning>& warnings) {
-  for (const recordings::ReadWarning& warning : warnings) {
+void log_warnings(const std::string& file, std::vector<recordings::ReadWarning>& warnings) {
+  for (recordings::ReadWarning& warning : warnings) {
+    warning.message = with_flags(warning.message);
     spdlog::warn("{}: {}", file, jobs::warning_text(warning));
   }
 }

@@ -10,8 +10,9 @@
 
 namespace risley::app {
 
-/// Warnings on stderr, each with the name of the file.
-void log_warnings(const std::string& file, const std::vector<recordings::ReadWarning>& warnings);
+/// Warnings on stderr, each with the name of the file; options in them get the names that users
+/// know.
+void log_warnings(const std::string& file, std::vector<recordings::ReadWarning>& warnings);
 
 /// 1234567 as "1 234 567".
 std::string grouped(std::uint64_t number);

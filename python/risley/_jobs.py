@@ -31,7 +31,7 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
              angle_noise_deg: Optional[float] = None, fixed: Fixed = (), free: Iterable[str] = (),
              mirrored: Optional[bool] = None, truth: Path = "", states: str = "knots",
              shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
-             extrinsics_deg: YawPitchRoll = None, threads: int = 0,
+             extrinsics_deg: YawPitchRoll = None, device: str = "", threads: int = 0,
              progress: Progress = None) -> Estimate:
     """Estimate a sensor's parameters and rotation angles from a recording.
 
@@ -60,7 +60,7 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
         ``OUT.truth.yaml`` of the simulation that made the recording, to compare the estimate with.
     states : {'knots', 'all', 'none'}
         Rotor states to write into ``output``.
-    shot_rate, extrinsics, extrinsics_deg
+    shot_rate, extrinsics, extrinsics_deg, device
         As in `risley.read`.
     threads : int, default 0
         Number of threads; 0 means one per core.
@@ -83,7 +83,7 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
         "output": os.fspath(output), "method": method, "rate": rate,
         "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg), "fixed": _held(fixed),
         "free": list(free), "mirrored": mirrored, "truth": os.fspath(truth), "states": states,
-        "shot_rate": shot_rate, "extrinsics": pose(extrinsics, extrinsics_deg)}
+        "device": device, "shot_rate": shot_rate, "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:
         return Estimate(_risley.estimate(options, threads, tell))
 
@@ -103,8 +103,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
               fixed: Fixed = (), free: Iterable[str] = (), mirrored: Optional[bool] = None,
               truth: Union[Path, Sequence[Path]] = (), force: bool = False,
               states: str = "knots", shot_rate: Optional[float] = None,
-              extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None, seed: int = 0,
-              threads: int = 0,
+              extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
+              device: str = "", seed: int = 0, threads: int = 0,
               progress: Progress = None) -> Union[Calibration, FlightCalibration]:
     """Calibrate a sensor on plane walls or, with a trajectory, on the strips of a flight.
 
@@ -159,7 +159,7 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         Take walls as exact planes, and ranges as free of errors but for a constant one.
     patch_thickness : float, optional
         How far dark or light patches stand off their wall, one standard deviation, m; 0 for paint.
-    fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, threads, progress
+    fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, device, threads, progress
         As in `risley.estimate`.
     truth : str, path or a sequence of them
         ``OUT.truth.yaml`` of the simulation that made each recording, to compare with.
@@ -191,7 +191,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         "range_offset_sigma": range_offset_sigma,
         "tolerance": angle("tolerance", tolerance, tolerance_deg),
         "fixed": _held(fixed), "free": list(free),
-        "mirrored": mirrored, "truth": _paths(truth), "force": force, "shot_rate": shot_rate,
+        "mirrored": mirrored, "truth": _paths(truth), "force": force, "device": device,
+        "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
     on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),
                 "station": list(station), "beam_origin": beam_origin, "same_walls": same_walls,
@@ -291,7 +292,7 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
           trajectory_topic: str = "", mount: Path = "", accuracy: Path = "",
           trajectory_errors: Path = "", crs: str = "", datum: str = "", distribution: bool = False,
           shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
-          extrinsics_deg: YawPitchRoll = None, threads: int = 0,
+          extrinsics_deg: YawPitchRoll = None, device: str = "", threads: int = 0,
           progress: Progress = None) -> Cloud:
     """Turn a recording into points with covariance.
 
@@ -328,7 +329,7 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
         Map of the points and datum of the trajectory, ``EPSG:N``.
     distribution : bool, default False
         Report how the points of a flight lie on the ground.
-    shot_rate, extrinsics, extrinsics_deg, threads, progress
+    shot_rate, extrinsics, extrinsics_deg, device, threads, progress
         As in `risley.estimate`.
 
     Returns
@@ -351,7 +352,8 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
         "las_scale": las_scale, "time": time, "trajectory": os.fspath(trajectory),
         "trajectory_topic": trajectory_topic, "mount": os.fspath(mount),
         "accuracy": os.fspath(accuracy), "trajectory_errors": os.fspath(trajectory_errors),
-        "crs": crs, "datum": datum, "distribution": distribution, "shot_rate": shot_rate,
+        "crs": crs, "datum": datum, "distribution": distribution, "device": device,
+        "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:
         return Cloud(_risley.cloud(options, threads, tell))
@@ -449,7 +451,7 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
 
 def identify(recording: Source, *, output: Path = "", force: bool = False, most_prisms: int = 3,
              fastest: Optional[float] = None, shot_rate: Optional[float] = None,
-             extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
+             extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None, device: str = "",
              threads: int = 0, progress: Progress = None) -> Identification:
     """Find which prisms made a scan, from its times and directions alone.
 
@@ -465,7 +467,7 @@ def identify(recording: Source, *, output: Path = "", force: bool = False, most_
         Largest number of prisms to try.
     fastest : float, optional
         Largest speed of a rotor, rad/s; by default 400 turns a second.
-    shot_rate, extrinsics, extrinsics_deg, threads, progress
+    shot_rate, extrinsics, extrinsics_deg, device, threads, progress
         As in `risley.estimate`.
 
     Returns
@@ -481,7 +483,7 @@ def identify(recording: Source, *, output: Path = "", force: bool = False, most_
     """
     options = {
         "recording": source(recording), "output": os.fspath(output), "force": force,
-        "most_prisms": most_prisms, "fastest": fastest, "shot_rate": shot_rate,
+        "most_prisms": most_prisms, "fastest": fastest, "device": device, "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:
         return Identification(*_risley.identify(options, threads, tell))
@@ -571,7 +573,7 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
                   angle_noise_deg: Optional[float] = None, rounding: bool = True,
                   fixed: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
                   extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
-                  threads: int = 0, progress: Progress = None) -> Dict[str, Any]:
+                  device: str = "", threads: int = 0, progress: Progress = None) -> Dict[str, Any]:
     """Compute Cramér-Rao bounds of all parameters for a recording or a plan.
 
     Parameters
@@ -584,7 +586,7 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
         Shots per second of the plan, or to use from the recording, Hz.
     rounding : bool, default True
         Whether the angles of a plan are rounded to the sensor's resolution.
-    sensor, angle_noise, angle_noise_deg, fixed, free, shot_rate, extrinsics, extrinsics_deg
+    sensor, angle_noise, angle_noise_deg, fixed, free, shot_rate, extrinsics, extrinsics_deg, device
         As in `risley.estimate`.
     threads, progress
         As in `risley.estimate`.
@@ -597,7 +599,8 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
     options = {
         "recording": source(recording), "sensor": os.fspath(sensor), "duration": duration,
         "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "rounding": rounding, "fixed": _held(fixed), "free": list(free), "shot_rate": shot_rate,
+        "rounding": rounding, "fixed": _held(fixed), "free": list(free), "device": device,
+        "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:
         return dict(_risley.observability(options, threads, tell))
@@ -685,7 +688,8 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
 
 def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
          shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
-         extrinsics_deg: YawPitchRoll = None, progress: Progress = None) -> Dict[str, Any]:
+         extrinsics_deg: YawPitchRoll = None, device: str = "",
+         progress: Progress = None) -> Dict[str, Any]:
     """Describe what a recording or a trajectory holds, and check its times.
 
     Parameters
@@ -696,7 +700,7 @@ def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
         Accuracies of a trajectory (SMRMSG).
     trajectory_topic : str, optional
         Topic of a ROS bag whose poses are described.
-    shot_rate, extrinsics, extrinsics_deg, progress
+    shot_rate, extrinsics, extrinsics_deg, device, progress
         As in `risley.read`.
 
     Returns
@@ -705,7 +709,7 @@ def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
         As in ``risley info --json``. Damage is reported under ``error``.
     """
     options = {"input": source(file), "accuracy": os.fspath(accuracy),
-               "trajectory_topic": trajectory_topic, "shot_rate": shot_rate,
+               "trajectory_topic": trajectory_topic, "device": device, "shot_rate": shot_rate,
                "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:
         return dict(_risley.info(options, tell))

@@ -12,7 +12,8 @@ _UNKNOWN_TYPE = 255
 
 
 def read(path: Path, *, shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
-         extrinsics_deg: YawPitchRoll = None, progress: Progress = None) -> _risley.Recording:
+         extrinsics_deg: YawPitchRoll = None, device: str = "",
+         progress: Progress = None) -> _risley.Recording:
     """Read a whole recording of any known format into memory.
 
     Parameters
@@ -24,6 +25,8 @@ def read(path: Path, *, shot_rate: Optional[float] = None, extrinsics: YawPitchR
     extrinsics, extrinsics_deg : (float, float, float), optional
         Yaw, pitch and roll of the sensor in the frame of the recording, rad or deg. The rows are
         transformed back into the sensor's frame.
+    device : str, optional
+        Serial number, topic or number (from "0") of one sensor of a recording of several.
     progress : bool or callable, optional
         Function that is called with the name of the stage and the fraction done; True shows tqdm
         bars if tqdm is installed. An exception in the function stops reading and is raised here.
@@ -41,17 +44,18 @@ def read(path: Path, *, shot_rate: Optional[float] = None, extrinsics: YawPitchR
         For options that make no sense.
     """
     with telling(progress) as tell:
-        return _risley.read(os.fspath(path), shot_rate, pose(extrinsics, extrinsics_deg), tell)
+        return _risley.read(os.fspath(path), shot_rate, pose(extrinsics, extrinsics_deg), device,
+                            tell)
 
 
 def read_chunks(path: Path, rows: int = 65536, *, shot_rate: Optional[float] = None,
                 extrinsics: YawPitchRoll = None,
-                extrinsics_deg: YawPitchRoll = None) -> _risley.ChunkReader:
+                extrinsics_deg: YawPitchRoll = None, device: str = "") -> _risley.ChunkReader:
     """Read a recording piece by piece, so that memory use does not grow with its length.
 
     Parameters
     ----------
-    path, shot_rate, extrinsics, extrinsics_deg
+    path, shot_rate, extrinsics, extrinsics_deg, device
         As in `read`.
     rows : int, default 65536
         Approximate number of rows of a piece; packets are not split.
@@ -66,7 +70,8 @@ def read_chunks(path: Path, rows: int = 65536, *, shot_rate: Optional[float] = N
     FileError, ValueError
         As in `read`. Damage in the body is raised only after all sound rows before it were given.
     """
-    return _risley.ChunkReader(os.fspath(path), rows, shot_rate, pose(extrinsics, extrinsics_deg))
+    return _risley.ChunkReader(os.fspath(path), rows, shot_rate, pose(extrinsics, extrinsics_deg),
+                               device)
 
 
 def from_arrays(*, azimuth: Any, zenith: Any, time_ns: Any = None, range: Any = None,

@@ -132,16 +132,8 @@ class Work {
 
  private:
   void check_sensor() const {
+    recordings::require_one_device(reader_.header(), "the recording");
     const auto& devices = reader_.header().devices;
-    if (devices.size() > 1) {
-      std::string names;
-      for (const auto& device : devices) {
-        names += fmt::format("{}{}", names.empty() ? "" : ", ",
-                             device.serial.empty() ? "unknown" : device.serial);
-      }
-      throw InvalidArgument(fmt::format(
-          "the recording holds {} sensors ({}), a calibration is of one", devices.size(), names));
-    }
     const std::string& serial = devices.front().serial;
     if (!serial.empty() && !calibration_.serial.empty() && serial != calibration_.serial) {
       throw InvalidArgument(fmt::format(
@@ -696,7 +688,8 @@ class Work {
     if (summary_.points == 0 && summary_.without_pose > 0) {
       const std::int64_t shift = georeference_->clock_shift_ns();
       throw EstimationError(trajectories::no_overlap_words(
-          options_.platform->trajectory, first_time_ns_ + shift, last_time_ns_ + shift));
+          options_.platform->trajectory, first_time_ns_ + shift, last_time_ns_ + shift,
+          reader_.header().stamps_after_times_ns));
     }
     if (summary_.points == 0) {
       throw EstimationError(summary_.warnings.empty() ? std::string("no shot has a point")

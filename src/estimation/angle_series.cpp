@@ -141,7 +141,9 @@ void ShotSelector::add(const recordings::Observations& o) {
     const bool first = !first_time_ns;
     const std::int64_t step = first ? 1 : o.time_ns[i] - last_time_ns_;
     if (step <= 0 && step >= -kResetNs) {
-      ++(step == 0 ? counts_.further_returns : counts_.out_of_order);
+      // What stood before the first row of a piece is not known any more.
+      const bool further = i == 0 ? o.return_number[i] > 1 : recordings::is_further_return(o, i);
+      ++(step < 0 ? counts_.out_of_order : further ? counts_.further_returns : counts_.equal_times);
       continue;
     }
     if (step < 0) ++counts_.clock_resets;

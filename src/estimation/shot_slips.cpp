@@ -15,6 +15,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/free_parameters.hpp"
@@ -969,6 +970,47 @@ std::int64_t order_shift(const std::vector<std::uint8_t>& of, const std::vector<
 }
 
 }  // namespace
+
+namespace {
+
+/// Angles between shots that stand so many rows apart, rad.
+std::vector<double> steps_over(const CountedShots& shots, std::size_t rows) {
+  constexpr std::size_t kMost = 100'000;
+  std::vector<double> steps;
+  for (std::size_t i = 0, next = 0; i < shots.rows.size() && steps.size() < kMost; ++i) {
+    while (next < shots.rows.size() && shots.rows[next] < shots.rows[i] + rows) ++next;
+    if (next == shots.rows.size() || shots.rows[next] != shots.rows[i] + rows) continue;
+    const AngleSeries& s = shots.series;
+    const double azimuth = std::remainder(s.azimuth[next] - s.azimuth[i], kTwoPi);
+    steps.push_back(std::hypot(azimuth * std::sin(s.zenith[i]), s.zenith[next] - s.zenith[i]));
+  }
+  return steps;
+}
+
+}  // namespace
+
+int emitters_in_turn(const CountedShots& shots) {
+  constexpr double kSmoother = 1.5;
+  std::vector<double> neighbours = steps_over(shots, 1);
+  const double usual = median(neighbours);
+  for (const int emitters : {4, 6}) {
+    std::vector<double> steps = steps_over(shots, static_cast<std::size_t>(emitters));
+    if (median(steps) < kSmoother * usual) return emitters;
+  }
+  return 1;
+}
+
+double rows_between_jumps(const CountedShots& shots, int emitters) {
+  constexpr std::size_t kFewest = 500;
+  constexpr double kJump = 4.0;  // of the usual step
+  const auto turn = static_cast<std::size_t>(std::max(emitters, 1));
+  std::vector<double> steps = steps_over(shots, turn);
+  if (steps.size() < kFewest) return std::numeric_limits<double>::infinity();
+  const double limit = kJump * median(steps);
+  const auto jumps = static_cast<double>(
+      std::count_if(steps.begin(), steps.end(), [limit](double step) { return step > limit; }));
+  return static_cast<double>(steps.size() * turn) / jumps;
+}
 
 ShotCount find_slips(const CountedShots& counted, const sensors::Sensor& sensor,
                      const Progress& progress) {

@@ -195,7 +195,9 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
                      end_ns = last->time_ns.back() + shift_ns + offset_ns;
   if (end_ns < platform.trajectory.time_ns.front() ||
       begin_ns > platform.trajectory.time_ns.back()) {
-    throw EstimationError(trajectories::no_overlap_words(platform.trajectory, begin_ns, end_ns));
+    throw EstimationError(
+        trajectories::no_overlap_words(platform.trajectory, begin_ns, end_ns,
+                                       result.recordings.front().header.stamps_after_times_ns));
   }
   if (result.strips.size() < 2) {
     throw EstimationError(fmt::format(

@@ -32,11 +32,8 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
       place_input(options.recording, options.reading, UntoldShots::left_out, progress);
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const recordings::RecordingHeader& header = reader->header();
+  recordings::require_one_device(header, options.recording.name());
   recordings::require_times(header);
-  if (header.devices.size() > 1) {
-    throw InvalidArgument(fmt::format("{} holds {} sensors, identify needs the recording of one",
-                                      options.recording.name(), header.devices.size()));
-  }
   estimation::ShotSelector selector({});
   recordings::Chunk chunk;
   while (reader->read(chunk)) {
@@ -45,6 +42,7 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
   }
   for (const auto& warning : reader->warnings()) result.warnings.push_back(warning_text(warning));
   result.warnings.insert(result.warnings.end(), input.words.begin(), input.words.end());
+  add_left_out_words(selector.counts(), result.warnings);
   result.cropped = input.choice.has_value();
   if (result.cropped) {
     result.warnings.push_back(

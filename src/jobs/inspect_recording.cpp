@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "risley/jobs/recording_input.hpp"
+
 #include "jobs/packet_recording.hpp"
 
 namespace risley::jobs {
@@ -22,9 +24,11 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   recordings::TimeAudit audit;
   recordings::Chunk chunk;
+  UntimedShots untimed;
   try {
     while (reader->read(chunk)) {
       audit.add(chunk);
+      if (!reader->header().has_times && !untimed.enough()) untimed.add(chunk.observations);
       reading.report(reader->fraction_read());
     }
   } catch (const FileError& error) {
@@ -36,6 +40,10 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   result.warnings = reader->warnings();
   for (const std::string& words : input.words) result.warnings.push_back({{}, words});
   result.time_uncertainty = input.time_uncertainty;
+  if (!result.header.has_times) {
+    const std::string words = untimed.removed_words();
+    if (!words.empty()) result.warnings.push_back({{}, words});
+  }
   if (input.choice) result.choice = std::move(input.choice);
   if (!result.choice && result.header.devices.size() == 1 && result.audit.shots > 0) {
     try {

@@ -173,25 +173,57 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
 
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
-/// Asks for times, after what is wrong with the shots themselves.
-/// @throws FileError, recordings::MissingTimes
-void require_times(const recordings::Source& source, const recordings::ReadOptions& reading,
-                   const recordings::RecordingHeader& header, const Progress& progress) {
-  try {
-    recordings::require_times(header);
-  } catch (const recordings::MissingTimes& missing) {
-    constexpr double kAnyRate = 1e5;  // Hz
-    recordings::ReadOptions counted = reading;
-    counted.shot_rate = kAnyRate;
-    const estimation::AngleSeries shots = first_second(source, counted, progress);
-    if (const auto problem = recordings::not_a_scan(shots.azimuth, shots.zenith, shots.range)) {
-      throw FileError(source.name(), {}, *problem);
-    }
-    const auto problem =
-        recordings::beyond_reach(shots.range, recordings::kFarthestReach, "these sensors");
-    if (!problem) throw;
-    throw recordings::MissingTimes(fmt::format("{}. Besides, {}", *problem, missing.what()));
+/// The sensor whose rate counts the shots of a recording whose times are all the same, where it is
+/// known.
+std::optional<sensors::Sensor> sensor_to_count_by(const recordings::RecordingHeader& header,
+                                                  const recordings::ReadOptions& reading,
+                                                  const std::optional<sensors::Sensor>& given) {
+  if (!header.all_times_equal || reading.shot_rate || header.devices.size() != 1) {
+    return std::nullopt;
   }
+  const recordings::Device& device = header.devices.front();
+  if (given || device.type == recordings::kUnknownDeviceType) return given;
+  return preset_of_type(device.type);
+}
+
+/// What a recording without times lacks: only their rate, or shots; what is wrong with the shots
+/// themselves comes first.
+/// @throws recordings::MissingTimes, FileError for what is no scan, EstimationError where shots
+/// were removed
+[[noreturn]] void refuse_without_times(const recordings::Source& source,
+                                       const recordings::ReadOptions& reading,
+                                       recordings::Reader& reader, const Progress& progress) {
+  constexpr double kAnyRate = 1e5;  // Hz
+  recordings::ReadOptions counted = reading;
+  counted.shot_rate = kAnyRate;
+  const estimation::AngleSeries first = first_second(source, counted, progress);
+  if (const auto problem = recordings::not_a_scan(first.azimuth, first.zenith, first.range)) {
+    throw FileError(source.name(), {}, *problem);
+  }
+  const auto beyond =
+      recordings::beyond_reach(first.range, recordings::kFarthestReach, "these sensors");
+  UntimedShots shots;
+  recordings::Chunk chunk;
+  try {
+    while (!shots.enough() && reader.read(chunk)) shots.add(chunk.observations);
+  } catch (const FileError&) {  // what is wrong here comes first
+  }
+  const std::string words = shots.removed_words();
+  if (!words.empty()) throw EstimationError(fmt::format("{}: {}", source.name(), words));
+  try {
+    recordings::require_times(reader.header());
+  } catch (const recordings::MissingTimes& missing) {
+    if (!beyond) throw;
+    throw recordings::MissingTimes(fmt::format("{}. Besides, {}", *beyond, missing.what()));
+  }
+  throw EstimationError(fmt::format("{}: has no times", source.name()));
+}
+
+/// @throws EstimationError where shots are missing all over a recording whose shots were counted
+void require_all_shots(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
+                       const std::string& name) {
+  const auto words = removed_shots_words(shots, sensor.train.emitters());
+  if (!words.empty()) throw EstimationError(fmt::format("{}: {}", name, words));
 }
 
 /// Opens a recording, chooses its sensor, and turns it back by the pose that it states where its
@@ -204,10 +236,25 @@ SensorFrameRecording open_by_stated_pose(const recordings::Source& source,
   progress.check();
   SensorFrameRecording result{
       open_input(source, reading, progress), {}, {}, reading.extrinsics.has_value()};
-  require_times(source, reading, result.reader->header(), progress);
+  if (const auto sensor = sensor_to_count_by(result.reader->header(), reading, given)) {
+    result.warnings.push_back(fmt::format(
+        "all times of the recording are the same: shots were counted at the {:.6g} shots "
+        "per second of {}",
+        sensor->shot_rate, sensor->name));
+    reading.shot_rate = sensor->shot_rate;
+    result.reader = open_input(source, reading, progress);
+  }
+  if (!result.reader->header().has_times) {
+    refuse_without_times(source, reading, *result.reader, progress);
+  }
   result.choice = choose_sensor(source, reading, result.reader->header(), given, progress);
   require_possible(result.choice, source.name());
-  result.warnings = result.choice.warnings;
+  result.warnings.insert(result.warnings.end(), result.choice.warnings.begin(),
+                         result.choice.warnings.end());
+  if (result.choice.times_at_fault) {
+    reading.shot_rate = result.choice.sensor.shot_rate;
+    result.reader = open_input(source, reading, progress);
+  }
   const recordings::RecordingHeader& header = result.reader->header();
   if (reading.extrinsics || header.devices.size() != 1) return result;
   const recordings::Device& device = header.devices.front();
@@ -299,6 +346,7 @@ SensorFrameRecording open_in_sensor_frame(const recordings::Source& source,
   }
   const auto shots = counted_shots(source, reading, sensor, progress);
   if (!shots) return result;
+  require_all_shots(*shots, sensor, source.name());
   reading.shot_rate = shots->shot_rate;
   reading.emitters = sensor.train.emitters();
   estimation::ShotCount count = count_of(*shots, sensor, progress);
@@ -321,11 +369,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   SensorFrameRecording input =
       open_in_sensor_frame(source, options.reading, given_sensor(options.sensor), progress);
   recordings::Reader& reader = *input.reader;
-  if (reader.header().devices.size() > 1) {
-    throw InvalidArgument(
-        fmt::format("{} holds {} sensors, an estimation needs the recording of one", source.name(),
-                    reader.header().devices.size()));
-  }
+  recordings::require_one_device(reader.header(), source.name());
   EstimationInput result;
   result.whole_steps = reader.header().cartesian && !input.turned_back && !input.cut_mended;
   estimation::SelectionOptions selection = options.selection;
@@ -351,6 +395,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
   result.choice = std::move(input.choice);
   result.counts = selector.counts();
+  add_left_out_words(result.counts, result.warnings);
   if (result.counts.clock_resets > 0) {
     result.warnings.push_back(
         fmt::format("the clock of the recording jumps back {} times: the pieces share their "
@@ -360,6 +405,43 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   result.head = selector.head();
   result.reading_time = watch.seconds();
   return result;
+}
+
+std::string removed_shots_words(const estimation::CountedShots& shots, int emitters) {
+  const double rows = estimation::rows_between_jumps(shots, emitters);
+  // Where a packet is missing now and then, rotors can be followed from one to the next.
+  constexpr double kFewest = 1000;
+  if (rows >= kFewest) return {};
+  return fmt::format(
+      "shots without a return were removed from this file, which has no times: about every {:.0f} "
+      "rows the beam jumps, and how many shots are missing there, so when each was fired, is lost. "
+      "Directions and ranges hold all the same: they can be looked at, converted, and made a "
+      "cloud. "
+      "An estimation needs the recording with times of single shots, or with shots without a "
+      "return "
+      "kept as 0 0 0, or what it was exported from (LVX, a capture, or a bag of CustomMsg)",
+      rows);
+}
+
+std::string UntimedShots::removed_words() {
+  const estimation::CountedShots shots{selector_.take_series(), selector_.rows(), 0, false};
+  return removed_shots_words(shots, estimation::emitters_in_turn(shots));
+}
+
+void add_left_out_words(const estimation::SelectionCounts& counts,
+                        std::vector<std::string>& words) {
+  if (counts.out_of_order > 0) {
+    words.push_back(fmt::format(
+        "{} of {} shots are a little earlier than the shot before and were left out: packets came "
+        "late",
+        counts.out_of_order, counts.rows));
+  }
+  if (counts.equal_times > 0) {
+    words.push_back(fmt::format(
+        "{} of {} shots have the time of the shot before, so that nobody knows when they were "
+        "fired, and were left out: option shot_rate counts shots, where none is missing",
+        counts.equal_times, counts.rows));
+  }
 }
 
 std::string warning_text(const recordings::ReadWarning& warning) {

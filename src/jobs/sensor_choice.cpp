@@ -304,21 +304,48 @@ SensorChoice choose_without_times(const recordings::Source& source, recordings::
   return choice;
 }
 
+/// Whether counted shots show one of some sensors of one shot rate better than the times do: these
+/// are at fault then.
+/// @param misfit  of what the times show, rad
+/// @param count   gives the first shots as counted at that rate
+template <class Count>
+bool is_at_fault_by_count(std::span<const Sensor> some, double misfit, Count&& count,
+                          SensorChoice& choice) {
+  const auto found = recognised(count(), some);
+  if (!found || !found->fits || misfit_of(found->matches.front()) >= misfit) return false;
+  take(*found, some, choice);
+  choice.times_at_fault = true;
+  choice.warnings.push_back(
+      fmt::format("the times of the recording are at fault: by them its scan is not that of a {}, "
+                  "and counted at "
+                  "{:.6g} shots per second it is",
+                  choice.sensor.model, choice.sensor.shot_rate));
+  return true;
+}
+
 /// What the type that a file names says, and whether the shots contradict it.
+/// @param count  gives the first shots as counted at the rate of that type
+template <class Count>
 SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
-                            std::span<const Sensor> candidates) {
+                            std::span<const Sensor> candidates, Count&& count) {
   SensorChoice choice;
   choice.sensor = named;
   const auto alone = recognised(shots, {&named, 1});
   if (alone) take(*alone, {&named, 1}, choice);
   choice.chosen_by = ChosenBy::file;
   choice.words = "named by the file";
+  if (!alone || !alone->fits) {
+    const double misfit =
+        alone ? misfit_of(alone->matches.front()) : std::numeric_limits<double>::infinity();
+    if (is_at_fault_by_count({&named, 1}, misfit, count, choice)) return choice;
+  }
   const bool by_lines = alone && alone->decided && !alone->matches.front().residual;
   if (!alone || by_lines) return choice;
   const auto found = recognised(shots, candidates);
   if (!found || !found->decided) return choice;
   const SensorMatch& best = found->matches.front();
   if (candidates[best.candidate].name == named.name) return choice;
+  if (is_at_fault_by_count({&named, 1}, misfit_of(best), count, choice)) return choice;
   choice.fits = false;
   choice.misfits = {{candidates[best.candidate].name, misfit_of(best)}};
   for (const SensorMatch& match : found->matches) {
@@ -374,13 +401,30 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
     if (named != nullptr) choice.chosen_by = ChosenBy::file;
     return choice;
   }
+  const auto count = [&] {
+    if (reading.shot_rate) return FirstShots{};  // they are counted already
+    recordings::ReadOptions counting = reading;
+    counting.shot_rate = named->shot_rate;
+    return first_shots(source, counting, {named, 1}, progress);
+  };
   if (named != nullptr && !device.type_inferred) {
     const int lines = choice.lines;
-    choice = choose_by_name(shots, *named, candidates);
+    choice = choose_by_name(shots, *named, candidates, count);
     choice.lines = lines;
     return choice;
   }
   const auto found = recognised(shots, candidates);
+  const Sensor* const best =
+      found && found->decided ? &candidates[found->matches.front().candidate] : nullptr;
+  if (named != nullptr && best != nullptr &&
+      best->shot_rate != named->shot_rate) {  // the rate within packets and messages is another one
+    std::vector<Sensor> some;
+    std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(some),
+                 [&](const Sensor& sensor) { return sensor.shot_rate == named->shot_rate; });
+    choice.chosen_by = ChosenBy::scan;
+    choice.words = "recognised from the scan, where shots are counted";
+    if (is_at_fault_by_count(some, misfit_of(found->matches.front()), count, choice)) return choice;
+  }
   if (found && found->decided) {
     take(*found, candidates, choice);
     choice.chosen_by = ChosenBy::scan;
@@ -392,6 +436,16 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
     choice.words = "by the rates, tags and returns of the file";
   } else {
     guess(shots, found, candidates, choice);
+    if (choice.fits != true && one_sensor && !reading.shot_rate && header.packet_shots == 0) {
+      SensorChoice counted = choose_without_times(source, reading, candidates, shots, progress);
+      if (counted.fits != true) return choice;
+      choice = std::move(counted);
+      choice.times_at_fault = true;
+      choice.warnings.push_back(fmt::format(
+          "the times of the recording are at fault: by them no built-in preset describes its scan; "
+          "counted at {:.6g} shots per second, {} does",
+          choice.sensor.shot_rate, choice.sensor.name));
+    }
   }
   return choice;
 }

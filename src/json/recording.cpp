@@ -34,7 +34,9 @@ Json devices_json(const recordings::RecordingHeader& header, const TimeAuditResu
     const auto pose = recordings::stored_extrinsics(device);
     devices.push_back(
         {{"type", recordings::device_type_name(device.type)},
+         {"sensor", recordings::device_type_name(device.type)},
          {"serial", device.serial},
+         {"topic", device.topic},
          {"hub_serial", device.hub_serial},
          {"extrinsics_deg", pose ? Json(yaw_pitch_roll_deg(*pose)) : Json()},
          {"translation_m",

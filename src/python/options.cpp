@@ -79,7 +79,9 @@ recordings::ReadOptions read_options(const Options& options) {
   YawPitchRoll extrinsics;
   options.take("shot_rate", shot_rate);
   options.take("extrinsics", extrinsics);
-  return read_options(shot_rate, extrinsics);
+  std::string device;
+  options.take("device", device);
+  return read_options(shot_rate, extrinsics, std::move(device));
 }
 
 jobs::HeldParameters held_parameters(const Options& options) {

@@ -68,7 +68,7 @@ class Options {
 recordings::Source recording_source(const Options& options, const char* name);
 /// A list of them.
 std::vector<recordings::Source> recording_sources(const Options& options, const char* name);
-/// shot_rate, Hz, and extrinsics, yaw, pitch, roll in rad.
+/// shot_rate, Hz, extrinsics, yaw, pitch, roll in rad, and device.
 recordings::ReadOptions read_options(const Options& options);
 /// fixed: [(name, value or None)], by either name of a parameter.
 jobs::HeldParameters held_parameters(const Options& options);

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "risley/recordings/reader.hpp"
 
@@ -11,10 +13,12 @@ namespace risley::python {
 
 using YawPitchRoll = std::optional<std::array<double, 3>>;
 
-/// How a recording is to be read. @param yaw_pitch_roll  rad
+/// How a recording is to be read. @param yaw_pitch_roll  rad  @param device  empty: all of them
 inline recordings::ReadOptions read_options(std::optional<double> shot_rate,
-                                            const YawPitchRoll& yaw_pitch_roll) {
+                                            const YawPitchRoll& yaw_pitch_roll,
+                                            std::string device) {
   recordings::ReadOptions options;
+  options.device = std::move(device);
   options.shot_rate = shot_rate;
   if (yaw_pitch_roll) {
     const auto& [yaw, pitch, roll] = *yaw_pitch_roll;

@@ -255,6 +255,7 @@ void bind_header(py::module_& module) {
   using recordings::Device;
   py::class_<Device>(module, "Device", "One sensor of a recording.")
       .def_readonly("serial", &Device::serial, "Broadcast code; empty when it is not known.")
+      .def_readonly("topic", &Device::topic, "Of its messages in a bag; empty in other formats.")
       .def_readonly("hub_serial", &Device::hub_serial, "That of the hub; empty without one.")
       .def_readonly("type", &Device::type, "Number of the Livox type; 255 when it is not known.")
       .def_property_readonly(
@@ -332,10 +333,12 @@ void bind_recordings(py::module_& module) {
   py::class_<ChunkReader>(module, "ChunkReader",
                           "Iterator over the pieces of a recording; see `read_chunks`.")
       .def(py::init([](const std::string& path, std::size_t rows, std::optional<double> shot_rate,
-                       const YawPitchRoll& extrinsics) {
-             return std::make_unique<ChunkReader>(path, rows, read_options(shot_rate, extrinsics));
+                       const YawPitchRoll& extrinsics, std::string device) {
+             return std::make_unique<ChunkReader>(
+                 path, rows, read_options(shot_rate, extrinsics, std::move(device)));
            }),
-           py::arg("path"), py::arg("rows"), py::arg("shot_rate"), py::arg("extrinsics"))
+           py::arg("path"), py::arg("rows"), py::arg("shot_rate"), py::arg("extrinsics"),
+           py::arg("device"))
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &ChunkReader::next)
       .def("__enter__", [](py::object self) { return self; })
@@ -351,15 +354,17 @@ void bind_recordings(py::module_& module) {
   module.def(
       "read",
       [](const std::string& path, std::optional<double> shot_rate, const YawPitchRoll& extrinsics,
-         const py::object& tell) {
-        const recordings::ReadOptions options = read_options(shot_rate, extrinsics);
+         std::string device, const py::object& tell) {
+        const recordings::ReadOptions options =
+            read_options(shot_rate, extrinsics, std::move(device));
         auto recording = std::make_shared<Recording>();
         run_job(tell, 0, [&](const Progress& progress) {
           *recording = recordings::load_recording(path, progress.stage("reading"), options);
         });
         return recording;
       },
-      py::arg("path"), py::arg("shot_rate"), py::arg("extrinsics"), py::arg("tell"));
+      py::arg("path"), py::arg("shot_rate"), py::arg("extrinsics"), py::arg("device"),
+      py::arg("tell"));
   module.def("recording_from_arrays", &recording_from_arrays, py::arg("time_ns"),
              py::arg("azimuth"), py::arg("zenith"), py::arg("range"), py::arg("others"),
              py::arg("serial"), py::arg("device_type"));

@@ -59,6 +59,17 @@ void Observations::append(const Observations& other, std::size_t begin, std::siz
       *this, other);
 }
 
+void Observations::append(const Observations& other, std::span<const std::size_t> rows) {
+  require_columns(other);
+  for (const std::size_t row : rows) require_place("rows", row, other.size());
+  for_each_column(
+      [rows](std::string_view, auto& column, const auto& more) {
+        column.reserve(column.size() + rows.size());
+        for (const std::size_t row : rows) column.push_back(more[row]);
+      },
+      *this, other);
+}
+
 void Observations::drop_front(std::size_t rows) {
   require_columns(*this);
   require_rows("rows", 0, rows, size());
@@ -96,6 +107,25 @@ void require_angles(const Observations& rows) {
       throw InvalidArgument(fmt::format("zenith = {} rad in row {}, allowed 0 to pi", zenith, i));
     }
   }
+}
+
+bool is_further_return(const Observations& rows, std::size_t row) {
+  const std::size_t before = row - 1;
+  if (rows.time_ns[row] != rows.time_ns[before] || rows.device[row] != rows.device[before]) {
+    return false;
+  }
+  if (rows.return_number[row] > 1) return true;
+  if (rows.beam[row] != rows.beam[before] || rows.valid[row] == 0 || rows.valid[before] == 0) {
+    return false;
+  }
+  const auto close = [row, before](const std::vector<double>& angle,
+                                   const std::vector<float>& resolution) {
+    constexpr double kLeast = 1e-7, kSteps = 0.75;  // rad, of each row's rounding
+    const double step =
+        static_cast<double>(resolution[row]) + static_cast<double>(resolution[before]);
+    return std::abs(std::remainder(angle[row] - angle[before], kTwoPi)) <= kLeast + kSteps * step;
+  };
+  return close(rows.azimuth, rows.azimuth_resolution) && close(rows.zenith, rows.zenith_resolution);
 }
 
 void Chunk::clear() {

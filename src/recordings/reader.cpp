@@ -82,9 +82,14 @@ std::unique_ptr<Reader> open_as_it_is(const std::string& path, const Progress& p
 std::unique_ptr<Reader> open_recording(const Source& source, const ReadOptions& options,
                                        const Progress& progress) {
   const std::string& path = source.name();
-  std::unique_ptr<Reader> reader = source.recording()
-                                       ? std::make_unique<MemoryReader>(source.recording())
-                                       : open_as_it_is(path, progress);
+  const auto open_device = [&]() -> std::unique_ptr<Reader> {
+    std::unique_ptr<Reader> reader = source.recording()
+                                         ? std::make_unique<MemoryReader>(source.recording())
+                                         : open_as_it_is(path, progress);
+    if (options.device.empty()) return reader;
+    return of_one_device(std::move(reader), path, options.device);
+  };
+  std::unique_ptr<Reader> reader = with_judged_times(open_device, options, progress);
   if (options.shot_rate) reader = with_counted_times(std::move(reader), path, options);
   if (options.packet_places) reader = with_packet_places(std::move(reader), options);
   if (options.extrinsics) reader = in_sensor_frame(std::move(reader), *options.extrinsics);
@@ -92,6 +97,25 @@ std::unique_ptr<Reader> open_recording(const Source& source, const ReadOptions& 
 }
 
 bool is_recording_folder(const std::string& path) { return bags::is_bag_folder(path); }
+
+std::string devices_words(const RecordingHeader& header) {
+  std::string words;
+  for (std::size_t i = 0; i < header.devices.size(); ++i) {
+    const Device& device = header.devices[i];
+    words += fmt::format("{}{}: {}", words.empty() ? "" : "; ", i, device_type_name(device.type));
+    if (!device.serial.empty()) words += ", serial " + device.serial;
+    if (!device.topic.empty()) words += ", topic " + device.topic;
+  }
+  return words;
+}
+
+void require_one_device(const RecordingHeader& header, const std::string& name) {
+  if (header.devices.size() == 1) return;
+  throw InvalidArgument(
+      fmt::format("{} holds {} sensors, and one is needed here ({}); option device chooses one, by "
+                  "its serial number, its topic or its number in this list",
+                  name, header.devices.size(), devices_words(header)));
+}
 
 void require_times(const RecordingHeader& header) {
   if (header.has_times) return;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,6 +38,23 @@ class DecoratingReader : public Reader {
   std::unique_ptr<Reader> inner_;
   std::optional<FileError> failure_;
 };
+
+/// Opens the same recording again and again.
+using OpenReader = std::function<std::unique_ptr<Reader>()>;
+
+/// Judges times before anybody trusts them, by the first rows of each device. Rows that do not
+/// stand in the order of firing are sorted by their times; times that begin anew with every message
+/// are counted; times that are all the same are none; rounded ones, also where shots share them,
+/// are put on the even grid that they show together. Each is told as a warning. Sound times are
+/// left as they are.
+std::unique_ptr<Reader> with_judged_times(const OpenReader& open, const ReadOptions& options,
+                                          const Progress& progress);
+
+/// Leaves the rows of one sensor, see ReadOptions::device.
+/// @param path  for errors
+/// @throws InvalidArgument as open_recording()
+std::unique_ptr<Reader> of_one_device(std::unique_ptr<Reader> reader, const std::string& path,
+                                      const std::string& device);
 
 /// Gives every row the time that counting its shot gives, see ReadOptions::shot_rate.
 /// @param path  for errors

@@ -86,7 +86,8 @@ std::string interval_words(const Trajectory& trajectory) {
 }
 
 std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns,
-                             std::int64_t last_ns) {
+                             std::int64_t last_ns,
+                             std::optional<std::int64_t> stamps_after_times_ns) {
   if (first_ns <= trajectory.time_ns.back() && last_ns >= trajectory.time_ns.front()) {
     return fmt::format(
         "no shot of the recording has a pose: the trajectory runs {}, the recording from {} to {} "
@@ -108,6 +109,20 @@ std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns
       {-kGpsEpoch, "one counts from 1970, the other GPS time from 1980"},
       {-kGpsEpoch + kLeap, "one counts UTC from 1970, the other GPS time from 1980"},
   }};
+  if (stamps_after_times_ns) {
+    const std::int64_t shift =
+        *stamps_after_times_ns +
+        shift_from_utc_ns(trajectory, first_ns + *stamps_after_times_ns).value_or(0);
+    if (first_ns + shift <= trajectory.time_ns.back() &&
+        last_ns + shift >= trajectory.time_ns.front()) {
+      return words +
+             fmt::format(
+                 "; they are of two clocks: the times of the recording count from power-on of the "
+                 "sensor, the stamps of its messages are UTC. By the stamps, they overlap when "
+                 "{:.6f} s are added to the recording's times (clock_offset_s of the mount)",
+                 1e-9 * static_cast<double>(shift));
+    }
+  }
   for (const auto& [seconds, cause] : causes) {
     const std::int64_t shift = seconds * kClockSecond;
     if (first_ns + shift <= trajectory.time_ns.back() &&

@@ -163,6 +163,7 @@ TEST(AngleSeries, SelectsFirstReturnsInOrderOnAFixedGrid) {
     o.valid[i] = i != 5;
     o.zenith_resolution[i] = 0.12F;
   }
+  o.return_number[1] = 2;
   ShotSelector selector({1000.0});
   selector.add(o);
   EXPECT_EQ(selector.series().time_ns, (std::vector<std::int64_t>{0, 1'000'000, 3'000'000}));

@@ -46,7 +46,9 @@ void read_value(const std::string& word) {
   } catch (const InvalidArgument&) {  // refused
   }
   try {
-    const auto pose = app::read_options({{}, word}).extrinsics;
+    app::ReadingWishes wishes;
+    wishes.extrinsics_deg = word;
+    const auto pose = app::read_options(wishes).extrinsics;
     require(!pose || (std::isfinite(pose->yaw) && std::isfinite(pose->pitch) &&
                       std::isfinite(pose->roll)),
             "a pose is of numbers");

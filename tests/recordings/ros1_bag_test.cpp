@@ -28,7 +28,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 RawMessage custom(std::uint64_t timebase, const std::vector<Point>& points,
-                  std::int64_t claimed_more = 0) {
+                  std::int64_t claimed_more = 0, std::uint8_t lidar = 1, std::uint64_t stamp = 0) {
   RawMessage message;
   message.type = "livox_ros_driver/CustomMsg";
   message.md5 = "e4d6829bdfe657cb6c21a746c86b21a6";
@@ -43,10 +43,10 @@ RawMessage custom(std::uint64_t timebase, const std::vector<Point>& points,
   const auto count =
       static_cast<std::uint32_t>(static_cast<std::int64_t>(points.size()) + claimed_more);
   std::string& bytes = message.bytes;
-  bytes = ros_header(timebase + 137);  // the stamp went through a double
+  bytes = ros_header(stamp > 0 ? stamp : timebase + 137);  // which went through a double
   put<std::uint64_t>(bytes, timebase);
   put<std::uint32_t>(bytes, count);
-  put<std::uint8_t>(bytes, 1);
+  put<std::uint8_t>(bytes, lidar);
   bytes.append(3, '\0');
   put<std::uint32_t>(bytes, count);
   for (const Point& p : points) {
@@ -219,6 +219,7 @@ TEST(Ros1Bag, TellsTheModelWhereOneIsLeft) {
   EXPECT_EQ(type_of(shots(90),
                     [](Point& p, std::size_t i) {
                       p.offset_ns = static_cast<std::uint32_t>(i / 3 * 4167);
+                      p.z -= 0.002F * static_cast<float>(i % 3);  // in the direction of the first
                     }),
             7);
 }
@@ -694,6 +695,76 @@ TEST(Ros1Bag, ReadersOfSeveralThreadsLeaveTheLoggingAsItWas) {
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(rows, 160 * read_all(kRos1BagFormat, path).rows().size());
   EXPECT_EQ(console_bridge::getOutputHandler(), handler);
+}
+
+TEST(Ros1Bag, LidarsOfOneTopicAreToldApartByTheirNumbers) {
+  Bag bag;
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    for (const std::uint8_t lidar : std::vector<std::uint8_t>{0, 1, 4}) {
+      bag.add(kTopic, custom(kPowerOn + i * 500'000 + 137 * lidar,
+                             shots(50, 2.0F + static_cast<float>(lidar)), 0, lidar));
+    }
+  }
+  const Outcome outcome = bag.read();
+  ASSERT_FALSE(outcome.error) << outcome.error->what();
+  ASSERT_EQ(outcome.recording.header.devices.size(), 3U);
+  EXPECT_EQ(outcome.recording.header.devices[2].topic, kTopic);
+  EXPECT_EQ(outcome.recording.header.devices[2].index, 2);
+  const Observations& rows = outcome.rows();
+  ASSERT_EQ(rows.size(), 900U);
+  for (std::size_t row = 0; row < rows.size(); row += 50) {
+    const std::size_t device = row / 50 % 3;
+    EXPECT_EQ(rows.device[row], device);
+    const double x[] = {2.0, 3.0, 6.0};
+    EXPECT_NEAR(rows.range[row], std::hypot(x[device], 0.25, 0.5), 1e-6);
+  }
+  EXPECT_EQ(outcome.recording.warnings.size(), 1U);
+}
+
+TEST(Ros1Bag, OffsetsThatGrowOverMessagesCountFromTheFirst) {
+  Bag bag;
+  constexpr std::uint64_t kMessage = 100'000'000;
+  for (std::uint64_t i = 0; i < 50; ++i) {  // beyond the 4.3 s that an offset holds
+    std::vector<Point> points = shots(10);
+    for (Point& point : points) point.offset_ns += static_cast<std::uint32_t>(i * kMessage);
+    bag.add(kTopic, custom(kPowerOn + i * kMessage, points));
+  }
+  const Outcome outcome = bag.read();
+  ASSERT_FALSE(outcome.error) << outcome.error->what();
+  const Observations& rows = outcome.rows();
+  ASSERT_EQ(rows.size(), 500U);
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    ASSERT_EQ(rows.time_ns[row],
+              static_cast<std::int64_t>(kPowerOn + row / 10 * kMessage + row % 10 * 10'000));
+  }
+  ASSERT_EQ(outcome.recording.warnings.size(), 1U);
+  EXPECT_THAT(outcome.recording.warnings[0].message, HasSubstr("times are at fault"));
+}
+
+TEST(Ros1Bag, StampsInUtcBesideTimesFromPowerOnAreCompared) {
+  Bag bag;
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    bag.add(kTopic, custom(kPowerOn + i * 200'000, shots(20), 0, 1, kUtc + i * 200'000));
+  }
+  const Outcome outcome = bag.read();
+  EXPECT_EQ(outcome.recording.header.time_reference, TimeReference::power_on);
+  ASSERT_TRUE(outcome.recording.header.stamps_after_times_ns);
+  EXPECT_EQ(*outcome.recording.header.stamps_after_times_ns,
+            static_cast<std::int64_t>(kUtc - kPowerOn));
+  EXPECT_FALSE(small_bag().read().recording.header.stamps_after_times_ns);
+}
+
+TEST(Ros1Bag, PointsOfOneTimeInOtherDirectionsAreNoReturns) {
+  Bag bag;
+  std::vector<Point> points = shots(60);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].offset_ns = static_cast<std::uint32_t>(i / 3 * 30'000);
+    points[i].y = 0.1F * static_cast<float>(i);
+  }
+  bag.add(kTopic, custom(kPowerOn, points));
+  const Outcome outcome = bag.read();
+  EXPECT_EQ(outcome.recording.header.returns_per_shot, 1);
+  for (const std::uint8_t number : outcome.rows().return_number) EXPECT_EQ(number, 1);
 }
 
 }  // namespace risley::recordings::ros1_bag_test

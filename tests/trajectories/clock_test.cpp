@@ -45,6 +45,19 @@ TEST(TrajectoryClock, UtcBecomesEveryScaleAndBack) {
   EXPECT_NE(refusal([] { shift_from_utc_ns({}, 0); }).find("records"), std::string::npos);
 }
 
+TEST(TrajectoryClock, StampsInUtcTellTheOffsetOfTimesFromPowerOn) {
+  constexpr std::int64_t kPowerOn = 10;  // s, when UTC was kUtc
+  const Trajectory week = from_to(TimeScale::gps_second_of_week, 129'600, 129'700);
+  const auto words = [&](std::optional<std::int64_t> stamps_after) {
+    return no_overlap_words(week, kPowerOn * kSecond, (kPowerOn + 5) * kSecond, stamps_after);
+  };
+  // GPS second of week 129618 is kUtc.
+  EXPECT_NE(words((kUtc - kPowerOn) * kSecond).find("129608.000000 s are added"),
+            std::string::npos);
+  EXPECT_EQ(words((kUtc - 5000) * kSecond).find("stamps"), std::string::npos);
+  EXPECT_EQ(words({}).find("stamps"), std::string::npos);
+}
+
 TEST(TrajectoryClock, SaysWhyNoTimeIsShared) {
   const Trajectory week = from_to(TimeScale::gps_second_of_week, 129'000, 129'100);
   const auto words = [&](std::int64_t first, std::int64_t last) {

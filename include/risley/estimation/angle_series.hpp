@@ -112,6 +112,7 @@ struct SelectionCounts {
   std::uint64_t rows = 0;             ///< observations offered
   std::uint64_t invalid = 0;          ///< without a direction
   std::uint64_t further_returns = 0;  ///< second and later returns of a shot
+  std::uint64_t equal_times = 0;      ///< other shots with the time of the one before
   std::uint64_t out_of_order = 0;     ///< a little earlier than the shot before
   std::uint64_t clock_resets = 0;     ///< steps back by more than kClockReset
 };
@@ -120,8 +121,9 @@ struct SelectionCounts {
 inline constexpr double kClockReset = 0.01;
 
 /// Chooses shots from a recording that comes in pieces. Only the first return of a shot counts
-/// (all returns share its direction). A row that is a little earlier than the one before is left
-/// out and counted; after a reset of the clock the series goes on with the new times.
+/// (all returns share its direction). Another shot with the same time is left out and counted. A
+/// row that is a little earlier than the one before is left out and counted; after a reset of the
+/// clock the series goes on with the new times.
 class ShotSelector {
  public:
   explicit ShotSelector(const SelectionOptions& options);

@@ -22,6 +22,15 @@ struct CountedShots {
   bool in_turn = false;           ///< the file names no emitters: they were taken to fire in turn
 };
 
+/// Emitters that fire in turn, as far as known sensors have so many: shots of one emitter follow
+/// each other as smoothly as those of one that fires alone.
+int emitters_in_turn(const CountedShots& shots);
+
+/// How many rows stand between two places where the beam of an emitter jumps by several times what
+/// it moves from one of its shots to the next; infinite where it does not, or there are too few
+/// shots to tell. @param emitters  of the sensor, which fire in turn
+double rows_between_jumps(const CountedShots& shots, int emitters);
+
 /// What the rotors say of the count of a recording's shots.
 struct ShotCount {
   /// The rotors could be followed; otherwise nothing is known.

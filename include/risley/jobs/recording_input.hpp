@@ -10,6 +10,7 @@
 #include "risley/core/progress.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/packed_series.hpp"
+#include "risley/estimation/shot_slips.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/reader.hpp"
@@ -43,8 +44,11 @@ struct SensorFrameRecording {
 /// the count and, where the file does not tell which of a sensor's emitters fired, the order in
 /// which they do: see estimation/shot_slips.hpp. Both are mended. Such a recording is read twice,
 /// and all of its directions are held in memory meanwhile.
+/// Shots of a recording whose times are all the same are counted at the rate of its sensor where
+/// that is given or named by the file; so are those whose times choose_sensor() finds at fault.
 /// @param given  sensor that was asked for, see choose_sensor()
-/// @throws recordings::MissingTimes, Cancelled, and as recordings::open_recording, choose_sensor()
+/// @throws recordings::MissingTimes; EstimationError where counted shots lack those without a
+///         return; Cancelled, and as recordings::open_recording, choose_sensor()
 SensorFrameRecording open_in_sensor_frame(const recordings::Source& source,
                                           const recordings::ReadOptions& reading,
                                           const std::optional<sensors::Sensor>& given,
@@ -85,6 +89,28 @@ struct EstimationInput {
 ///         at damage
 EstimationInput read_for_estimation(const EstimationInputOptions& options,
                                     const Progress& progress = {});
+
+/// What is wrong with a count of shots where those without a return were removed; empty where they
+/// were not. @param emitters  of the sensor, which fire in turn
+std::string removed_shots_words(const estimation::CountedShots& shots, int emitters);
+
+/// The first shots of a recording without times, which tell whether others were removed.
+class UntimedShots {
+ public:
+  /// Takes the next rows of the recording.
+  void add(const recordings::Observations& rows) { selector_.add(rows); }
+  /// Whether there are enough to tell.
+  bool enough() const { return selector_.rows().size() >= kMost; }
+  /// As removed_shots_words(), of a sensor that nobody knows. Leaves no shot here.
+  std::string removed_words();
+
+ private:
+  static constexpr std::size_t kMost = 100'000;
+  estimation::ShotSelector selector_{{.rate = std::nullopt, .ranges = false, .rows = true}};
+};
+
+/// Says which shots were left out because their times do not tell when they were fired.
+void add_left_out_words(const estimation::SelectionCounts& counts, std::vector<std::string>& words);
 
 /// A warning of a reader with its place: "... (at byte 17)", "... (line 3)".
 std::string warning_text(const recordings::ReadWarning& warning);

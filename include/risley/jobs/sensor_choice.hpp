@@ -53,6 +53,9 @@ struct SensorChoice {
   std::string beyond_reach;  ///< what is wrong with ranges that the sensor cannot measure, or empty
   int lines =
       0;  ///< the first shots name so many (one more than the highest), 0 when not looked at
+  /// The times of the recording do not describe its scan, and shots that are counted at the rate of
+  /// the sensor do.
+  bool times_at_fault = false;
   /// Order in which its emitters fire where beams are counted.
   estimation::FiringOrder order;
   /// The recording's roll about the optical axis, rad; 0 where it is not known or small. And where
@@ -67,7 +70,8 @@ struct SensorChoice {
 /// the presets' shot rates are tried, and the answer is a guess; so is the preset with the smallest
 /// field of view that holds the shots, where that is all there is. A type that the file names and
 /// the shots contradict is kept, with a warning. Before any is asked, the shots must be those of a
-/// scan.
+/// scan. Where shots contradict the type, or no preset describes them, they are counted, too, to
+/// see whether the times are at fault.
 /// @param header  of the recording
 /// @param given   sensor that was asked for
 /// @throws FileError, InvalidArgument, Cancelled

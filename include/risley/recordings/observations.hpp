@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -41,6 +43,8 @@ struct Observations {
   void append(const Observations& other);
   /// Appends rows [begin, end) of another. @throws InvalidArgument as append(), and beyond its rows
   void append(const Observations& other, std::size_t begin, std::size_t end);
+  /// Appends some rows of another. @throws InvalidArgument as append(), and beyond its rows
+  void append(const Observations& other, std::span<const std::size_t> rows);
   /// Removes rows from the beginning.
   /// @throws InvalidArgument when there are fewer, and as require_columns()
   void drop_front(std::size_t rows);
@@ -54,6 +58,10 @@ void mark_valid(Observations& rows);
 /// @throws InvalidArgument naming the row of a valid direction whose azimuth is not in [-pi, pi] or
 ///         whose zenith is not in [0, pi]
 void require_angles(const Observations& rows);
+
+/// Whether a row is a further return of the shot of the row before, which has the same time: it
+/// says so, or shows the same direction as far as rounding tells. @param row  at least 1
+bool is_further_return(const Observations& rows, std::size_t row);
 
 /// Header of one sensor data packet as it was recorded, kept so that a packet format can be
 /// written again byte by byte.
@@ -99,6 +107,7 @@ inline constexpr std::uint8_t kUnknownDeviceType = 255;
 /// One sensor of a recording.
 struct Device {
   std::string serial;      ///< broadcast code, e.g. "0TFDG3B006H2Z11"; empty when unknown
+  std::string topic;       ///< of a bag, on which its messages are; empty in other formats
   std::string hub_serial;  ///< broadcast code of the hub, empty without one
   std::uint8_t index = 0;  ///< the key by which packets name it
   std::uint8_t type = kMid40;
@@ -132,9 +141,13 @@ struct RecordingHeader {
   std::string format;           ///< short name, e.g. "lvx-1.1", "scan-sequence-csv"
   std::vector<Device> devices;  ///< at least one
   TimeReference time_reference = TimeReference::relative;
+  /// By which UTC stamps of messages are later than times from power-on, ns; empty without them.
+  std::optional<std::int64_t> stamps_after_times_ns = {};
   /// false when the file holds no times of single shots: Observations::time_ns then has shot
   /// numbers 0, 1, 2, ..., in which shots without return and lost ones keep their places.
   bool has_times = true;
+  /// Where it holds none: there are times, and all of them are the same.
+  bool all_times_equal = false;
   /// Shots per second that the times were counted with, Hz; 0 where they are the recording's own.
   double counted_rate = 0;
   std::vector<ShotSlip> slips;  ///< of the count that were mended

@@ -81,6 +81,10 @@ struct PacketPlaces {
 
 /// How a recording is to be read.
 struct ReadOptions {
+  /// Sensor of a recording of several: serial number, topic, or place in
+  /// RecordingHeader::devices, from 0. Only its rows, packets and inertial samples are read, and
+  /// the header names it alone. Empty: all.
+  std::string device = {};
   /// Shots of one device per second, Hz. Times are then counted: shot i is fired at i / shot_rate,
   /// whatever times the file holds. Rows of a further return belong to the shot before them.
   /// Packet headers and inertial samples, which have the file's times, are left out.
@@ -109,20 +113,30 @@ struct ReadOptions {
 
 /// Opens a recording of any known format, recognised by its content and not by its name: a file, or
 /// a folder of ROS 2 whose metadata.yaml names the bags that are read one after the other; or one
-/// in memory.
+/// in memory. Times are judged before they are given: where rows of a file do not stand in the
+/// order of firing they are sorted by time, times that begin anew with every message are counted,
+/// rounded ones are put on the even grid of shots that they show. Warnings tell.
 /// @param progress  cancels opening, and reading where a chunk may take long; its flag must outlive
 ///                  the reader
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;
-///         InvalidArgument when shot_rate is not a finite number above 0, emitters are not 0 to
-///         255 or not as many as the firing order has, slips do not ascend, places come with a shot
-///         rate, without a firing order or for a recording that has none, extrinsics are not
-///         finite, or when they are given for a recording of several sensors
+///         InvalidArgument when device names none or several, shot_rate is not a finite number
+///         above 0, emitters are not 0 to 255 or not as many as the firing order has, slips do not
+///         ascend, places come with a shot rate, without a firing order or for a recording that has
+///         none, extrinsics are not finite, or when they are given for a recording of several
+///         sensors
 std::unique_ptr<Reader> open_recording(const Source& source, const ReadOptions& options = {},
                                        const Progress& progress = {});
 
 /// Whether a folder holds one recording and not any number of them: a bag of ROS 2, also where its
 /// metadata.yaml is missing.
 bool is_recording_folder(const std::string& path);
+
+/// The sensors of a recording in words, each with its number: "0: Livox Avia, serial ..."
+std::string devices_words(const RecordingHeader& header);
+
+/// @param name  of the recording
+/// @throws InvalidArgument for a recording of several sensors: which they are, and how to choose
+void require_one_device(const RecordingHeader& header, const std::string& name);
 
 /// A recording without times was given to something that needs them.
 class MissingTimes : public InvalidArgument {

@@ -28,7 +28,9 @@ std::string interval_words(const Trajectory& trajectory);
 /// Why a recording and a trajectory share no pose: both intervals, and what is probably wrong: leap
 /// seconds, a week, another scale of time, a gap.
 /// @param first_ns, last_ns  of the recording, in what is taken for the trajectory's time
+/// @param stamps_after_times_ns  by which UTC stamps of its messages are later than its times
 std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns,
-                             std::int64_t last_ns);
+                             std::int64_t last_ns,
+                             std::optional<std::int64_t> stamps_after_times_ns = {});
 
 }  // namespace risley::trajectories

@@ -161,32 +161,26 @@ class LasReader final : public Reader {
                    file_.point_format));
       return;
     }
-    std::size_t shots = 0, times = 0, backwards = 0;
+    std::size_t shots = 0, times = 0;
     double first = 0, last = 0;
     for (std::size_t i = 0; i < ahead_.size(); ++i) {
       const double time = ahead_[i].gps_time;
       if (i > 0 && is_further_return(ahead_[i], ahead_[i - 1])) continue;
       ++shots;
       if (times == 0 || time != last) ++times;
-      if (times > 1 && time < last) ++backwards;
       if (i == 0) first = time;
       last = time;
     }
     if ((times == 1 && shots > 1) || (times > 0 && shots / times >= kShotsOfOneTime)) {
       header_.has_times = false;
+      header_.all_times_equal = times == 1;
       warn({}, fmt::format("GPS times are not those of single shots: {} of the first {} shots {}; "
                            "points are taken to be in the order of firing",
                            times == 1 ? "all" : fmt::format("{} on average", shots / times), shots,
                            times == 1 ? fmt::format("have {} s", first) : "share one"));
       return;
     }
-    const bool fit = times_fit(adjusted);
-    if (adjusted && fit) header_.time_reference = TimeReference::utc;
-    if (backwards > 0) {
-      warn({}, fmt::format("GPS times go back {} times in the first {} shots: the points are not "
-                           "in the order of firing, which an estimation needs",
-                           backwards, shots));
-    }
+    if (times_fit(adjusted) && adjusted) header_.time_reference = TimeReference::utc;
   }
 
   /// Whether the times of the first points can be what the header says they are; says what they may
@@ -204,8 +198,7 @@ class LasReader final : public Reader {
     if (adjusted && low >= 0 && high <= kWeek) {
       found =
           "the header says that times are adjusted GPS time, which would be of September 2011; "
-          "they "
-          "look like seconds of the GPS week: clear bit 0 of the global encoding";
+          "they look like seconds of the GPS week: clear bit 0 of the global encoding";
     } else if (adjusted && low >= kOther) {
       found = fmt::format(
           "the header says that times are adjusted GPS time, which would be of 2043 or later; they "

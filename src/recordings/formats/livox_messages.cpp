@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
+#include "risley/core/vector3.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
@@ -53,7 +55,14 @@ bool is_close(double value, double expected) {
   return std::fabs(value - expected) < 0.05 * expected;
 }
 
-/// Number of points from `first` on that have its time and line: the returns of one shot.
+/// Whether two points may be returns of one shot: they lie in one direction, as far as coordinates
+/// in whole millimetres tell.
+bool in_one_direction(const MessagePoint& a, const MessagePoint& b) {
+  const Vector3<double> one{a.x, a.y, a.z}, other{b.x, b.y, b.z};
+  return norm(cross(one, other)) <= 2 * kMillimetre * (norm(one) + norm(other));
+}
+
+/// Number of points from `first` on that have its time and line.
 std::size_t run_length(const std::vector<MessagePoint>& points, std::size_t first) {
   std::size_t end = first + 1;
   while (end < points.size() && points[end].offset_ns == points[first].offset_ns &&
@@ -61,6 +70,15 @@ std::size_t run_length(const std::vector<MessagePoint>& points, std::size_t firs
     ++end;
   }
   return end - first;
+}
+
+/// Whether so many points of one time and line are the returns of one shot.
+bool is_one_shot(const std::vector<MessagePoint>& points, std::size_t first, std::size_t run) {
+  if (run > kMostReturns) return false;
+  for (std::size_t i = first + 1; i < first + run; ++i) {
+    if (!in_one_direction(points[first], points[i])) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -104,6 +122,8 @@ MessageReader::MessageReader(std::unique_ptr<bags::Bag> bag, std::string_view fo
     : bag_(std::move(bag)) {
   header_.format = format;
   choose_topics();
+  find_lidars();
+  choose_imu_topics();
   describe();
 }
 
@@ -171,12 +191,62 @@ void MessageReader::choose_topics() {
     }
     Device device;
     device.serial = serial_of(topic.name);
+    device.topic = topic.name;
     device.index = static_cast<std::uint8_t>(header_.devices.size());
     device.type = kUnknownDeviceType;
     devices_[i] = device.index;
     header_.devices.push_back(device);
   }
-  choose_imu_topics();
+  lidars_.assign(topics().size(), {});
+}
+
+void MessageReader::find_lidars() {
+  std::vector<std::set<std::uint8_t>> seen(topics().size());
+  std::size_t points = 0, messages = 0;
+  LidarMessage message;
+  rewind();
+  try {
+    while (points < kPointsLookedAt && messages < kPointMessagesLookedAt * header_.devices.size() &&
+           next(message)) {
+      ++messages;
+      points += message.points.size();
+      seen[message.topic].insert(message.lidar);
+    }
+  } catch (const FileError&) {
+    // Reported when the caller comes to it, behind the sound messages.
+  }
+  std::vector<Device> devices;
+  for (std::size_t i = 0; i < topics().size(); ++i) {
+    if (!devices_[i]) continue;
+    Device device = header_.devices[*devices_[i]];
+    devices_[i] = static_cast<std::uint8_t>(devices.size());
+    const std::size_t sharing = std::max<std::size_t>(seen[i].size(), 1);
+    if (devices.size() + sharing > UINT8_MAX + std::size_t{1}) {
+      bag_->fail("holds the points of more than 256 lidars, expected at most 256");
+    }
+    if (sharing > 1) {
+      lidars_[i].assign(seen[i].begin(), seen[i].end());
+      warn(
+          fmt::format("{} lidars share the topic {}: they are told apart by the numbers that the "
+                      "driver gave them",
+                      sharing, topics()[i].name));
+      device.serial.clear();
+    }
+    for (std::size_t lidar = 0; lidar < sharing; ++lidar) {
+      device.index = static_cast<std::uint8_t>(devices.size());
+      devices.push_back(device);
+    }
+  }
+  header_.devices = std::move(devices);
+  growth_from_ns_.assign(header_.devices.size(), std::nullopt);
+}
+
+std::optional<std::uint8_t> MessageReader::device_of(const LidarMessage& message) const {
+  const std::vector<std::uint8_t>& lidars = lidars_[message.topic];
+  if (lidars.empty()) return devices_[message.topic];
+  const auto found = std::find(lidars.begin(), lidars.end(), message.lidar);
+  if (found == lidars.end()) return std::nullopt;
+  return static_cast<std::uint8_t>(*devices_[message.topic] + (found - lidars.begin()));
 }
 
 /// An IMU belongs to the lidar of its serial or name space, or to the only lidar when it is itself
@@ -194,7 +264,7 @@ void MessageReader::choose_imu_topics() {
       const bool same_sensor = serial == header_.devices[*devices_[lidar]].serial &&
                                (!serial.empty() || name_space_of(topics()[lidar].name) ==
                                                        name_space_of(topics()[i].name));
-      if (same_sensor) candidates.push_back(*devices_[lidar]);
+      if (same_sensor && lidars_[lidar].empty()) candidates.push_back(*devices_[lidar]);
     }
     if (candidates.size() == 1) {
       devices_[i] = candidates.front();
@@ -217,6 +287,8 @@ struct MessageReader::FirstMessages {
   std::size_t most_returns = 1;
   bool tagged = false, several_lines = false;
   std::vector<double> accelerations;
+  /// Times, stamps and earliest offsets of messages.
+  std::vector<std::int64_t> times_ns, stamps_ns, offsets_ns;
 };
 
 void MessageReader::find_cloud_times() {
@@ -261,7 +333,7 @@ void MessageReader::describe() {
   header_.has_intensity = false;
   find_cloud_times();
   rewind();
-  std::vector<FirstMessages> first(topics().size());
+  std::vector<FirstMessages> first(topics().size()), lidars(header_.devices.size());
   std::size_t points = 0, messages = 0, point_messages = 0;
   std::optional<std::int64_t> first_time_ns;
   LidarMessage message;
@@ -269,12 +341,14 @@ void MessageReader::describe() {
     while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
            point_messages < kPointMessagesLookedAt * header_.devices.size() && next(message)) {
       ++messages;
-      FirstMessages& topic = first[message.topic];
       if (topics()[message.topic].kind == MessageKind::imu) {
         const auto& a = message.acceleration;
-        topic.accelerations.push_back(std::hypot(a[0], a[1], a[2]));
+        first[message.topic].accelerations.push_back(std::hypot(a[0], a[1], a[2]));
         continue;
       }
+      const auto device = device_of(message);
+      if (!device) continue;
+      FirstMessages& topic = lidars[*device];
       ++point_messages;
       points += message.points.size();
       header_.has_intensity = header_.has_intensity || message.has_intensity;
@@ -285,13 +359,25 @@ void MessageReader::describe() {
       }
       topic.last_time_ns = message.time_ns;
       topic.last_points = message.points.size();
+      if (topics()[message.topic].kind == MessageKind::points && !message.points.empty()) {
+        topic.times_ns.push_back(message.time_ns);
+        topic.stamps_ns.push_back(message.stamp_ns);
+        topic.offsets_ns.push_back(
+            std::min_element(message.points.begin(), message.points.end(),
+                             [](const MessagePoint& a, const MessagePoint& b) {
+                               return a.offset_ns < b.offset_ns;
+                             })
+                ->offset_ns);
+      }
       const bool timed = has_times(message.topic);
       for (std::size_t i = 0; i < message.points.size();) {
         const MessagePoint& point = message.points[i];
         topic.tagged = topic.tagged || point.tag != 0;
         topic.several_lines = topic.several_lines || point.line != 0;
         const std::size_t run = timed ? run_length(message.points, i) : 1;
-        if (run <= kMostReturns) topic.most_returns = std::max(topic.most_returns, run);
+        if (is_one_shot(message.points, i, run)) {
+          topic.most_returns = std::max(topic.most_returns, run);
+        }
         if (i + run < message.points.size() && timed &&
             message.points[i + run].offset_ns > point.offset_ns) {
           topic.intervals.push_back(
@@ -310,9 +396,16 @@ void MessageReader::describe() {
   }
   for (std::size_t i = 0; i < topics().size(); ++i) {
     if (!devices_[i]) continue;
-    if (topics()[i].kind == MessageKind::cloud && !has_times(i)) settle_cloud_grid(i, first[i]);
+    if (topics()[i].kind == MessageKind::cloud && !has_times(i)) {
+      settle_cloud_grid(i, lidars[*devices_[i]]);
+    }
     if (topics()[i].kind != MessageKind::imu) {
-      describe_device(i, first[i]);
+      const std::size_t sharing = std::max<std::size_t>(lidars_[i].size(), 1);
+      for (std::size_t lidar = 0; lidar < sharing; ++lidar) {
+        const auto device = static_cast<std::uint8_t>(*devices_[i] + lidar);
+        describe_device(i, device, lidars[device]);
+        compare_clocks(device, lidars[device]);
+      }
     } else if (!first[i].accelerations.empty() && median(first[i].accelerations) > kLongestInG) {
       acceleration_units_[i] = 1.0 / kStandardGravity;
       warn(
@@ -326,11 +419,11 @@ void MessageReader::describe() {
 
 /// Tells the model where only one is left: three returns have only the Avia, 100 kHz only the
 /// Mid-40, which has no tags, and the Mid-70, which has.
-void MessageReader::describe_device(std::size_t topic, FirstMessages& first) {
+void MessageReader::describe_device(std::size_t topic, std::uint8_t number, FirstMessages& first) {
   const bool is_cloud = !has_times(topic);
   const int returns = is_cloud ? clouds_[topic].returns : static_cast<int>(first.most_returns);
   header_.returns_per_shot = std::max(header_.returns_per_shot, returns);
-  Device& device = header_.devices[*devices_[topic]];
+  Device& device = header_.devices[number];
   device.type_inferred = true;
   if (returns == 3) {
     device.type = kAvia;
@@ -339,6 +432,35 @@ void MessageReader::describe_device(std::size_t topic, FirstMessages& first) {
     // Drivers and tools that know no tags write 0, too.
     device.type = first.tagged || returns > 1 ? kMid70 : kMid40;
   }
+}
+
+void MessageReader::compare_clocks(std::uint8_t device, const FirstMessages& first) {
+  const std::size_t messages = first.times_ns.size();
+  if (messages == 0) return;
+  if (first.times_ns.front() < kYear2000 && first.stamps_ns.front() >= kYear2000) {
+    std::vector<double> later;
+    for (std::size_t i = 0; i < messages; ++i) {
+      later.push_back(static_cast<double>(first.stamps_ns[i] - first.times_ns[i] -
+                                          first.stamps_ns[0] + first.times_ns[0]));
+    }
+    header_.stamps_after_times_ns =
+        first.stamps_ns[0] - first.times_ns[0] + std::llround(median(later));
+  }
+  // Whether offsets grow by as much as the times do.
+  bool grow = messages > 1;
+  for (std::size_t i = 1; i < messages; ++i) {
+    const std::int64_t passed = first.times_ns[i] - first.times_ns[0],
+                       grown = first.offsets_ns[i] - first.offsets_ns[0];
+    constexpr std::int64_t kMostApart = 2'000'000;  // ns; no message is shorter
+    grow = grow && passed > kMostApart && std::abs(grown - passed) < kMostApart;
+  }
+  if (!grow) return;
+  growth_from_ns_[device] = first.times_ns[0];
+  warn(
+      fmt::format("times are at fault: the offset times of topic {} do not begin anew with each "
+                  "message but grow as the time of the messages does; they were taken as counted "
+                  "from the first message",
+                  header_.devices[device].topic));
 }
 
 /// Finds the shots per second and the returns per shot of a cloud topic from its points per
@@ -407,10 +529,20 @@ void MessageReader::take_bag_warnings() {
   for (const bags::BagWarning& one : bag_->warnings()) {
     warnings_.push_back({one.place, one.message, 0});
   }
+  if (unknown_lidar_points_ == 0) return;
+  warnings_.push_back({{},
+                       "points of lidars that are not among the first messages of their topic were "
+                       "left out",
+                       unknown_lidar_points_});
 }
 
 void MessageReader::append(const LidarMessage& message, Chunk& chunk) {
-  const std::uint8_t device = *devices_[message.topic];
+  const auto known = device_of(message);
+  if (!known) {
+    unknown_lidar_points_ += message.points.size();
+    return;
+  }
+  const std::uint8_t device = *known;
   switch (*topics()[message.topic].kind) {
     case MessageKind::points:
       append_points(message, device, chunk.observations);
@@ -448,19 +580,27 @@ void MessageReader::append_points(const LidarMessage& message, std::uint8_t devi
   const std::vector<MessagePoint>& points = message.points;
   std::size_t row = rows.size();
   rows.resize(row + points.size());
+  // Offsets that grow are 32-bit numbers and begin again after 4.3 s.
+  const std::int64_t grown =
+      growth_from_ns_[device] ? message.time_ns - *growth_from_ns_[device] : 0;
+  const auto time_of = [&](const MessagePoint& point) {
+    if (grown == 0) return message.time_ns + point.offset_ns;
+    return message.time_ns + std::int64_t{static_cast<std::int32_t>(
+                                 static_cast<std::uint32_t>(point.offset_ns - grown))};
+  };
   for (std::size_t first = 0; first < points.size();) {
     const std::size_t run = run_length(points, first);
-    const bool is_shot = run <= kMostReturns;
-    if (!is_shot && !equal_times_reported_) {
+    const bool is_shot = is_one_shot(points, first, run);
+    if (run > kMostReturns && !equal_times_reported_) {
       equal_times_reported_ = true;
       warn(
           fmt::format("{} points of topic {} have the same time; where more than {} do, each is "
-                      "taken as a separate shot, and when it was fired is unknown",
+                      "taken as a separate shot",
                       run, topics()[message.topic].name, kMostReturns));
     }
     for (std::size_t i = 0; i < run; ++i, ++row) {
       const MessagePoint& point = points[first + i];
-      set_row(rows, row, point, message.time_ns + point.offset_ns, is_shot ? i + 1 : 1, device);
+      set_row(rows, row, point, time_of(point), is_shot ? i + 1 : 1, device);
     }
     first += run;
   }

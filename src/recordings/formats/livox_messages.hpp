@@ -9,9 +9,13 @@
 // the year 2000 on are taken as UTC (PTP may serve TAI, which no message tells), earlier ones as
 // counted from power-on.
 //
-// Sensors. Every topic of points is one device; its serial is the broadcast code with which the
-// topic ends, if it does. Messages do not name the model: it is told only where the shot interval,
-// the tags and the returns leave a single one.
+// Offset times that grow from message to message as the time of the messages does are counted from
+// the first message, and are taken so.
+//
+// Sensors. Every topic of points is one device, or one for each lidar number that its CustomMsg
+// have where drivers publish several sensors together; its serial is the broadcast code with which
+// the topic ends, if it does. Messages do not name the model: it is told only where the shot
+// interval, the tags and the returns leave a single one.
 #pragma once
 
 #include <array>
@@ -24,6 +28,7 @@
 #include <vector>
 
 #include "risley/bags/bag.hpp"
+#include "risley/bags/message_fields.hpp"
 #include "risley/core/error.hpp"
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/reader.hpp"
@@ -44,8 +49,10 @@ struct MessagePoint {
 
 /// A message of a lidar after decoding.
 struct LidarMessage {
-  std::size_t topic = 0;     ///< index of the topic
-  std::int64_t time_ns = 0;  ///< of the first point, or of the inertial sample
+  std::size_t topic = 0;      ///< index of the topic
+  std::int64_t time_ns = 0;   ///< of the first point, or of the inertial sample
+  std::int64_t stamp_ns = 0;  ///< of the header
+  std::uint8_t lidar = 0;     ///< number that the driver gave the sensor
   std::vector<MessagePoint> points;
   bool has_intensity = true;
   std::array<double, 3> angular_velocity{};  ///< rad/s
@@ -56,6 +63,11 @@ struct LidarMessage {
 
 /// Bytes of one point of a CustomMsg, without padding.
 inline constexpr std::size_t kCustomPointBytes = 19;
+
+/// The stamp of a header that is not needed, whatever it says, ns.
+inline std::int64_t unchecked_stamp(const bags::Header& header) {
+  return header.seconds * 1'000'000'000 + std::int64_t{header.nanoseconds};
+}
 
 /// Adds a point of a CustomMsg. @throws BadMessage when a coordinate is no number
 void append_point(LidarMessage& message, const MessagePoint& point);
@@ -88,6 +100,8 @@ class MessageReader final : public Reader {
   const std::vector<bags::Topic>& topics() const { return bag_->topics(); }
   /// Chooses the topics of points and those of inertial samples.
   void choose_topics();
+  /// Makes devices of the lidars that share a topic.
+  void find_lidars();
   /// Completes the header from the first messages.
   void describe();
   /// Finds the fields by which clouds tell times, from the first messages.
@@ -99,7 +113,11 @@ class MessageReader final : public Reader {
   void set_times(LidarMessage& message) const;
   void take_bag_warnings();
   void choose_imu_topics();
-  void describe_device(std::size_t topic, FirstMessages& first);
+  void describe_device(std::size_t topic, std::uint8_t device, FirstMessages& first);
+  /// Device of a message of points; empty where it is none of those known.
+  std::optional<std::uint8_t> device_of(const LidarMessage& message) const;
+  /// Clocks of the times and of the stamps, and offset times that grow.
+  void compare_clocks(std::uint8_t device, const FirstMessages& first);
   /// Whether the points of a topic have times of their own.
   bool has_times(std::size_t topic) const {
     return topics()[topic].kind == MessageKind::points || cloud_times_[topic];
@@ -113,13 +131,16 @@ class MessageReader final : public Reader {
   void warn(std::string message) { warnings_.push_back({{}, std::move(message), 0}); }
 
   std::unique_ptr<bags::Bag> bag_;
-  std::vector<std::optional<std::uint8_t>> devices_;   ///< by topic; empty when it is not read
-  std::vector<CloudGrid> clouds_;                      ///< by topic
-  std::vector<std::optional<CloudTime>> cloud_times_;  ///< by topic
-  std::vector<std::string> unused_times_;              ///< by topic: why a field is not used
-  std::vector<double> acceleration_units_;             ///< by topic: g per unit of the message
+  std::vector<std::optional<std::uint8_t>> devices_;  ///< by topic; empty when it is not read
+  std::vector<std::vector<std::uint8_t>> lidars_;     ///< by topic: numbers that share it
+  std::vector<std::optional<std::int64_t>> growth_from_ns_;  ///< by device: offsets count from it
+  std::vector<CloudGrid> clouds_;                            ///< by topic
+  std::vector<std::optional<CloudTime>> cloud_times_;        ///< by topic
+  std::vector<std::string> unused_times_;                    ///< by topic: why a field is not used
+  std::vector<double> acceleration_units_;  ///< by topic: g per unit of the message
   LidarMessage message_;
   std::optional<FileError> failure_;
+  std::uint64_t unknown_lidar_points_ = 0;
   bool equal_times_reported_ = false, imu_without_numbers_reported_ = false, ended_ = false;
 };
 

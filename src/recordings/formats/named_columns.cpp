@@ -351,6 +351,8 @@ void NamedColumns::settle_time(RecordingHeader& header, std::vector<std::string>
   for (const Source& source : sources_) {
     if (source.meaning.role != Role::time) continue;
     if (is_shared_by_many(source)) {
+      const auto [low, high] = extent(source.samples);
+      header.all_times_equal = low == high;
       shared += fmt::format("{}{}", shared.empty() ? "" : ", ", name_of(source));
     } else if (chosen == nullptr) {
       chosen = &source;
@@ -365,6 +367,7 @@ void NamedColumns::settle_time(RecordingHeader& header, std::vector<std::string>
                     printable(shared), chosen != nullptr ? "" : ": the recording has no times"));
   }
   header.has_times = chosen != nullptr;
+  header.all_times_equal = header.all_times_equal && !header.has_times;
   auto& cell = cell_of_[static_cast<std::size_t>(Role::time)];
   cell.reset();
   if (chosen == nullptr) return;

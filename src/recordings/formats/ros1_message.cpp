@@ -22,10 +22,10 @@ using bags::Ros1Fields;
 using io::load;
 
 void decode_points(Ros1Fields bytes, LidarMessage& message) {
-  take_header(bytes);
+  message.stamp_ns = unchecked_stamp(take_header(bytes));
   message.time_ns = message_time(bytes.number<std::uint64_t>("the time base"));
   bytes.number<std::uint32_t>("the number of points");
-  bytes.take(4, "bytes of lidar number and reserve");
+  message.lidar = bytes.take(4, "bytes of lidar number and reserve").front();
   const auto count = bytes.number<std::uint32_t>("the length of the points");
   require_room("points", count, kCustomPointBytes, bytes.left());
   message.points.reserve(count);

@@ -21,10 +21,11 @@ void skip_doubles(CdrFields& cdr, int count) {
 }
 
 void decode_points(CdrFields& cdr, LidarMessage& message) {
-  take_header(cdr);
+  message.stamp_ns = unchecked_stamp(take_header(cdr));
   message.time_ns = message_time(cdr.number<std::uint64_t>());
   cdr.number<std::uint32_t>();  // number of points, also in front of them
-  for (int i = 0; i < 4; ++i) cdr.number<std::uint8_t>();  // lidar number and reserve
+  message.lidar = cdr.number<std::uint8_t>();
+  for (int i = 0; i < 3; ++i) cdr.number<std::uint8_t>();  // reserve
   const std::uint32_t count = cdr.length("points", kCustomPointBytes);
   message.points.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {

@@ -1,0 +1,340 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Times are judged before anybody trusts them: whether the rows stand in their order, whether times
+// tell more than the order within a message, and how they are rounded.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "risley/core/saturating.hpp"
+
+#include "recordings/reader_decorators.hpp"
+#include "recordings/time_grid.hpp"
+#include "recordings/time_order.hpp"
+
+namespace risley::recordings {
+namespace {
+
+/// So many rows are judged: a second of the fastest sensor, and more.
+constexpr std::size_t kRowsJudged = 1 << 18;
+/// Packets have a grid of their own.
+constexpr std::size_t kRowsOfPacketsJudged = 1 << 15;
+/// Rows that are put on a grid together; as many stay behind, so that no part is a short one.
+constexpr std::size_t kRowsTogether = 1 << 17;
+
+/// Rows of each device, as they stand.
+std::vector<std::vector<std::size_t>> rows_by_device(const Observations& rows) {
+  std::vector<std::vector<std::size_t>> which;
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    if (rows.device[row] >= which.size()) which.resize(rows.device[row] + std::size_t{1});
+    which[rows.device[row]].push_back(row);
+  }
+  return which;
+}
+
+/// Looks ahead into a recording, and reads it with its times put right.
+class JudgedReader final : public Reader {
+ public:
+  /// @param counted  whoever reads counts the shots
+  JudgedReader(std::unique_ptr<Reader> inner, bool counted, const Progress& progress)
+      : inner_(std::move(inner)), counted_(counted) {
+    header_ = inner_->header();
+    if (!header_.has_times || header_.packet_shots > 0) return;
+    std::vector<Chunk> ahead = look_ahead(progress);
+    if (counted_ && in_packets_) return;
+    judge(ahead);
+    if (!changes_) return;
+    for (Chunk& chunk : ahead) take(std::move(chunk));
+    settle();
+    describe();
+  }
+
+  /// Whether there is anything to put right, or to tell.
+  bool changes() const { return changes_; }
+
+  bool read(Chunk& chunk, std::size_t max_rows) override {
+    chunk.clear();
+    Chunk more;
+    while (ready_at_ == ready_.size() && imu_.empty() && !is_at_end()) {
+      if (next(more)) take(std::move(more));
+      settle();
+    }
+    const std::size_t rows = std::min(max_rows, ready_.size() - ready_at_);
+    chunk.observations.append(ready_, ready_at_, ready_at_ + rows);
+    ready_at_ += rows;
+    chunk.imu = std::exchange(imu_, {});
+    describe();
+    if (rows > 0 || !chunk.imu.empty()) return true;
+    if (failure_) throw FileError(*failure_);
+    return false;
+  }
+
+  double fraction_read() const override {
+    const bool all_given = ready_at_ == ready_.size() && held_.size() + ordered_.size() == 0;
+    return all_given ? inner_->fraction_read() : 0.5 * inner_->fraction_read();
+  }
+
+ private:
+  /// What is done about one device's times.
+  struct Device {
+    OrderJudgement order;
+    std::int64_t window_ns = 0;  ///< within which rows are mixed
+    std::optional<TimeGrid> grid;
+    std::optional<std::int64_t> latest_ns;  ///< time that was read
+    // Of times that begin anew:
+    std::int64_t run_begin_ns = 0, last_ns = 0, run_shot = 0, last_shot = -1;
+  };
+
+  bool is_at_end() const { return ended_ || failure_; }
+
+  /// One chunk of the inner reader. @return whether there was one
+  bool next(Chunk& chunk) {
+    if (is_at_end()) return false;
+    try {
+      if (inner_->read(chunk)) return true;
+      ended_ = true;
+    } catch (const FileError& error) {
+      failure_.emplace(error);
+    }
+    return false;
+  }
+
+  std::vector<Chunk> look_ahead(const Progress& progress) {
+    std::vector<Chunk> ahead;
+    std::size_t rows = 0;
+    Chunk chunk;
+    while (rows < (in_packets_ ? kRowsOfPacketsJudged : kRowsJudged) && next(chunk)) {
+      in_packets_ = in_packets_ || !chunk.packets.empty();
+      rows += chunk.observations.size();
+      ahead.push_back(std::move(chunk));
+      progress.check();
+    }
+    return ahead;
+  }
+
+  void judge(const std::vector<Chunk>& ahead) {
+    Observations rows;
+    for (const Chunk& chunk : ahead) rows.append(chunk.observations);
+    std::vector<std::vector<std::size_t>> which = rows_by_device(rows);
+    devices_.resize(std::max(header_.devices.size(), which.size()));
+    for (std::size_t i = 0; i < which.size(); ++i) judge(rows, std::move(which[i]), devices_[i]);
+  }
+
+  void judge(const Observations& rows, std::vector<std::size_t> which, Device& device) {
+    if (in_packets_) {  // writers fill packets up with records without a return
+      std::erase_if(which, [&rows](std::size_t row) { return rows.valid[row] == 0; });
+    }
+    device.order = judge_order(rows, which, in_packets_);
+    switch (device.order.order) {
+      case RowOrder::mixed: {
+        const auto [first, last] = std::minmax_element(
+            which.begin(), which.end(),
+            [&rows](std::size_t a, std::size_t b) { return rows.time_ns[a] < rows.time_ns[b]; });
+        const std::int64_t span = saturating_difference(rows.time_ns[*last], rows.time_ns[*first]);
+        constexpr std::int64_t kShare = 8;
+        const bool near = !is_at_end() && device.order.depth_ns < span / kShare;
+        device.window_ns =
+            near ? 2 * device.order.depth_ns : std::numeric_limits<std::int64_t>::max();
+        order_by_time(rows, which);
+        changes_ = true;
+        break;
+      }
+      case RowOrder::begins_anew:
+      case RowOrder::constant:
+        if (counted_) return;
+        changes_ = true;
+        if (device.order.order == RowOrder::constant) {
+          header_.has_times = false;
+          header_.all_times_equal = true;
+        }
+        if (header_.has_times) header_.counted_rate = 1e9 / device.order.step_ns;
+        header_.time_reference = TimeReference::relative;
+        return;
+      case RowOrder::overlapping:
+        changes_ = true;  // which is told
+        break;
+      case RowOrder::ascending:
+        break;
+    }
+    if (in_packets_ || counted_) return;
+    device.grid.emplace(rows, which);
+    changes_ = changes_ || !device.grid->words().empty();
+  }
+
+  /// Takes rows of the inner reader into hand.
+  void take(Chunk&& chunk) {
+    for (std::size_t row = 0; row < chunk.observations.size(); ++row) {
+      Device& device = devices_[chunk.observations.device[row]];
+      const std::int64_t time_ns = chunk.observations.time_ns[row];
+      if (device.latest_ns && time_ns < *device.latest_ns &&
+          device.order.order == RowOrder::mixed) {
+        ++mixed_rows_;
+      }
+      device.latest_ns = std::max(device.latest_ns.value_or(time_ns), time_ns);
+      if (!counted_) count(chunk.observations, row, device);
+    }
+    const bool anew = header_.counted_rate > 0 || !header_.has_times;
+    if (anew) lost_samples_ += chunk.imu.size();
+    if (!anew) imu_.insert(imu_.end(), chunk.imu.begin(), chunk.imu.end());
+    held_.append(chunk.observations);
+  }
+
+  void settle() {
+    order();
+    put_on_grid();
+  }
+
+  /// Counts a shot whose time says little.
+  void count(Observations& rows, std::size_t row, Device& device) const {
+    std::int64_t& time_ns = rows.time_ns[row];
+    const RowOrder order = device.order.order;
+    if (order != RowOrder::begins_anew && order != RowOrder::constant) {
+      if (!header_.has_times) time_ns = ++device.last_shot;
+      return;
+    }
+    const bool first = device.last_shot < 0;
+    const bool further = !first && time_ns == device.last_ns && rows.return_number[row] > 1;
+    if (order == RowOrder::constant || !header_.has_times) {
+      if (!further) ++device.last_shot;
+      device.last_ns = time_ns;
+      time_ns = device.last_shot;
+      return;
+    }
+    if (first || time_ns < device.last_ns) {
+      device.run_begin_ns = time_ns;
+      device.run_shot = device.last_shot + 1;
+    }
+    device.last_ns = time_ns;
+    if (!further) {
+      const auto since = static_cast<double>(saturating_difference(time_ns, device.run_begin_ns));
+      device.last_shot = device.run_shot + std::llround(since / device.order.step_ns);
+    }
+    time_ns = std::llround(static_cast<double>(device.last_shot) * device.order.step_ns);
+  }
+
+  /// Moves on rows before which no other can come.
+  void order() {
+    const bool all = is_at_end();
+    std::vector<std::size_t> kept;
+    const auto which = rows_by_device(held_);
+    for (std::size_t i = 0; i < which.size(); ++i) {
+      const Device& device = devices_[i];
+      if (device.order.order != RowOrder::mixed) {
+        ordered_.append(held_, which[i]);
+        continue;
+      }
+      const std::int64_t until = saturating_difference(*device.latest_ns, device.window_ns);
+      std::vector<std::size_t> given;
+      for (const std::size_t row : which[i]) {
+        (all || held_.time_ns[row] <= until ? given : kept).push_back(row);
+      }
+      order_by_time(held_, given);
+      ordered_.append(held_, given);
+    }
+    if (kept.empty()) {
+      held_.clear();
+      return;
+    }
+    std::sort(kept.begin(), kept.end());
+    Observations rest;
+    rest.append(held_, kept);
+    held_ = std::move(rest);
+  }
+
+  void put_on_grid() {
+    const bool all = is_at_end();
+    const bool any = std::any_of(devices_.begin(), devices_.end(), [](const Device& device) {
+      return device.grid && device.grid->is_needed();
+    });
+    std::size_t done = ordered_.size();
+    if (any && !all) {
+      if (ordered_.size() < 2 * kRowsTogether) return;
+      done -= kRowsTogether;
+    }
+    Observations rows;
+    rows.append(ordered_, 0, done);
+    ordered_.drop_front(done);
+    const auto which = rows_by_device(rows);
+    for (std::size_t i = 0; i < which.size(); ++i) {
+      if (devices_[i].grid) off_grid_ += devices_[i].grid->apply(rows, which[i]);
+    }
+    ready_.drop_front(ready_at_);
+    ready_at_ = 0;
+    ready_.append(rows);
+  }
+
+  /// Warnings of the inner reader, and what was found here.
+  void describe() {
+    warnings_ = inner_->warnings();
+    clock_wraps_ = inner_->clock_wraps();
+    const auto warn = [this](std::string message, std::uint64_t lost = 0) {
+      warnings_.push_back({{}, std::move(message), lost});
+    };
+    if (mixed_rows_ > 0) {
+      warn(
+          fmt::format("{} rows are earlier than one before them: the rows do not stand in the "
+                      "order in which the shots were fired, and were sorted by their times",
+                      mixed_rows_));
+    }
+    for (const Device& device : devices_) {
+      if (device.order.order == RowOrder::begins_anew && !counted_) {
+        warn(
+            fmt::format("times begin anew with every message or packet and tell nothing beyond "
+                        "one: shots were counted in the order of the file, at the {:.6g} shots "
+                        "per second within messages; option shot_rate names another rate",
+                        1e9 / device.order.step_ns));
+      } else if (device.order.order == RowOrder::constant && !counted_) {
+        warn(
+            "all times are the same, and tell nothing: shots are numbered in the order of the "
+            "file; option shot_rate counts their times");
+      } else if (device.order.order == RowOrder::overlapping) {
+        warn(
+            "pieces of the recording begin within the time of those before them: several sensors "
+            "seem to share one stream, and nothing in the file tells them apart");
+      } else if (device.grid) {
+        if (const std::string words = device.grid->words(); !words.empty()) warn(words);
+      }
+    }
+    if (off_grid_ > 0) {
+      warn(fmt::format("{} shots do not stand on that grid, and their times were left as they are",
+                       off_grid_));
+    }
+    if (in_packets_) {
+      warn("packet headers hold the times that were put right, and were left out");
+    }
+    if (lost_samples_ > 0) {
+      warn(
+          "inertial samples were left out: their times cannot be compared with those of counted "
+          "shots",
+          lost_samples_);
+    }
+  }
+
+  std::unique_ptr<Reader> inner_;
+  bool counted_, in_packets_ = false, changes_ = false, ended_ = false;
+  std::optional<FileError> failure_;
+  std::vector<Device> devices_;
+  Observations held_, ordered_, ready_;  ///< as read; in order; on the grid
+  std::vector<ImuSample> imu_;
+  std::size_t ready_at_ = 0;  ///< of these given
+  std::uint64_t mixed_rows_ = 0, off_grid_ = 0, lost_samples_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Reader> with_judged_times(const OpenReader& open, const ReadOptions& options,
+                                          const Progress& progress) {
+  auto reader = std::make_unique<JudgedReader>(open(), options.shot_rate.has_value(), progress);
+  if (reader->changes()) return reader;
+  return open();
+}
+
+}  // namespace risley::recordings
