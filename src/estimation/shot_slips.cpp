@@ -1001,15 +1001,37 @@ int emitters_in_turn(const CountedShots& shots) {
 }
 
 double rows_between_jumps(const CountedShots& shots, int emitters) {
-  constexpr std::size_t kFewest = 500;
-  constexpr double kJump = 4.0;  // of the usual step
+  constexpr std::size_t kFewest = 500, kMost = 100'000;
+  // Changes of the step from shot to shot: share of the usual step, and multiples of the usual
+  // change and of what rounding leaves. Beams that turn smoothly change it by some per cent.
+  constexpr double kChange = 0.5, kUsualChanges = 6.0, kRounding = 5.0;
   const auto turn = static_cast<std::size_t>(std::max(emitters, 1));
-  std::vector<double> steps = steps_over(shots, turn);
+  const AngleSeries& s = shots.series;
+  const auto step = [&s](std::size_t from, std::size_t to) {
+    const double azimuth = std::remainder(s.azimuth[to] - s.azimuth[from], kTwoPi);
+    return Eigen::Vector2d(azimuth * std::sin(s.zenith[from]), s.zenith[to] - s.zenith[from]);
+  };
+  std::vector<double> steps, changes, roundings;
+  std::size_t next = 0, last = 0;
+  const auto find = [&](std::size_t row, std::size_t& place) {
+    while (place < shots.rows.size() && shots.rows[place] < row) ++place;
+    return place < shots.rows.size() && shots.rows[place] == row;
+  };
+  for (std::size_t i = 0; i < shots.rows.size() && steps.size() < kMost; ++i) {
+    if (!find(shots.rows[i] + turn, next) || !find(shots.rows[i] + 2 * turn, last)) continue;
+    const Eigen::Vector2d one = step(i, next), other = step(next, last);
+    steps.push_back(one.norm());
+    changes.push_back((other - one).norm());
+    roundings.push_back(std::sqrt(6.0 * static_cast<double>(s.zenith_rounding_variance[next])));
+  }
   if (steps.size() < kFewest) return std::numeric_limits<double>::infinity();
-  const double limit = kJump * median(steps);
-  const auto jumps = static_cast<double>(
-      std::count_if(steps.begin(), steps.end(), [limit](double step) { return step > limit; }));
-  return static_cast<double>(steps.size() * turn) / jumps;
+  std::vector<double> sorted = changes;
+  const double limit = std::max(kChange * median(steps), kUsualChanges * median(sorted));
+  double jumps = 0;  // each is seen from both sides, by every emitter
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    jumps += changes[i] > std::max(limit, kRounding * roundings[i]) ? 0.5 : 0.0;
+  }
+  return static_cast<double>(changes.size() * turn) / jumps;
 }
 
 ShotCount find_slips(const CountedShots& counted, const sensors::Sensor& sensor,

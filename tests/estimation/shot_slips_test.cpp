@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <ostream>
 #include <random>
 #include <set>
@@ -202,6 +203,18 @@ TEST_P(NoLostShots, AreInventedUnderTheSky) {
 
 INSTANTIATE_TEST_SUITE_P(Sensors, NoLostShots,
                          ::testing::Values("mid-40", "horizon", "tele-15", "avia"), kByItself);
+
+TEST_P(NoLostShots, MakeTheBeamOfAnEmitterJumpButWhereTheyWereRemoved) {
+  CountedShots shots = record({GetParam(), {}, 0, true});
+  const int emitters = sensors::load_sensor(GetParam()).train.emitters();
+  EXPECT_EQ(emitters_in_turn(shots), emitters);
+  EXPECT_GT(rows_between_jumps(shots, emitters), 5000);
+  // The sky was removed.
+  for (std::size_t i = 0; i < shots.rows.size(); ++i) shots.rows[i] = i;
+  EXPECT_LT(rows_between_jumps(shots, emitters), 500);
+  shots.rows.resize(300);
+  EXPECT_EQ(rows_between_jumps(shots, emitters), std::numeric_limits<double>::infinity());
+}
 
 TEST(ShotSlips, AreNotLookedForInAThinnedRecording) {
   CountedShots shots = record({"mid-40", {}});

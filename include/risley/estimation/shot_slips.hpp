@@ -26,8 +26,8 @@ struct CountedShots {
 /// each other as smoothly as those of one that fires alone.
 int emitters_in_turn(const CountedShots& shots);
 
-/// How many rows stand between two places where the beam of an emitter jumps by several times what
-/// it moves from one of its shots to the next; infinite where it does not, or there are too few
+/// How many rows stand between two places where the beam of an emitter jumps or turns as no rotors
+/// move it from one of its shots to the next; infinite where it does not, or there are too few
 /// shots to tell. @param emitters  of the sensor, which fire in turn
 double rows_between_jumps(const CountedShots& shots, int emitters);
 
