@@ -178,6 +178,7 @@ class PlausibilityReader final : public DecoratingReader {
   std::optional<FileError> change(Chunk& chunk) override {
     const Observations& rows = chunk.observations;
     if (judged_) return std::nullopt;
+    has_packets_ = has_packets_ || !chunk.packets.empty();
     for (std::size_t row = 0; row < rows.size() && azimuth_.size() < kMostJudged; ++row) {
       if (rows.valid[row] == 0) continue;
       azimuth_.push_back(rows.azimuth[row]);
@@ -192,9 +193,9 @@ class PlausibilityReader final : public DecoratingReader {
     judged_ = true;
     std::vector<double> ranges = finite(range_);
     const bool far = !ranges.empty() && quantile(ranges, 0.5) > kFarthestReach;
-    // What names its sensor is in that sensor's units; it may still have been put on a map.
-    const bool named = header_.devices.front().type != kUnknownDeviceType;
-    const auto problem = named && !far ? std::nullopt : not_a_scan(azimuth_, zenith_, range_);
+    // A sensor's own packets, and what names it, are in its units; they may have been put on a map.
+    const bool own = has_packets_ || header_.devices.front().type != kUnknownDeviceType;
+    const auto problem = own && !far ? std::nullopt : not_a_scan(azimuth_, zenith_, range_);
     if (problem) {
       found_.push_back({{}, *problem});
     } else if (const auto beyond = beyond_reach(range_, kFarthestReach, "these sensors")) {
@@ -203,7 +204,7 @@ class PlausibilityReader final : public DecoratingReader {
     azimuth_ = zenith_ = range_ = {};
   }
 
-  bool judged_ = false;
+  bool judged_ = false, has_packets_ = false;
   std::vector<double> azimuth_, zenith_, range_;
   std::vector<ReadWarning> found_;
 };
