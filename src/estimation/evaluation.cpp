@@ -76,8 +76,6 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
                   emitters);
   recordings::require_columns(truth, prisms);
   const auto rows = matching_rows(states.time_ns, truth.time_ns);
-  const std::size_t first_row =
-      matching_rows({estimate.series.time_ns(first_used_shot(estimate))}, truth.time_ns).front();
   const auto rotor_count = static_cast<std::size_t>(prisms);
   const double duration =
       1e-9 * static_cast<double>(states.time_ns.back() - states.time_ns.front());
@@ -100,7 +98,9 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
                                              : truth.angular_velocity[rotor][rows.front()];
       compare(value, true_value, value.value - true_value);
     } else {
-      const double true_value = wrap_to_pi(truth.rotation_angle[rotor][first_row]);
+      const std::int64_t first_ns = estimate.series.time_ns(first_used_shot(estimate));
+      const std::size_t row = matching_rows({first_ns}, truth.time_ns).front();
+      const double true_value = wrap_to_pi(truth.rotation_angle[rotor][row]);
       compare(value, true_value, wrap_to_pi(value.value - true_value));
     }
   }

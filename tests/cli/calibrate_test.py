@@ -364,9 +364,9 @@ class CalibrateTest(CommandTest):
         recording("shuffled.csv", [[r, *row[1:]] for r, row in zip(ranges, rows)])
         self.refused(1, ("shuffled.csv", "no plane found"), "shuffled.csv")
         (self.folder / "earlier").mkdir()
-        self.write("earlier/calibration.yaml", "of an earlier run\n")  # is not this run's to remove
+        self.write("earlier/calibration.yaml", "of an earlier run of risley\n")  # is not this run's to remove
         self.expect(1, "calibrate", "shuffled.csv", "-o", "earlier")
-        self.assertEqual(self.calibration_of("earlier"), "of an earlier run\n")
+        self.assertEqual(self.calibration_of("earlier"), "of an earlier run of risley\n")
         # Clutter everywhere but in a strip of 1.2 degrees.
         self.simulate("strip.csv", self.write("strip.yaml", wall(10, 0)))
         head, *rows = (self.folder / "strip.csv").read_text().splitlines()

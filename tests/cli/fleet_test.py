@@ -143,7 +143,11 @@ class FleetTest(CommandTest):
         self.assertEqual(self.counts(found), (0, 5, 6))
         # What could not be read may have been the machine's fault.
         self.assertTrue(all(one.get("skipped", False) == (one["status"] != 3) for one in found["results"]))
-        self.assertEqual(self.rows("again.csv"), self.rows("fleet.csv"))
+        again, before = self.rows("again.csv"), self.rows("fleet.csv")
+        for row in again + before:
+            if row["exit_status"] == "3":
+                row["seconds_total"] = ""
+        self.assertEqual(again, before)
         shutil.copy(self.folder / "fleet/zenith.lvx", self.folder / "before.lvx")
         try:  # another file of the same name; its time tells nothing
             times = os.stat(self.folder / "fleet/zenith.lvx")
@@ -152,7 +156,8 @@ class FleetTest(CommandTest):
             self.assertEqual(self.counts(self.estimate(3, "--resume")), (1, 5, 5))
         finally:
             shutil.move(self.folder / "before.lvx", self.folder / "fleet/zenith.lvx")
-        (self.folder / "results/east/scan/calibration.yaml").write_text("half")
+        half = self.folder / "results/east/scan/calibration.yaml"
+        half.write_text(half.read_text()[:500])
         (self.folder / "results/north/scan/calibration.yaml").unlink()
         (self.folder / "results.records/south.sequence.json").write_text("{")
         self.assertEqual(self.counts(self.estimate(3, "--resume")), (4, 5, 2))

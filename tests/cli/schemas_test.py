@@ -166,7 +166,8 @@ class SchemasTest(CommandTest):
         cls.print(0, "cloud", "hall.lvx", *cloud, "-o", "hall.las", "--report", "hall.html")
         cls.print(3, "cloud", "hall.lvx", "no.lvx", "bad.lvx", "cut.csv", *cloud, "-o", "clouds/")
         cls.print(1, "cloud", "hall.lvx", "--calibration", "mid-70", "-o", "no.las")
-        cls.print(1, "cloud", "hall.lvx", "wall.lvx", "--calibration", "mid-70", "-o", "clouds/")
+        for _ in range(2):
+            cls.print(1, "cloud", "hall.lvx", "wall.lvx", "--calibration", "mid-70", "-o", "clouds/", "--resume")
         small = ("--calibration", "mid-40-table3", "-o", "clouds/", "--resume", "--table", "clouds.csv")
         for _ in range(2):
             cls.print(3, "cloud", "wall.lvx", "no.lvx", *small)

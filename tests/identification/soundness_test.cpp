@@ -27,7 +27,8 @@ Identification found_mid_40(double wedge_sigma_deg) {
 TEST(Soundness, ATrainHasToBePossible) {
   sensors::Sensor sensor = sensors::load_sensor("mid-40");
   EXPECT_EQ(doubt_of(found_mid_40(0.01), sensor).words, "");
-  sensor.train.set("prism_tilt_b_vertical_deg", radians_from_degrees(35.6));
+  const int tilt = find_parameter("prism_tilt_b_vertical_deg", sensor.shape()).places.front();
+  sensor.train.set_place(tilt, radians_from_degrees(35.6));
   EXPECT_TRUE(doubt_of(found_mid_40(0.01), sensor).refuted);
 }
 
