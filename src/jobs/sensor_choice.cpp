@@ -234,6 +234,22 @@ std::string wide_words(const recordings::DirectionSpread& spread) {
   return "merged clouds of several sensors: record or export each of them by itself";
 }
 
+/// Says so where most ranges are shorter than the sensor measures.
+std::string too_near_words(const AngleSeries& shots, const Sensor& sensor) {
+  std::size_t returns = 0, below = 0;
+  for (const double range : shots.range) {
+    if (!(range > 0)) continue;
+    ++returns;
+    if (range < sensor.range_minimum) ++below;
+  }
+  if (2 * below <= returns) return {};
+  return fmt::format(
+      "{:.0f} % of the ranges are shorter than the {:g} m from which a {} measures: check their "
+      "unit",
+      100.0 * static_cast<double>(below) / static_cast<double>(returns), sensor.range_minimum,
+      sensor.name);
+}
+
 /// Says why no sensor can have made the shots, where that is so.
 std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> candidates) {
   if (shots.size() < recordings::kFewestJudged) return {};
@@ -522,6 +538,7 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
   if (!(reach > 0) || !choice.impossible.empty() || sensor_name(choice) == "unknown") return choice;
   choice.beyond_reach =
       recordings::beyond_reach(shots.head.range, reach, choice.sensor.name).value_or("");
+  if (choice.beyond_reach.empty()) choice.beyond_reach = too_near_words(shots.head, choice.sensor);
   // What no sensor reaches the reader tells.
   if (!choice.beyond_reach.empty() &&
       !recordings::beyond_reach(shots.head.range, recordings::kFarthestReach, "")) {
