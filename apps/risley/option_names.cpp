@@ -67,7 +67,12 @@ constexpr OptionName kNames[] = {
 
 constexpr std::string_view kWord = "ption ";  // after "o" or "O"
 
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+/// What stands beside the words of a sentence, and not within the name of a file.
+bool ends_word(const std::string& text, std::size_t at) {
+  if (at >= text.size()) return true;
+  const bool ends_sentence = at + 1 == text.size() || text[at + 1] == ' ';
+  return text[at] == '.' ? ends_sentence : std::string_view(" ,;:)\n").find(text[at]) != text.npos;
+}
 
 }  // namespace
 
@@ -76,7 +81,7 @@ std::string with_flags(const std::string& text) {
   std::size_t done = 0;
   for (std::size_t at = text.find(kWord); at != std::string::npos; at = text.find(kWord, at + 1)) {
     if (at == 0 || (text[at - 1] != 'o' && text[at - 1] != 'O') || at - 1 < done) continue;
-    if (at > 1 && is_letter(text[at - 2])) continue;  // "adoption"
+    if (at > 1 && text[at - 2] != ' ' && text[at - 2] != '(') continue;  // "adoption"
     const std::size_t begin = at + kWord.size();
     const std::size_t end =
         std::min(text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_", begin), text.size());
@@ -84,7 +89,7 @@ std::string with_flags(const std::string& text) {
     const auto* const found =
         std::find_if(std::begin(kNames), std::end(kNames),
                      [field](const OptionName& name) { return name.field == field; });
-    if (found == std::end(kNames)) continue;
+    if (found == std::end(kNames) || !ends_word(text, end)) continue;
     result.append(text, done, at - 1 - done).append(found->flag);
     done = end;
   }

@@ -112,6 +112,10 @@ class UsageTest(CommandTest):
             with self.subTest(words=words):
                 self.assertIn("finite", self.expect(2, *words).stderr)
 
+    def test_names_of_files_stay_as_they_are(self):
+        for name in ("an option rate.csv", "an option sensor.lvx"):
+            self.assertIn(name, self.expect(3, "info", name).stderr)
+
     def test_version(self):
         self.assertRegex(self.expect(0, "--version").stdout, r"^risley \d+\.\d+\.\d+\n$")
 
