@@ -895,6 +895,8 @@ std::optional<FollowedPiece> follow_piece(NumberedShots& shots, ShotRange range,
   }
   // An anchor is as good as what comes of following the rotors from it.
   std::optional<Anchor> best;
+  constexpr int kMostSound = 4;
+  int sound = 0;
   std::size_t least_cost = std::numeric_limits<std::size_t>::max();
   double least_missed = std::numeric_limits<double>::infinity();
   for (const Anchor& one : find_anchors(shots, range, *start, sensor, in_turn, progress)) {
@@ -914,7 +916,8 @@ std::optional<FollowedPiece> follow_piece(NumberedShots& shots, ShotRange range,
     }
     const double fine = std::max(kLeastNoiseSteps * usual_step(one.start, shots.rate),
                                  1.5 * one.start.residual_rms);
-    if (cost == 0 && trial.residual_rms < fine) break;
+    if (cost > 0) continue;
+    if (trial.residual_rms < fine || ++sound == kMostSound) break;
   }
   if (!best) return std::nullopt;
   Anchor anchor = *std::move(best);

@@ -32,11 +32,14 @@ Doubt doubt_of(const Identification& found, const sensors::Sensor& sensor) {
     }
   }
   for (const FittedValue& value : fitted_values(found.best())) {
-    if (!value.name.starts_with("wedge_angle_") || !std::isfinite(value.sigma)) continue;
-    if (std::abs(value.value) >= kSeenSigmas * value.sigma) continue;
+    // What is held says how a deflection divides into wedge and glass, not whether it is there.
+    const double sigma =
+        std::isfinite(value.sigma_given_held) ? value.sigma_given_held : value.sigma;
+    if (!value.name.starts_with("wedge_angle_") || !std::isfinite(sigma)) continue;
+    if (std::abs(value.value) >= kSeenSigmas * sigma) continue;
     return {fmt::format("the train that fits best has a prism that the scan does not show: {} = "
                         "{:.3g} +- {:.2g} {}",
-                        value.name, value.value, value.sigma, value.unit),
+                        value.name, value.value, sigma, value.unit),
             false};
   }
   if (found.correlation_time_factor > kMostCorrelated) {

@@ -32,6 +32,8 @@ using sensors::Sensor;
 /// A variant of a sensor's optics is tried where the residuals of its own are so many times what
 /// its noise and the recording's rounding leave, and taken where it leaves this share of them.
 constexpr double kPoorOptics = 3.0, kBetterOptics = 0.5;
+/// Times are at fault where counted shots leave this share of what the times do.
+constexpr double kBetterCounted = 0.5;
 /// Fewer shots do not fill a field of view.
 constexpr std::size_t kFewestInField = 1000;
 /// The emitters' firing order says the rest; smaller rolls are within what emitters may be off.
@@ -320,6 +322,14 @@ SensorChoice choose_without_times(const recordings::Source& source, recordings::
   return choice;
 }
 
+/// Whether counting shots at a rate would give the times that they have.
+bool are_as_counted(const AngleSeries& shots, double rate) {
+  constexpr double kOtherRate = 0.02;
+  if (shots.size() < 2) return false;
+  return std::abs(static_cast<double>(shots.size() - 1) / (shots.duration() * rate) - 1.0) <
+         kOtherRate;
+}
+
 /// Whether counted shots show one of some sensors of one shot rate better than the times do: these
 /// are at fault then.
 /// @param misfit  of what the times show, rad
@@ -328,7 +338,9 @@ template <class Count>
 bool is_at_fault_by_count(std::span<const Sensor> some, double misfit, Count&& count,
                           SensorChoice& choice) {
   const auto found = recognised(count(), some);
-  if (!found || !found->fits || misfit_of(found->matches.front()) >= misfit) return false;
+  if (!found || !found->fits || misfit_of(found->matches.front()) > kBetterCounted * misfit) {
+    return false;
+  }
   take(*found, some, choice);
   choice.times_at_fault = true;
   choice.warnings.push_back(
@@ -418,7 +430,7 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
     return choice;
   }
   const auto count = [&] {
-    if (reading.shot_rate) return FirstShots{};  // they are counted already
+    if (reading.shot_rate || are_as_counted(shots.head, named->shot_rate)) return FirstShots{};
     recordings::ReadOptions counting = reading;
     counting.shot_rate = named->shot_rate;
     return first_shots(source, counting, {named, 1}, progress);

@@ -141,7 +141,7 @@ class StoryTest(CommandTest):
         for verb, *more in (("estimate", "--sensor", folder),
                             ("cloud", "-o", f"{name}.las", "--calibration", folder)):
             told = self.expect_json(3, verb, f"{name}.nc", *more)
-            self.assertIn(f"{folder}: holds no calibration.yaml", told["error"])
+            self.assertIn(f"{folder}/calibration.yaml: is missing", told["error"])
             self.assertIn("report.html beside it says why", told["error"])
         self.assertFalse((self.folder / f"{name}.las").exists())
 
