@@ -251,7 +251,7 @@ TEST(CloudTimes, ATimeFarFromItsStampIsDamage) {
     return "";
   };
   EXPECT_EQ(problem(7),
-            "point 2 has t = 11, allowed at most 10 s from the time stamp of its message");
+            "point 3 has t = 11, allowed at most 10 s from the time stamp of its message");
   EXPECT_THAT(problem(8), HasSubstr("of datatype 8"));
   layout.fields[0].name = "u";
   EXPECT_THAT(problem(7), HasSubstr("found no such field"));

@@ -380,7 +380,7 @@ TEST(Pcd, Damage) {
                           "1234567890123455289 more points");
   std::string huge = rows;
   huge.replace(13 * 1000, 4, number_bytes(3e9, 'f', 4, false));
-  expect_prefix_and_error(kPcdFormat, header + huge, 1000, header.size() + 13 * 1000, "point 1000");
+  expect_prefix_and_error(kPcdFormat, header + huge, 1000, header.size() + 13 * 1000, "point 1001");
   const std::string packed_header = pcd_header("binary_compressed");
   const std::string all = packed(scene_bytes(scene, true));
   const Outcome cut = read_text(kPcdFormat, packed_header + all.substr(0, all.size() - 100));
