@@ -245,8 +245,11 @@ Sensor load_result(const std::string& path) {
   if (!file) {
     throw FileError(
         (fs::path(path) / kCalibrationFile).string(), {},
-        "is missing: estimate and calibrate write it only if their result is better than "
-        "what the sensor believed");
+        fmt::format("is missing: estimate and calibrate write it only if their result is better "
+                    "than what the sensor believed{}",
+                    fs::exists(fs::path(path) / "report.html", ignored)
+                        ? "; report.html beside it says why it is not"
+                        : ""));
   }
   return sensors::load_sensor(*file);
 }

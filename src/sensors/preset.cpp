@@ -574,11 +574,6 @@ PresetSource source_of(const std::string& name_or_path) {
     return {preset->text, fmt::format("built-in preset {}", preset->name)};
   }
   const std::filesystem::path path(name_or_path);
-  if (std::filesystem::exists(path / "report.json")) {
-    throw FileError(name_or_path, {},
-                    "holds no calibration.yaml: estimate and calibrate write one only where the "
-                    "result can be used, and report.html beside it says why it could not");
-  }
   if (path.extension() == ".yaml" || path.extension() == ".yml" || std::filesystem::exists(path)) {
     return {io::read_text_file(name_or_path), name_or_path};
   }

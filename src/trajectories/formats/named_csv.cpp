@@ -180,7 +180,7 @@ constexpr std::array kCsvUnitAliases{
 std::string csv_name(std::string_view written) {
   while (written.starts_with('#') || written.starts_with('"')) written.remove_prefix(1);
   while (written.ends_with('"')) written.remove_suffix(1);
-  const std::string name = lower_case(std::string(io::trimmed(written)));
+  std::string name = lower_case(std::string(io::trimmed(written)));
   std::string base = name;
   std::string_view suffix;
   const auto open = name.find_first_of("[(");
