@@ -20,7 +20,7 @@ constexpr std::size_t kFewestShots = 40;      // fewer tell no grid
 constexpr std::size_t kFewestOfPart = 256;    // shots that are put on a grid by themselves
 constexpr std::size_t kMostOfPart = 1 << 16;  // over so many a clock keeps its rate
 constexpr double kExact_ns = 2.0;             // what whole nanoseconds leave
-constexpr double kHarmless_ns = 50.0;         // a rotor turns 0.002 degrees meanwhile
+constexpr double kDouble_ns = 50.0;           // what seconds since 1970 leave as doubles
 constexpr double kRounded_ns = 10.0;          // smaller common divisors of times are accidents
 constexpr double kSlack = 1.02;               // of half a rounding step
 constexpr double kLargestOff = 0.3;           // of a step, where the rounding is not known
@@ -157,7 +157,7 @@ void TimeGrid::try_kinds(const Shots& shots) {
   unexplained_ = !found && (equal_times_ > 0 || rounding_ns_ > 100);
   if (!found) return;
   const Fit whole = fit(shots, begin, end, kind_, step_ns_);
-  if (whole.largest_ns <= kHarmless_ns) {
+  if (whole.largest_ns <= (rounding_ns_ > 0 ? kExact_ns : kDouble_ns)) {
     kind_ = Kind::none;
     return;
   }
