@@ -66,15 +66,15 @@ class CheckLayersTest(unittest.TestCase):
             "src/estimation/ekf.cpp": '#include "estimation/knots.hpp"\n',
             "include/risley/estimation/ekf.hpp": '#include "estimation/knots.hpp"\n',
             "src/report/html.cpp": '#include "estimation/knots.hpp"\n',
-            "apps/risley/main.cpp": '#include "report/charts.hpp"\n',
-            "studies/paper/run.cpp": '#include "report/charts.hpp"\n',
+            "apps/risley/main.cpp": '#include "report/chart.hpp"\n',
+            "studies/paper/run.cpp": '#include "report/chart.hpp"\n',
             "bench/steps_bench.cpp": '#include "estimation/knots.hpp"\n',
         }), [
             "include/risley/estimation/ekf.hpp:1: estimation/knots.hpp is a private header of the layer"
             " estimation",
             "src/report/html.cpp:1: estimation/knots.hpp is a private header of the layer estimation",
-            "apps/risley/main.cpp:1: report/charts.hpp is a private header of the layer report",
-            "studies/paper/run.cpp:1: report/charts.hpp is a private header of the layer report",
+            "apps/risley/main.cpp:1: report/chart.hpp is a private header of the layer report",
+            "studies/paper/run.cpp:1: report/chart.hpp is a private header of the layer report",
         ])
 
     def test_libraries_know_no_option_of_the_command(self):

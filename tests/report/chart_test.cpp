@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 
 #include <algorithm>
 #include <numeric>
 
 #include <gtest/gtest.h>
 
-namespace risley::report::charts_test {
+namespace risley::report::chart_test {
 
 TEST(Charts, APeakSurvivesThinning) {
   constexpr std::size_t kRows = 100000, kPeak = 54321, kDip = 77777;
@@ -59,4 +59,4 @@ TEST(Charts, AHistogramHasBinsForItsValues) {
   EXPECT_EQ(bins(3000000), 61u);
 }
 
-}  // namespace risley::report::charts_test
+}  // namespace risley::report::chart_test

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 
 #include <algorithm>
 #include <cmath>
