@@ -14,14 +14,11 @@
 #include "risley/core/saturating.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
-#include "risley/io/yaml_output.hpp"
 
 namespace risley::trajectories {
 namespace {
 
 using io::fail_at;
-using io::yaml_decimal;
-using io::yaml_quoted;
 using io::YamlMap;
 
 constexpr int kErrorModelVersion = 1;
@@ -125,25 +122,6 @@ void require_error_model(const ErrorModel& model) {
   } else {
     require_between("sample_interval", model.sample_interval, 0, kLongestSample, "s");
   }
-}
-
-std::string error_model_text(const ErrorModel& model) {
-  require_error_model(model);
-  std::string text = fmt::format("risley_trajectory_errors: {}\n", kErrorModelVersion);
-  if (model.sample_interval > 0) {
-    text += fmt::format("sample_interval_s: {}\n", yaml_decimal(model.sample_interval));
-  }
-  for (std::size_t i = 0; i < kPoseErrors; ++i) {
-    const ErrorTerm& term = model.terms[i];
-    const ErrorName& name = kErrorNames[i];
-    text += fmt::format("{}: {{", name.key);
-    if (term.sigma) text += fmt::format("sigma: {}, ", yaml_decimal(*term.sigma, name.scale));
-    text += fmt::format("correlation_time_s: {}, ", yaml_decimal(term.correlation_time));
-    if (term.white > 0) text += fmt::format("white: {}, ", yaml_decimal(term.white, name.scale));
-    text += fmt::format("source: {}}}\n",
-                        yaml_quoted(term.source.empty() ? "not stated" : term.source));
-  }
-  return text;
 }
 
 ErrorProcess::ErrorProcess(const ErrorModel& model, const Trajectory& trajectory) {

@@ -27,7 +27,6 @@ using io::fail_at;
 using io::YamlMap;
 
 constexpr int kFlightVersion = 1, kStripsVersion = 1;
-constexpr std::int64_t kLatestTime_ns = std::int64_t{1} << 62;  // 146 years
 /// Numbers of the random streams; those of scenes and simulations are others.
 constexpr std::uint64_t kAttitudeMotion = 300, kVelocityMotion = 301;
 
@@ -400,38 +399,6 @@ Flight fly(const FlightPlan& plan) {
     trajectory.attitude.push_back((frame_from_ned * ned).normalized());
   }
   return flight;
-}
-
-std::vector<StripTimes> parse_strip_times(const std::string& text, const std::string& path) {
-  const YamlMap root(io::parse_yaml(text, path), path, "");
-  root.allow_only({"risley_strips", "time_scale", "strips"});
-  root.integer("risley_strips", kStripsVersion, kStripsVersion);
-  root.text("time_scale");
-  const YamlMap::Entry& list = root.at("strips");
-  if (!list.value.is_list()) fail_at(path, list.line, "strips: expected a list");
-  std::vector<StripTimes> strips;
-  for (std::size_t i = 0; i < list.value.items.size(); ++i) {
-    const YamlMap map(list.value.items[i], path, fmt::format("strips[{}]", i));
-    map.allow_only({"name", "begin_ns", "end_ns"});
-    const auto time = [&](std::string_view key, std::int64_t earliest) {
-      const long double value =
-          map.number(key, static_cast<long double>(earliest), kLatestTime_ns, "ns");
-      if (value != std::floor(value)) {
-        fail_at(path, map.at(key).line, map.field(key) + ": expected whole nanoseconds");
-      }
-      return static_cast<std::int64_t>(value);
-    };
-    StripTimes strip;
-    strip.name = map.text("name");
-    strip.begin_ns = time("begin_ns", strips.empty() ? -kLatestTime_ns : strips.back().end_ns);
-    strip.end_ns = time("end_ns", strip.begin_ns);
-    strips.push_back(std::move(strip));
-  }
-  return strips;
-}
-
-std::vector<StripTimes> load_strip_times(const std::string& path) {
-  return parse_strip_times(io::read_text_file(path), path);
 }
 
 std::string strip_times_text(const std::vector<StripTimes>& strips, TimeScale scale) {
