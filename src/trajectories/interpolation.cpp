@@ -5,10 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
-
-#include "trajectories/rotation_vector.hpp"
 
 namespace risley::trajectories {
 namespace {
@@ -94,7 +93,7 @@ void Interpolation::Cursor::set_interval(std::size_t row) {
   std::size_t points = 0;
   const auto add = [&](std::size_t record, const Eigen::Vector3d& neighbour) -> Eigen::Vector3d {
     Eigen::Vector3d turn = nearest_turn(
-        rotation_vector(all.attitude[row].conjugate() * all.attitude[record]), neighbour);
+        algebra::rotation_vector(all.attitude[row].conjugate() * all.attitude[record]), neighbour);
     at[points] = 1e-9 * static_cast<double>(all.time_ns[record] - begin_ns_) / interval_;
     values[points++] << all.position[record] - all.position[row], turn;
     return turn;
@@ -146,10 +145,10 @@ std::optional<Pose> Interpolation::Cursor::at(std::int64_t time_ns) {
   const Eigen::Vector3d turn = value.tail<3>();
   Pose pose;
   pose.position = all.position[row_] + value.head<3>();
-  pose.attitude = all.attitude[row_] * turned_by(turn);
+  pose.attitude = all.attitude[row_] * algebra::turned_by(turn);
   pose.attitude.normalize();
   pose.velocity = slope.head<3>();
-  pose.angular_velocity = pose.attitude * angular_velocity_of(turn, slope.tail<3>());
+  pose.angular_velocity = pose.attitude * algebra::angular_velocity_of(turn, slope.tail<3>());
   return pose;
 }
 

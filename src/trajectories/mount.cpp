@@ -14,6 +14,7 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -22,8 +23,6 @@
 #include "risley/io/yaml_covariance.hpp"
 #include "risley/io/yaml_map.hpp"
 #include "risley/io/yaml_output.hpp"
-
-#include "trajectories/rotation_vector.hpp"
 
 namespace risley::trajectories {
 namespace {
@@ -310,7 +309,7 @@ Eigen::Matrix3d body_from_sensor(const Mount& mount) {
   require_mount(mount);
   const Eigen::Vector3d turn(mount.boresight[0].value, mount.boresight[1].value,
                              mount.boresight[2].value);
-  return mount.nominal * turned_by(turn).toRotationMatrix();
+  return mount.nominal * algebra::turned_by(turn).toRotationMatrix();
 }
 
 Eigen::Vector3d lever_arm(const Mount& mount) {

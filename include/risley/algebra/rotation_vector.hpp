@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 
 /// Rotation vectors: the axis of a rotation times its angle, rad.
-namespace risley::trajectories {
+namespace risley::algebra {
 
 /// The rotation vector, of length [0, pi], of a unit quaternion of either sign.
 inline Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& q) {
@@ -19,11 +19,24 @@ inline Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& q) {
   return sign * factor * q.vec();
 }
 
+/// The rotation vector, of length [0, pi], of a rotation matrix.
+inline Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& rotation) {
+  const Eigen::AngleAxisd turn(rotation);
+  return turn.angle() * turn.axis();
+}
+
+/// The rotation of a rotation vector.
+inline Eigen::AngleAxisd rotation_by(const Eigen::Vector3d& vector) {
+  const double angle = vector.norm();
+  if (angle == 0) return {0, Eigen::Vector3d::UnitX()};
+  return {angle, vector / angle};
+}
+
 /// Below this angle, rad, series replace sine and cosine: they are exact to the last digit there,
 /// and hold for the time between records of any navigation system.
 inline constexpr double kSmallTurn = 0.02;
 
-/// The quaternion of a rotation vector.
+/// The same as a quaternion, fast for small ones.
 inline Eigen::Quaterniond turned_by(const Eigen::Vector3d& vector) {
   const double squared = vector.squaredNorm();
   double cosine = 0, factor = 0;  // of half the angle; its sine over the angle
@@ -55,4 +68,4 @@ inline Eigen::Vector3d angular_velocity_of(const Eigen::Vector3d& vector,
   return rate - first * across + second * vector.cross(across);
 }
 
-}  // namespace risley::trajectories
+}  // namespace risley::algebra
