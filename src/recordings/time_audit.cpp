@@ -6,6 +6,7 @@
 #include <array>
 #include <limits>
 
+#include "risley/core/median.hpp"
 #include "risley/core/saturating.hpp"
 
 namespace risley::recordings {
@@ -162,9 +163,7 @@ void TimeAudit::settle(DeviceState& state) {
     if (step.step_ns > 0) lengths.push_back(step.step_ns);
   }
   if (lengths.empty()) return;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  state.nominal_ns = *middle;
+  state.nominal_ns = upper_median(lengths);
   for (const TimeStep& step : steps) add_step(state, step);
 }
 

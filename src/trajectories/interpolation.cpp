@@ -7,6 +7,7 @@
 
 #include "risley/algebra/rotation_vector.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 
 namespace risley::trajectories {
@@ -38,9 +39,7 @@ Interpolation::Interpolation(const Trajectory& trajectory, const InterpolationOp
   if (times.size() < 2) return;
   std::vector<std::int64_t> steps(times.size() - 1);
   for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = times[i + 1] - times[i];
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  median_step_ns_ = *middle;
+  median_step_ns_ = upper_median(steps);
   constexpr double kMost_ns = 0x1p62;
   longest_step_ns_ = static_cast<std::int64_t>(
       std::min(options.gap_steps * static_cast<double>(median_step_ns_), kMost_ns));
