@@ -12,6 +12,7 @@
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/chi_square.hpp"
 #include "risley/core/error.hpp"
 #include "risley/io/table_file.hpp"
 #include "risley/jobs/campaign.hpp"
@@ -43,17 +44,10 @@ double chi2_per_degree(double degrees, double exceeded) {
   return high;
 }
 
-/// The same where the degrees are many, by Wilson and Hilferty (1931): to 1e-6 from a thousand on,
-/// where the series of the exact one grows long.
-double chi2_per_many_degrees(double degrees, double normal_quantile) {
-  const double ninth = 2.0 / (9.0 * degrees);
-  return std::pow(1.0 - ninth + normal_quantile * std::sqrt(ninth), 3);
-}
-
 BandedFigure mean_square(double value, double degrees) {
-  if (degrees > 1000) {
-    return {value, chi2_per_many_degrees(degrees, -kTwoSided95),
-            chi2_per_many_degrees(degrees, kTwoSided95)};
+  if (degrees > 1000) {  // where the series of the exact one grows long
+    return {value, chi_square_per_degree(degrees, -kTwoSided95),
+            chi_square_per_degree(degrees, kTwoSided95)};
   }
   return {value, chi2_per_degree(degrees, 0.975), chi2_per_degree(degrees, 0.025)};
 }
