@@ -16,6 +16,7 @@ endfunction()
 risley_package(eigen TARGET Eigen3::Eigen DEBIAN libeigen3-dev PKG_CONFIG eigen3
                FIND Eigen3 3.4 NO_MODULE)
 risley_package(fmt TARGET fmt::fmt DEBIAN libfmt-dev PKG_CONFIG fmt FIND fmt)
+risley_package(xsimd TARGET xsimd DEBIAN libxsimd-dev PKG_CONFIG xsimd FIND xsimd)
 risley_package(tbb TARGET TBB::tbb DEBIAN libtbb-dev PKG_CONFIG tbb FIND TBB)
 risley_package(yaml-cpp TARGET yaml-cpp::yaml-cpp DEBIAN libyaml-cpp-dev PKG_CONFIG yaml-cpp
                FIND yaml-cpp)

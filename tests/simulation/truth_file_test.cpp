@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/io/sha256.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/recordings/reader.hpp"
@@ -138,13 +138,15 @@ TEST_F(TruthFile, SameSeedGivesTheSameBytes) {
   s.threads = 2;
   simulate_to_file(s, path("two.nc"), {});
   for (const char* ending : {".nc", ".nc.truth.nc", ".nc.truth.yaml"}) {
-    EXPECT_EQ(io::sha256_of_file(path("one") + ending), io::sha256_of_file(path("two") + ending))
+    EXPECT_EQ(hashes::sha256_of_file(path("one") + ending),
+              hashes::sha256_of_file(path("two") + ending))
         << ending;
   }
   s.seed = 78;
   simulate_to_file(s, path("three.nc"), {});
   for (const char* ending : {".nc", ".nc.truth.nc", ".nc.truth.yaml"}) {
-    EXPECT_NE(io::sha256_of_file(path("one") + ending), io::sha256_of_file(path("three") + ending));
+    EXPECT_NE(hashes::sha256_of_file(path("one") + ending),
+              hashes::sha256_of_file(path("three") + ending));
   }
 }
 
@@ -213,7 +215,7 @@ TEST_F(TruthFile, FlightsOfTheSameSeedGiveTheSameBytes) {
     const auto more = simulate_to_file(s, path("more.nc"), {}).files;
     ASSERT_EQ(more.size(), one.size());
     for (std::size_t i = 0; i < one.size(); ++i) {
-      EXPECT_EQ(io::sha256_of_file(one[i]), io::sha256_of_file(more[i])) << more[i];
+      EXPECT_EQ(hashes::sha256_of_file(one[i]), hashes::sha256_of_file(more[i])) << more[i];
     }
   }
 }

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "risley/io/netcdf.hpp"
+#include "risley/tables/netcdf.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 
 /// A NetCDF file as the library reads it: what NetcdfInput asks for, answered in the process that
 /// the library may end. Nobody else may be inside the library.
@@ -44,4 +44,4 @@ class NetcdfFile {
   int id_ = 0;
 };
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/io/sqlite_input.hpp"
+#include "risley/tables/sqlite_input.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 
 #include "risley/core/error.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 namespace {
 
 /// A file's path as a URI of SQLite that promises that the file does not change.
@@ -243,4 +243,4 @@ SqliteQuery SqliteInput::query(const std::string& sql) const {
 
 void SqliteInput::fail(const std::string& problem) const { database_->fail(problem); }
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // What TableFile wrote is read again, and so is what a spreadsheet made of it.
-#include "risley/io/table_input.hpp"
+#include "risley/tables/table_input.hpp"
 
 #include <filesystem>
 #include <string>
@@ -11,12 +11,12 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/netcdf.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/tables/netcdf.hpp"
 
 #include "io/test_folder.hpp"
 
-namespace risley::io::table_input_test {
+namespace risley::tables::table_input_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -44,7 +44,7 @@ std::string problem_of(const std::string& path) {
 }
 
 TEST(TableInput, ReadsWhatWasWritten) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   for (const char* name : {"t.csv", "t.nc"}) {
     SCOPED_TRACE(name);
     write(folder.file(name));
@@ -61,22 +61,22 @@ TEST(TableInput, ReadsWhatWasWritten) {
 }
 
 TEST(TableInput, ReadsWhatASpreadsheetSaved) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   const std::string path = folder.file("t.csv");
   for (const char delimiter : {';', '\t', ','}) {
     std::string text =
         "\xEF\xBB\xBFinput|exit_status|wedge_angle_deg\r\n\"a, \"\"b\"\".lvx\"|0|"
         "0.3333333333333333\r\n\r\n\"ä\nb;.lvx\"||\r\n|9007199254740993|2";
     for (char& c : text) c = c == '|' ? delimiter : c;
-    write_text_file(path, text);
+    io::write_text_file(path, text);
     EXPECT_EQ(read_table(path, kColumns), kRows);
   }
 }
 
 TEST(TableInput, IsRecognised) {
-  const TestFolder folder;
-  write_text_file(folder.file("preset.yaml"), "name: x\n");
-  write_text_file(folder.file("empty.csv"), "");
+  const io::TestFolder folder;
+  io::write_text_file(folder.file("preset.yaml"), "name: x\n");
+  io::write_text_file(folder.file("empty.csv"), "");
   EXPECT_FALSE(is_table(folder.file("preset.yaml")));
   EXPECT_FALSE(is_table(folder.file("empty.csv")));
   EXPECT_FALSE(is_table(folder.file("nowhere.csv")));
@@ -84,10 +84,10 @@ TEST(TableInput, IsRecognised) {
 }
 
 TEST(TableInput, NamesWhereTextIsDamaged) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   const std::string path = folder.file("t.csv");
   const auto of = [&](const std::string& text) {
-    write_text_file(path, text);
+    io::write_text_file(path, text);
     return problem_of(path);
   };
   EXPECT_THAT(of(""), HasSubstr("none of the columns input, exit_status, wedge_angle_deg"));
@@ -102,7 +102,7 @@ TEST(TableInput, NamesWhereTextIsDamaged) {
 }
 
 TEST(TableInput, RefusesOtherKinds) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   {
     NetcdfOutput file(folder.file("t.nc"));
     const NetcdfDimension row = file.define_dimension("row", 2);
@@ -116,13 +116,13 @@ TEST(TableInput, RefusesOtherKinds) {
 }
 
 TEST(TableInput, SurvivesAnyChangedByte) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   write(folder.file("t.csv"));
-  const std::string bytes = read_text_file(folder.file("t.csv"));
+  const std::string bytes = io::read_text_file(folder.file("t.csv"));
   for (std::size_t at = 0; at < bytes.size(); ++at) {
     std::string changed = bytes;
     changed[at] = static_cast<char>(changed[at] ^ (1 << (at % 8)));
-    write_text_file(folder.file("t.csv"), changed);
+    io::write_text_file(folder.file("t.csv"), changed);
     try {
       ASSERT_LE(read_table(folder.file("t.csv"), kColumns).size(), 100U);
     } catch (const FileError&) {  // named, not obeyed
@@ -131,7 +131,7 @@ TEST(TableInput, SurvivesAnyChangedByte) {
 }
 
 TEST(TableInput, CanBeCancelled) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   CancelFlag flag;
   flag.set();
   const Progress progress([](double) {}, &flag);
@@ -139,4 +139,4 @@ TEST(TableInput, CanBeCancelled) {
   EXPECT_THROW(read_table(folder.file("t.csv"), kColumns, progress), Cancelled);
 }
 
-}  // namespace risley::io::table_input_test
+}  // namespace risley::tables::table_input_test

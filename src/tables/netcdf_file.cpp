@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "io/netcdf_file.hpp"
+#include "tables/netcdf_file.hpp"
 
 #include <array>
 #include <cerrno>
@@ -13,9 +13,9 @@
 
 #include "risley/core/error.hpp"
 
-#include "io/netcdf_library.hpp"
+#include "tables/netcdf_library.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 namespace {
 
 /// Deflate shrinks nothing by more than 1032 (zlib.net/zlib_tech.html), so a file can hold no more
@@ -251,4 +251,4 @@ void NetcdfFile::get(const NetcdfVariable& variable, std::size_t first, std::siz
       fmt::format("read entries {} to {} of variable {}", first, first + count - 1, variable.name));
 }
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/io/netcdf.hpp"
+#include "risley/tables/netcdf.hpp"
 
 #include <atomic>
 #include <cstdlib>
@@ -19,7 +19,7 @@
 #include "io/test_folder.hpp"
 #include "source_tree.hpp"
 
-namespace risley::io::netcdf_test {
+namespace risley::tables::netcdf_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -97,14 +97,14 @@ void expect_file(const std::string& path, const std::vector<double>& values) {
 }
 
 TEST(Netcdf, ReadsWhatItWrote) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   const auto values = numbers(1, 5000);
   write_file(folder.file("a.nc"), values, 3);
   expect_file(folder.file("a.nc"), values);
 }
 
 TEST(Netcdf, FilesOfSeveralThreadsDoNotDisturbEachOther) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   // Whatever the files are called: their content makes them NetCDF.
   const std::vector<std::string> endings{".nc", ".NC", ".dat", ""};
   ::testing::internal::CaptureStderr();  // HDF5 likes to print its errors, once per thread
@@ -128,7 +128,7 @@ TEST(Netcdf, FilesOfSeveralThreadsDoNotDisturbEachOther) {
 }
 
 TEST(Netcdf, AFileNotClosedLeavesNothing) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   {
     NetcdfOutput file(folder.file("a.nc"));
     const auto row = file.define_growing_dimension("row");
@@ -145,7 +145,7 @@ TEST(Netcdf, AFileNotClosedLeavesNothing) {
 }
 
 TEST(Netcdf, WrongCallsAreRefused) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   NetcdfOutput file(folder.file("a.nc"));
   EXPECT_THROW(file.define_dimension("none", 0), InvalidArgument);
   const auto row = file.define_growing_dimension("row");
@@ -195,7 +195,7 @@ class Foreign {
 };
 
 TEST(HostileNetcdf, MissingThingsAndOthersOfTheirName) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   Foreign foreign(folder.file("a.nc"));
   const int row = foreign.dimension("row", 4), other = foreign.dimension("other", 4);
   foreign.variable("bytes", NC_UBYTE, {row});
@@ -239,7 +239,7 @@ TEST(HostileNetcdf, MissingThingsAndOthersOfTheirName) {
 
 TEST(HostileNetcdf, NothingIsLargerThanItsFile) {
   // Kilobytes that claim exabytes: nothing of it was ever written.
-  const TestFolder folder;
+  const io::TestFolder folder;
   constexpr std::size_t kHuge = std::size_t{1} << 40;
   Foreign foreign(folder.file("a.nc"));
   const int huge = foreign.dimension("huge", kHuge), few = foreign.dimension("few", 2);
@@ -269,7 +269,7 @@ TEST(HostileNetcdf, NothingIsLargerThanItsFile) {
 }
 
 TEST(HostileNetcdf, EmptyDimensionsGiveNothing) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   Foreign foreign(folder.file("a.nc"));
   const int row = foreign.dimension("row", NC_UNLIMITED), axis = foreign.dimension("axis", 3);
   foreign.variable("place", NC_FLOAT, {row, axis});
@@ -288,7 +288,7 @@ TEST(HostileNetcdf, EmptyDimensionsGiveNothing) {
 }
 
 TEST(HostileNetcdf, OtherFiles) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("missing")}; }), HasSubstr("No such file"));
   EXPECT_THAT(refusal([&] { NetcdfInput{folder.path().string()}; }), HasSubstr("cannot be opened"));
   std::ofstream(folder.file("text")) << "no NetCDF at all";
@@ -327,7 +327,7 @@ TEST(HostileNetcdf, AnEndlessLoopOfTheLibraryIsAFileError) {
 }
 
 TEST(HostileNetcdf, NothingIsReadFromOtherFiles) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   write_file(folder.file("secret.nc"), numbers(1, 10), 1);
   const hid_t linked = H5Fcreate(folder.file("linked.nc").c_str(), H5F_ACC_TRUNC, 0, 0);
   EXPECT_GE(H5Lcreate_external("secret.nc", "/time", linked, "time", 0, 0), 0);
@@ -357,4 +357,4 @@ TEST(Netcdf, DevicesSurvive) {
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }
 
-}  // namespace risley::io::netcdf_test
+}  // namespace risley::tables::netcdf_test

@@ -21,7 +21,7 @@
 /// holds one lock of the whole process, and every file that is read has a process of its own, so
 /// that any number of threads may each have files open. A single file belongs to one thread at a
 /// time.
-namespace risley::io {
+namespace risley::tables {
 
 /// Types of values that are written and read; text is one of characters.
 enum class NetcdfType { text, uint8, int32, uint32, int64, uint64, float32, float64 };
@@ -69,7 +69,7 @@ class NetcdfOutput {
  public:
   explicit NetcdfOutput(const std::string& path);
   /// Writes into an output that is left for the caller to commit. @param output  must outlive this
-  explicit NetcdfOutput(const OutputFile& output);
+  explicit NetcdfOutput(const io::OutputFile& output);
   ~NetcdfOutput();
   NetcdfOutput(const NetcdfOutput&) = delete;
   NetcdfOutput& operator=(const NetcdfOutput&) = delete;
@@ -208,4 +208,4 @@ class NetcdfInput {
   std::unique_ptr<Process> process_;
 };
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "io/netcdf_library.hpp"
+#include "tables/netcdf_library.hpp"
 
 #include <cerrno>
 #include <cstring>
@@ -11,7 +11,7 @@
 
 #include "risley/core/require.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 namespace {
 
 /// Never destroyed: files may be closed while the process ends.
@@ -85,4 +85,4 @@ std::string netcdf_reason(int status) {
   return nc_strerror(status);
 }
 
-}  // namespace risley::io
+}  // namespace risley::tables

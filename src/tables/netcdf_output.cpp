@@ -13,12 +13,12 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/io/netcdf.hpp"
 #include "risley/io/output_file.hpp"
+#include "risley/tables/netcdf.hpp"
 
-#include "io/netcdf_library.hpp"
+#include "tables/netcdf_library.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 
 namespace {
 
@@ -42,7 +42,7 @@ hid_t another_handle(const std::string& path) {
 class NetcdfOutput::File {
  public:
   explicit File(const std::string& path) : own_(path), output_(*own_) { create(); }
-  explicit File(const OutputFile& output) : output_(output) { create(); }
+  explicit File(const io::OutputFile& output) : output_(output) { create(); }
   ~File() {
     if (!id_) return;
     const NetcdfLock lock;
@@ -113,14 +113,14 @@ class NetcdfOutput::File {
     id_ = id;
   }
 
-  std::optional<OutputFile> own_;
-  const OutputFile& output_;
+  std::optional<io::OutputFile> own_;
+  const io::OutputFile& output_;
   std::optional<int> id_;
   std::vector<std::pair<int, std::vector<std::string>>> texts_;  ///< not written yet
 };
 
 NetcdfOutput::NetcdfOutput(const std::string& path) : file_(std::make_unique<File>(path)) {}
-NetcdfOutput::NetcdfOutput(const OutputFile& output) : file_(std::make_unique<File>(output)) {}
+NetcdfOutput::NetcdfOutput(const io::OutputFile& output) : file_(std::make_unique<File>(output)) {}
 NetcdfOutput::~NetcdfOutput() = default;
 
 const std::string& NetcdfOutput::path() const { return file_->path(); }
@@ -262,4 +262,4 @@ void NetcdfOutput::put(const NetcdfVariable& variable, NetcdfType type, std::siz
 
 void NetcdfOutput::close() { file_->close(); }
 
-}  // namespace risley::io
+}  // namespace risley::tables

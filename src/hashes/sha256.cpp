@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/io/sha256.hpp"
+#include "risley/hashes/sha256.hpp"
 
 #include <memory>
 
@@ -8,11 +8,10 @@
 #include <openssl/evp.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/fork_lock.hpp"
+#include "risley/io/read_bytes.hpp"
 
-#include "io/fork_lock.hpp"
-#include "io/read_bytes.hpp"
-
-namespace risley::io {
+namespace risley::hashes {
 
 namespace {
 
@@ -29,17 +28,17 @@ std::string hexadecimal(const unsigned char* digest, unsigned int length) {
 }  // namespace
 
 std::string sha256_of_file(const std::string& path, const Progress& progress) {
-  auto in_library = ForkLock::instance().share();
+  auto in_library = io::ForkLock::instance().share();
   const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(),
                                                                    EVP_MD_CTX_free);
   require_done(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
   in_library.unlock();
-  read_bytes(path, [&](std::span<const char> bytes) {
+  io::read_bytes(path, [&](std::span<const char> bytes) {
     progress.check();
-    const auto again = ForkLock::instance().share();
+    const auto again = io::ForkLock::instance().share();
     require_done(EVP_DigestUpdate(context.get(), bytes.data(), bytes.size()) == 1);
   });
-  in_library = ForkLock::instance().share();
+  in_library = io::ForkLock::instance().share();
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_DigestFinal_ex(context.get(), digest, &length) == 1);
@@ -47,7 +46,7 @@ std::string sha256_of_file(const std::string& path, const Progress& progress) {
 }
 
 std::string sha256(std::string_view text) {
-  const auto in_library = ForkLock::instance().share();
+  const auto in_library = io::ForkLock::instance().share();
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);
@@ -55,7 +54,7 @@ std::string sha256(std::string_view text) {
 }
 
 std::string sha256_base64(std::string_view text) {
-  const auto in_library = ForkLock::instance().share();
+  const auto in_library = io::ForkLock::instance().share();
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);
@@ -64,4 +63,4 @@ std::string sha256_base64(std::string_view text) {
   return {encoded, encoded + characters};
 }
 
-}  // namespace risley::io
+}  // namespace risley::hashes

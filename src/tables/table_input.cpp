@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/io/table_input.hpp"
+#include "risley/tables/table_input.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,10 +18,10 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
-#include "risley/io/netcdf.hpp"
 #include "risley/io/text_table.hpp"
+#include "risley/tables/netcdf.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 namespace {
 
 using Rows = std::vector<std::vector<TableCell>>;
@@ -111,7 +111,7 @@ class CsvInput {
   }
 
   std::string path_;
-  LineReader lines_;
+  io::LineReader lines_;
   std::uint64_t line_ = 0;  ///< in which the row begins
   std::optional<char> delimiter_;
 };
@@ -124,11 +124,11 @@ TableCell cell_of(const std::string& field, const TableColumn& column) {
     case CellKind::text:
       return field;
     case CellKind::integer:
-      return integer_field(trimmed(field), column.name, kLow, kHigh);
+      return io::integer_field(io::trimmed(field), column.name, kLow, kHigh);
     case CellKind::real:
       break;
   }
-  return decimal_field(trimmed(field), column.name).value;
+  return io::decimal_field(io::trimmed(field), column.name).value;
 }
 
 Rows read_text(const std::string& path, const std::vector<TableColumn>& columns,
@@ -159,7 +159,7 @@ Rows read_text(const std::string& path, const std::vector<TableColumn>& columns,
     for (std::size_t i = 0; i < columns.size(); ++i) {
       try {
         rows.back().push_back(places[i] ? cell_of(fields[*places[i]], columns[i]) : TableCell());
-      } catch (const BadRow& error) {
+      } catch (const io::BadRow& error) {
         input.fail(error.what());
       }
     }
@@ -225,4 +225,4 @@ Rows read_table(const std::string& path, const std::vector<TableColumn>& columns
   return read_text(path, columns, progress);
 }
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -6,9 +6,9 @@
 #include <mutex>
 #include <string>
 
-#include "risley/io/netcdf.hpp"
+#include "risley/tables/netcdf.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 
 /// Held around every call of the NetCDF library, of the whole process.
 class NetcdfLock {
@@ -31,4 +31,4 @@ void require_dimensions(const std::string& variable,
 /// What the library says of a status; of a refusal by the disk what the system says.
 std::string netcdf_reason(int status);
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -7,7 +7,7 @@
 
 #include "risley/core/progress.hpp"
 
-namespace risley::io {
+namespace risley::hashes {
 
 /// SHA-256 of a file's bytes as 64 hexadecimal digits. @throws FileError, Cancelled
 std::string sha256_of_file(const std::string& path, const Progress& progress = {});
@@ -18,4 +18,4 @@ std::string sha256(std::string_view text);
 /// SHA-256 of a text in base64, as browsers take it.
 std::string sha256_base64(std::string_view text);
 
-}  // namespace risley::io
+}  // namespace risley::hashes

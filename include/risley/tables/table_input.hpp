@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
-#include "risley/io/table_file.hpp"
+#include "risley/tables/table_file.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 
 /// Whether a file is a table of TableFile's kinds: NetCDF by its first bytes, text by
 /// its ending .csv. false also where it cannot be read.
@@ -24,4 +24,4 @@ std::vector<std::vector<TableCell>> read_table(const std::string& path,
                                                const std::vector<TableColumn>& columns,
                                                const Progress& progress = {});
 
-}  // namespace risley::io
+}  // namespace risley::tables

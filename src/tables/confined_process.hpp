@@ -11,7 +11,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define RISLEY_SANITIZED
@@ -70,4 +70,4 @@ class ConfinedProcess {
   bool waited_too_long_ = false;
 };
 
-}  // namespace risley::io
+}  // namespace risley::tables

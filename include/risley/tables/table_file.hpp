@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-namespace risley::io {
+namespace risley::tables {
 
 /// What the values of a column are.
 enum class CellKind { text, integer, real };
@@ -64,4 +64,4 @@ class TableFile {
   std::unique_ptr<Writer> writer_;
 };
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -12,7 +12,7 @@
 
 struct sqlite3_stmt;
 
-namespace risley::io {
+namespace risley::tables {
 
 class SqliteInput;
 
@@ -72,4 +72,4 @@ class SqliteInput {
   std::unique_ptr<Database> database_;
 };
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/io/table_file.hpp"
+#include "risley/tables/table_file.hpp"
 
 #include <cmath>
 #include <limits>
@@ -12,11 +12,11 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/text.hpp"
-#include "risley/io/netcdf.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/io/text_table.hpp"
+#include "risley/tables/netcdf.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 
 using TableAbout = std::vector<std::pair<std::string, std::string>>;
 
@@ -96,7 +96,7 @@ class CsvTable final : public TableFile::Writer {
     is_first_ = true;
   }
 
-  TextOutput output_;
+  io::TextOutput output_;
   bool is_first_ = true;
 };
 
@@ -171,7 +171,7 @@ class NetcdfTable final : public TableFile::Writer {
     return variable;
   }
 
-  OutputFile output_;
+  io::OutputFile output_;
   TableAbout about_;
   std::vector<Column> columns_;
   std::size_t rows_ = 0;
@@ -220,4 +220,4 @@ void TableFile::add(const std::vector<TableCell>& cells) {
 
 void TableFile::close() { writer_->close(); }
 
-}  // namespace risley::io
+}  // namespace risley::tables

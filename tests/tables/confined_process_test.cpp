@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "io/confined_process.hpp"
+#include "tables/confined_process.hpp"
 
 #include <atomic>
 #include <chrono>
@@ -16,9 +16,9 @@
 #include <openssl/evp.h>
 #include <unistd.h>
 
-#include "risley/io/sha256.hpp"
+#include "risley/hashes/sha256.hpp"
 
-namespace risley::io::confined_process_test {
+namespace risley::tables::confined_process_test {
 
 using ::testing::HasSubstr;
 
@@ -51,7 +51,7 @@ TEST(ConfinedProcess, UsesOpenSslWhateverOtherThreadsDidWithItWhenItWasForked) {
   std::vector<std::jthread> hashing;
   for (int i = 0; i < 2; ++i) {
     hashing.emplace_back([&] {
-      while (!done) sha256("some text");
+      while (!done) hashes::sha256("some text");
     });
   }
   for (int i = 0; i < 100; ++i) {
@@ -124,4 +124,4 @@ TEST(ConfinedProcess, AnEndBetweenRequestsIsSeen) {
   EXPECT_THAT(end_of(process, "there?"), HasSubstr("Killed"));
 }
 
-}  // namespace risley::io::confined_process_test
+}  // namespace risley::tables::confined_process_test

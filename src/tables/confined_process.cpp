@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "io/confined_process.hpp"
+#include "tables/confined_process.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -19,9 +19,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "io/fork_lock.hpp"
+#include "risley/io/fork_lock.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 namespace {
 
 /// Status with which a child ends that got no more memory.
@@ -134,7 +134,7 @@ ConfinedProcess::ConfinedProcess(const Service& service, const Progress& progres
   }
   int problem = 0;
   {
-    const auto alone = ForkLock::instance().alone();
+    const auto alone = io::ForkLock::instance().alone();
     child_ = ::fork();
     problem = errno;
   }
@@ -220,4 +220,4 @@ void ConfinedProcess::fail() {
   throw ProcessEnded("the library's process ended without an answer");
 }
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -8,13 +8,13 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/netcdf.hpp"
+#include "risley/tables/netcdf.hpp"
 
-#include "io/confined_process.hpp"
-#include "io/netcdf_file.hpp"
-#include "io/netcdf_library.hpp"
+#include "tables/confined_process.hpp"
+#include "tables/netcdf_file.hpp"
+#include "tables/netcdf_library.hpp"
 
-namespace risley::io {
+namespace risley::tables {
 namespace {
 
 enum class Request : std::uint8_t {
@@ -326,4 +326,4 @@ void NetcdfInput::get(const NetcdfVariable& variable, NetcdfType type, std::size
   std::memcpy(values, bytes.data(), bytes.size());
 }
 
-}  // namespace risley::io
+}  // namespace risley::tables

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Tables in two formats hold the same, and appear whole or not at all.
-#include "risley/io/table_file.hpp"
+#include "risley/tables/table_file.hpp"
 
 #include <cmath>
 #include <limits>
@@ -14,12 +14,12 @@
 #include <netcdf.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/netcdf.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/tables/netcdf.hpp"
 
 #include "io/test_folder.hpp"
 
-namespace risley::io::table_file_test {
+namespace risley::tables::table_file_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -39,9 +39,9 @@ void write(const std::string& path) {
 }
 
 TEST(TableFile, WritesText) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   write(folder.file("t.csv"));
-  EXPECT_EQ(read_text_file(folder.file("t.csv")),
+  EXPECT_EQ(io::read_text_file(folder.file("t.csv")),
             "input,exit_status,wedge_angle_deg\n"
             "\"a, \"\"b\"\".lvx\",0,0.3333333333333333\n"
             "\"ä\nb.lvx\",,\n"
@@ -49,7 +49,7 @@ TEST(TableFile, WritesText) {
 }
 
 TEST(TableFile, WritesNetcdf) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   write(folder.file("t.nc"));
   const NetcdfInput file(folder.file("t.nc"));
   EXPECT_EQ(file.text("version"), "0.1.0");
@@ -67,7 +67,7 @@ TEST(TableFile, WritesNetcdf) {
 }
 
 TEST(TableFile, MayHaveNoRows) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   for (const char* name : {"t.csv", "t.nc"}) {
     TableFile(folder.file(name), kColumns, {}).close();
   }
@@ -75,21 +75,21 @@ TEST(TableFile, MayHaveNoRows) {
 }
 
 TEST(TableFile, IsThereWholeOrNotAtAll) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   for (const char* name : {"t.csv", "t.nc"}) {
-    write_text_file(folder.file(name), "before");
+    io::write_text_file(folder.file(name), "before");
     {
       TableFile table(folder.file(name), kColumns, {});
       table.add({"a", std::int64_t{0}, 1.0});
     }
-    EXPECT_EQ(read_text_file(folder.file(name)), "before");
+    EXPECT_EQ(io::read_text_file(folder.file(name)), "before");
     EXPECT_EQ(folder.names().size(), 1U) << name;
     std::filesystem::remove(folder.file(name));
   }
 }
 
 TEST(TableFile, RefusesWhatDoesNotFit) {
-  const TestFolder folder;
+  const io::TestFolder folder;
   EXPECT_THROW(TableFile::check_name("t.xlsx"), InvalidArgument);
   EXPECT_THROW(TableFile::check_name("t.sqlite"), InvalidArgument);
   EXPECT_THROW(TableFile(folder.file("t.csv"), {}, {}), InvalidArgument);
@@ -106,4 +106,4 @@ TEST(TableFile, RefusesWhatDoesNotFit) {
   }
 }
 
-}  // namespace risley::io::table_file_test
+}  // namespace risley::tables::table_file_test
