@@ -44,7 +44,7 @@ constexpr double kLargestErrorSigma = 1e4;                                      
 constexpr double kLongestCorrelation = 1e9, kLongestSample = 1e4, kShortestTime = 1e-6;  // s
 
 ErrorTerm read_error_term(const YamlMap& root, const ErrorName& name) {
-  const YamlMap map(root.at(name.key).value, root.path(), name.key);
+  const YamlMap map = root.section(name.key);
   map.allow_only({"sigma", "correlation_time_s", "white", "source"});
   const auto number = [&](std::string_view key) {
     return static_cast<double>(map.number(key, 0, kLargestErrorSigma, name.unit) * name.scale);
@@ -52,12 +52,8 @@ ErrorTerm read_error_term(const YamlMap& root, const ErrorName& name) {
   ErrorTerm term;
   if (map.find("sigma") != nullptr) term.sigma = number("sigma");
   if (map.find("white") != nullptr) term.white = number("white");
-  term.correlation_time = static_cast<double>(
-      map.number("correlation_time_s", kShortestTime, kLongestCorrelation, "s"));
-  term.source = map.text("source");
-  if (term.source.empty()) {
-    fail_at(map.path(), map.at("source").line, map.field("source") + " is empty");
-  }
+  term.correlation_time = map.real("correlation_time_s", kShortestTime, kLongestCorrelation, "s");
+  term.source = map.words("source");
   return term;
 }
 
@@ -93,8 +89,7 @@ ErrorModel parse_error_model(const std::string& text, const std::string& path) {
     model.terms[i] = read_error_term(root, kErrorNames[i]);
   }
   if (root.find("sample_interval_s") != nullptr) {
-    model.sample_interval =
-        static_cast<double>(root.number("sample_interval_s", kShortestTime, kLongestSample, "s"));
+    model.sample_interval = root.real("sample_interval_s", kShortestTime, kLongestSample, "s");
   } else if (has_white(model)) {
     fail_at(path, root.line(),
             "sample_interval_s is missing: white parts are constant within a sample");
