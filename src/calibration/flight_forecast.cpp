@@ -328,7 +328,6 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   take_true_planes(ground_cells(clean, work.shots.strip, cells), work.cells);
   result.cells = work.cells.planes.size();
   result.rough_cells = work.cells.rough;
-  result.steep_cells = work.cells.steep;
   result.cell_size = calibration.cell_size;
   if (work.cells.planes.size() < kFewestCells) {
     throw EstimationError(fmt::format(
