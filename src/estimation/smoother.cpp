@@ -329,6 +329,7 @@ class Smoother {
           each_knot(block, [&](std::size_t knot, std::size_t) { tell_state(knot, out); });
         });
     out.state_covariance = std::move(covariances_);
+    out.affine_states = std::move(filtered_);
   }
 
   /// Takes a knot's own shots and the noise of the step before it into what later knots say of it,

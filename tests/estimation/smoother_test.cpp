@@ -130,7 +130,7 @@ Matrix square_root(Matrix a) {
 /// offset, and nothing needs the inverse of a process noise, which may be singular.
 struct Dense {
   Vector parameter_step, state_step;
-  Matrix parameter_covariance, parameter_information, state_covariance;
+  Matrix parameter_covariance, parameter_information, state_covariance, sensitivity;
 
   explicit Dense(const Problem& p) {
     const Eigen::Index d = p.at.states(), n = p.equations.free;
@@ -176,6 +176,9 @@ struct Dense {
 
     const Eigen::HouseholderQR<Matrix> data(rows.topRows(shots + states));
     const Matrix triangle = data.matrixQR().topRows(states + n).triangularView<Eigen::Upper>();
+    const Matrix rotors = triangle.topLeftCorner(states, states);
+    sensitivity =
+        -motion * rotors.triangularView<Eigen::Upper>().solve(triangle.topRightCorner(states, n));
     parameter_information =
         triangle.bottomRightCorner(n, n).transpose() * triangle.bottomRightCorner(n, n);
     const Eigen::HouseholderQR<Matrix> all(rows);
@@ -232,8 +235,17 @@ void expect_dense_solution(const Problem& p) {
     EXPECT_LE(difference(states, dense.state_step, state_size, one), kStateTolerance);
     if (!covariances) {
       EXPECT_TRUE(found.state_covariance.empty());
+      EXPECT_TRUE(found.affine_states.empty());
       continue;
     }
+    ASSERT_EQ(found.affine_states.size(),
+              p.at.state.size() * static_cast<std::size_t>(p.equations.free + 1));
+    Eigen::MatrixXd sensitivity(dense.sensitivity.rows(), dense.sensitivity.cols());
+    for (std::size_t knot = 0; p.equations.free > 0 && knot < p.at.size(); ++knot) {
+      sensitivity.middleRows(static_cast<Eigen::Index>(knot) * d, d) = found.sensitivity(knot, d);
+    }
+    EXPECT_LE(difference(sensitivity, dense.sensitivity, state_sigma, sigma.cwiseInverse()),
+              kStateTolerance);
     ASSERT_EQ(found.state_covariance.size(),
               p.at.size() * static_cast<std::size_t>(d * (d + 1) / 2));
     const double* entry = found.state_covariance.data();

@@ -25,8 +25,16 @@ struct SmootherSolution {
   Eigen::MatrixXd parameter_covariance;   ///< [free, free], prior included
   Eigen::MatrixXd parameter_information;  ///< [free, free], of the data alone, rotors eliminated
   std::vector<double> state_step;         ///< [knots][prisms][3]
-  /// Only with covariances: joint covariance of each knot's states as in RotorTrajectory.
-  std::vector<double> state_covariance;
+  /// Only with covariances: joint covariance of each knot's states as in RotorTrajectory, and, knot
+  /// by knot, the smoothed states at unchanged parameters and their derivatives by the parameters
+  /// [free + 1][d].
+  std::vector<double> state_covariance, affine_states;
+
+  /// Derivatives of a knot's smoothed states by the parameters [d, free]. @param d  as states()
+  Eigen::Map<const Eigen::MatrixXd> sensitivity(std::size_t knot, Eigen::Index d) const {
+    const Eigen::Index free = parameter_step.size();
+    return {affine_states.data() + knot * static_cast<std::size_t>(d * (free + 1)) + d, d, free};
+  }
 };
 
 /// One Gauss-Newton step of the whole trajectory. The parameters are constants without noise, so
