@@ -3,7 +3,6 @@
 # Every C++ library comes from the distribution; scripts/install-dependencies names the packages.
 # What only building needs is named here, what users of the installed library need in RisleyPackages.
 include(RisleyPackages)
-risley_package(xsimd TARGET xsimd DEBIAN libxsimd-dev FIND xsimd)
 risley_package(random123 TARGET risley_random123 DEBIAN librandom123-dev)
 risley_package(cli11 TARGET CLI11::CLI11 DEBIAN libcli11-dev FIND CLI11)
 risley_package(spdlog TARGET spdlog::spdlog DEBIAN libspdlog-dev FIND spdlog)

@@ -67,7 +67,7 @@ function(risley_add_kernels_to owner)
     set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden UNITY_BUILD OFF)
     target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/include
                                                  ${PROJECT_SOURCE_DIR}/src)
-    target_link_libraries(${target} PRIVATE xsimd)
+    target_link_libraries(${target} PRIVATE risley_xsimd)
     target_compile_definitions(${target} PRIVATE RISLEY_KERNEL=${set}
       # xsimd's plain functions for huge angles do not name their instruction set themselves.
       __ieee754_rem_pio2=ieee754_rem_pio2_${set} __kernel_rem_pio2=kernel_rem_pio2_${set})

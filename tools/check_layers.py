@@ -2,7 +2,8 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Checks that no file includes a layer which its own layer does not declare in CMakeLists.txt, nor
-a private header (one under src/) of another layer, nor a library that only one layer may know; and
+a private header (one under src/) of another layer, nor a library that only one layer may know; that
+public headers include only libraries that their layer, or one below it, hands on to its users; and
 that no library knows an option of the command: no string in src/ and include/ has "--word" in it.
 
 Usage: tools/check_layers.py [ROOT]
@@ -13,6 +14,7 @@ import re
 import sys
 
 LAYER = re.compile(r"^\s*risley_add_layer\(\s*(\w+)(?:\s+LAYERS\s+([\w\s]*))?\)", re.MULTILINE)
+NEEDS = re.compile(r"^\s*risley_layer_needs\(\s*(\w+)\s+PUBLIC\s+([a-z0-9\s-]*)", re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]')
 STRING = re.compile(r'"((?:[^"\\]|\\.)*)"')
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
@@ -20,8 +22,12 @@ PROGRAMS = ("apps", "studies", "bench")  # may use every layer
 MEASURING = ("bench",)  # programs that measure what is private, as tests test it
 BINDINGS = "python"  # src/python: may use every layer's public headers, and nothing may use it
 # Libraries with one home: what others need of them, they ask that layer for.
-HOMES = {"netcdf": "io", "hdf5": "io", "yaml-cpp": "io", "openssl": "io", "sqlite3": "io", "pcap": "recordings",
-         "proj": "cloud", "proj_experimental": "cloud", "pybind11": BINDINGS, "tbb": "parallel", "oneapi": "parallel"}
+HOMES = {"netcdf": "tables", "hdf5": "tables", "sqlite3": "tables", "openssl": "hashes", "yaml-cpp": "io",
+         "pcap": "recordings", "proj": "cloud", "proj_experimental": "cloud", "pybind11": BINDINGS,
+         "tbb": "parallel", "oneapi": "parallel"}
+# Packages of risley_layer_needs by how their headers are included.
+PACKAGES = {"Eigen": "eigen", "fmt": "fmt", "xsimd": "xsimd", "nlohmann": "nlohmann-json", "Random123": "random123",
+            **{library: library for library in HOMES}}
 LIMITED_BY_PROGRAMS = ("tbb",)  # whose threads they may limit
 STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their agreement counts
 
@@ -29,6 +35,15 @@ STRANGERS = ("simulation", "estimation")  # they meet only in tests, so their ag
 def declared_layers(cmake_text):
     """{layer: set of the layers it may include}, lowest layer first."""
     return {name: set((below or "").split()) for name, below in LAYER.findall(cmake_text)}
+
+
+def exported_packages(layers, cmake_text):
+    """{layer: packages that it and those below it hand on to their users}"""
+    exported = {}
+    public = {name: set(packages.split()) for name, packages in NEEDS.findall(cmake_text)}
+    for name, below in layers.items():
+        exported[name] = public.get(name, set()).union(*(exported.get(layer, set()) for layer in below))
+    return exported
 
 
 def check_declarations(layers):
@@ -66,13 +81,14 @@ def flags_in(line):
 
 
 def library_of(include):
-    """The library among HOMES that an #include names, or None."""
+    """The library among PACKAGES that an #include names, or None."""
     name = include.split("/")[0].removesuffix(".h")
-    return name if name in HOMES else None
+    return name if name in PACKAGES else None
 
 
-def check_file(path, shown, own, allowed, layers):
-    """@param own  the file's layer; None in programs, which may know options"""
+def check_file(path, shown, own, allowed, layers, exported):
+    """@param own  the file's layer; None in programs, which may know options
+    @param exported  packages whose headers it may include; None: those of all"""
     errors = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         match = INCLUDE.match(line)
@@ -86,8 +102,11 @@ def check_file(path, shown, own, allowed, layers):
             errors.append(f'{shown}:{number}: "{include}" hides its layer, name it from the root')
             continue
         library = library_of(include)
-        if library and own != HOMES[library] and not (own is None and library in LIMITED_BY_PROGRAMS):
-            errors.append(f"{shown}:{number}: only the layer {HOMES[library]} may include {include}")
+        home = HOMES.get(library, own)
+        if own != home and not (own is None and library in LIMITED_BY_PROGRAMS):
+            errors.append(f"{shown}:{number}: only the layer {home} may include {include}")
+        elif library and exported is not None and PACKAGES[library] not in exported:
+            errors.append(f"{shown}:{number}: the layer {own} does not hand on {include} to its users")
         layer, private = included_layer(include, layers)
         if layer is None or layer == own == BINDINGS:
             continue
@@ -104,7 +123,9 @@ def check_file(path, shown, own, allowed, layers):
 
 def check(root):
     """Every error of the tree under root, as text."""
-    layers = declared_layers((root / "CMakeLists.txt").read_text(encoding="utf-8"))
+    cmake_text = (root / "CMakeLists.txt").read_text(encoding="utf-8")
+    layers = declared_layers(cmake_text)
+    exported = exported_packages(layers, cmake_text)
     if not layers:
         return ["CMakeLists.txt: no risley_add_layer found"]
     errors = check_declarations(layers)
@@ -122,7 +143,8 @@ def check(root):
                 allowed = layers[layer] | {layer}
             else:
                 continue
-            errors += check_file(path, shown, layer, allowed, layers)
+            errors += check_file(path, shown, layer, allowed, layers,
+                                 exported.get(layer) if folder == "include/risley" else None)
     return errors
 
 

@@ -30,8 +30,8 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/io/file_identity.hpp"
-#include "risley/io/sha256.hpp"
 #include "risley/io/temporaries.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/recordings/reader.hpp"
@@ -286,7 +286,8 @@ Json with_head(const CommonOptions& common, const Json& object, const jobs::Prov
     if (one["sha256"].is_null() && !interrupted.is_set() &&
         std::filesystem::is_regular_file(path, ignored)) {
       try {
-        one["sha256"] = io::sha256_of_file(path, {[](double, std::string_view) {}, &interrupted});
+        one["sha256"] =
+            hashes::sha256_of_file(path, {[](double, std::string_view) {}, &interrupted});
       } catch (const FileError&) {  // the verb says what is wrong with it
       } catch (const Cancelled&) {
       }

@@ -54,9 +54,10 @@ std::set<std::string> writable_format_names() {
 }
 
 /// Types of sensors by their names on the command line.
-const std::map<std::string, std::uint8_t>& sensor_types() {
-  static const std::map<std::string, std::uint8_t> types = {
-      {"avia", 7}, {"horizon", 3}, {"mid-40", 1}, {"mid-70", 6}, {"tele-15", 2}};
+std::map<std::string, std::uint8_t> sensor_types() {
+  std::map<std::string, std::uint8_t> types;
+  for (const auto& type : recordings::kLivoxTypes)
+    types[lower_case(std::string(type.name))] = type.number;
   return types;
 }
 

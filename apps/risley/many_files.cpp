@@ -21,16 +21,16 @@
 #include <unistd.h>
 
 #include "risley/core/error.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/io/folder.hpp"
 #include "risley/io/folder_lock.hpp"
 #include "risley/io/output_file.hpp"
-#include "risley/io/sha256.hpp"
-#include "risley/io/table_file.hpp"
 #include "risley/jobs/inputs.hpp"
 #include "risley/jobs/result_record.hpp"
 #include "risley/json/result_columns.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/recordings/reader.hpp"
+#include "risley/tables/table_file.hpp"
 
 #include "recording_text.hpp"
 #include "result_folder.hpp"
@@ -194,7 +194,7 @@ std::string work_text(const CLI::App& verb, const CommonOptions& common) {
     for (std::string& value : values) {
       std::string contents;
       for (const std::string& file : jobs::files_behind(value)) {
-        contents += " sha256:" + io::sha256_of_file(file, cancellable());
+        contents += " sha256:" + hashes::sha256_of_file(file, cancellable());
       }
       if (!contents.empty()) value = contents;
     }
@@ -395,11 +395,11 @@ class Runner {
   void write_table() const {
     json::ResultColumns columns;
     spool_.for_each([&](const Finished& one) { columns.note(row_of(one)); });
-    io::TableFile table(wishes_.table, columns.columns(),
-                        {{"title", fmt::format("risley {}, one row per input", common_.verb)},
-                         {"command", common_.command},
-                         {"version", RISLEY_VERSION},
-                         {"source", "risley " RISLEY_VERSION}});
+    tables::TableFile table(wishes_.table, columns.columns(),
+                            {{"title", fmt::format("risley {}, one row per input", common_.verb)},
+                             {"command", common_.command},
+                             {"version", RISLEY_VERSION},
+                             {"source", "risley " RISLEY_VERSION}});
     spool_.for_each([&](const Finished& one) { table.add(columns.cells(row_of(one))); });
     table.close();
   }
@@ -559,7 +559,7 @@ FileJobs file_jobs(const ManyWishes& wishes, const std::string& output, bool int
   }
   FileJobs result;
   result.many = are_several(wishes) || !wishes.table.empty() || wishes.resume;
-  if (!wishes.table.empty()) io::TableFile::check_name(wishes.table);
+  if (!wishes.table.empty()) tables::TableFile::check_name(wishes.table);
   if (wishes.resume && output.empty() && wishes.table.empty()) {
     throw InvalidArgument("--resume needs results that stay: give --output or --table");
   }

@@ -65,8 +65,7 @@ std::string some_names(std::vector<std::string> names) {
 std::vector<std::pair<std::string, std::size_t>> stated_names(const std::string& path) {
   constexpr int kLatestVersion = 1'000'000, kLastWithFolder = 3;
   const io::YamlMap whole(io::parse_yaml(io::read_text_file(path), path), path, "");
-  const io::YamlMap bag(whole.at("rosbag2_bagfile_information").value, path,
-                        "rosbag2_bagfile_information");
+  const io::YamlMap bag = whole.section("rosbag2_bagfile_information");
   const int version = bag.integer("version", 0, kLatestVersion);
   const auto& list = bag.at("relative_file_paths");
   const std::string field = bag.field("relative_file_paths");

@@ -11,7 +11,7 @@
 
 #include "risley/bags/bag.hpp"
 #include "risley/core/error.hpp"
-#include "risley/io/sqlite_input.hpp"
+#include "risley/tables/sqlite_input.hpp"
 
 #include "bags/bag_kinds.hpp"
 #include "bags/unpack.hpp"
@@ -80,7 +80,7 @@ class Ros2Bag final : public Bag {
 
  private:
   void find_topics() {
-    io::SqliteQuery query = database_.query(
+    tables::SqliteQuery query = database_.query(
         "SELECT id, name, type, serialization_format FROM topics ORDER BY name, id");
     while (query.next("give its topics")) {
       Topic topic;
@@ -107,7 +107,7 @@ class Ros2Bag final : public Bag {
 
   /// A damaged end is no reason to keep back what stands in front of it.
   std::int64_t id_at_end(const char* sql) const {
-    io::SqliteQuery query = database_.query(sql);
+    tables::SqliteQuery query = database_.query(sql);
     try {
       return query.next("give its ends") ? query.integer(0) : 0;
     } catch (const FileError&) {
@@ -122,7 +122,7 @@ class Ros2Bag final : public Bag {
     return std::nullopt;
   }
 
-  io::SqliteInput database_;
+  tables::SqliteInput database_;
   Unpacker unpacker_;
   std::uint64_t blob_bytes_ = 0;   ///< of the messages read so far
   bool any_read_ = false;          ///< and id_ is that of the last message
@@ -130,7 +130,7 @@ class Ros2Bag final : public Bag {
   std::vector<bool> wanted_;       ///< by topic
   std::int64_t first_id_ = 0, last_id_ = 0, id_ = 0;
   bool ended_ = false;
-  std::optional<io::SqliteQuery> messages_;  ///< none only while the bag is opened
+  std::optional<tables::SqliteQuery> messages_;  ///< none only while the bag is opened
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "risley/calibration/planar_adjustment.hpp"
+#include "risley/core/median.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -97,12 +98,9 @@ double DirectionGrid::shorter_extent(const std::vector<std::size_t>& beams) cons
   for (std::size_t k = 0; k < beams.size(); ++k) {
     across[k] = std::cos(longer) * angles_[beams[k]][1] - std::sin(longer) * angles_[beams[k]][0];
   }
-  const auto tail = static_cast<std::ptrdiff_t>(kTail * count);
-  const auto low = across.begin() + tail, high = across.end() - 1 - tail;
-  std::nth_element(across.begin(), low, across.end());
-  const double lowest = *low;
-  std::nth_element(across.begin(), high, across.end());
-  return (*high - lowest) / (1.0 - 2.0 * kTail);
+  const auto tail = static_cast<std::size_t>(kTail * count);
+  const double lowest = nth_value(across, tail);
+  return (nth_value(across, across.size() - 1 - tail) - lowest) / (1.0 - 2.0 * kTail);
 }
 
 }  // namespace risley::calibration

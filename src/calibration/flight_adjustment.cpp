@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/core/error.hpp"
@@ -42,17 +43,6 @@ constexpr double kSettledCorrection = 0.02;
 constexpr double kLeastOwnShare = 0.25;
 /// Columns of an inverse that are computed together.
 constexpr Index kInverseColumns = 96;
-
-Matrix3d rotation_of(const Vector3d& vector) {
-  const double angle = vector.norm();
-  if (!(angle > 0)) return Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
-}
-
-Vector3d rotation_vector_of(const Matrix3d& rotation) {
-  const Eigen::AngleAxisd turn(rotation);
-  return turn.angle() * turn.axis();
-}
 
 Matrix3d cross_matrix(const Vector3d& v) {
   Matrix3d m;
@@ -200,7 +190,7 @@ std::vector<PatchSums> patch_sums(const FlightRows& rows, const PlaneOfShot& pla
 
 VectorXd unknown_values(const FlightModel& model) {
   VectorXd values = VectorXd::Zero(model.unknowns().size());
-  values.head<3>() = rotation_vector_of(model.boresight);
+  values.head<3>() = algebra::rotation_vector(model.boresight);
   values.segment<3>(FlightUnknowns::lever_arm(0)) = model.lever_arm;
   values[FlightUnknowns::range_offset()] = model.range_offset;
   values[FlightUnknowns::clock_offset()] = model.clock_offset;
@@ -212,7 +202,7 @@ VectorXd unknown_values(const FlightModel& model) {
 MatrixXd value_rates(const FlightModel& model) {
   const Index globals = model.unknowns().size();
   MatrixXd rates = MatrixXd::Identity(globals, globals);
-  const Vector3d turn = rotation_vector_of(model.boresight);
+  const Vector3d turn = algebra::rotation_vector(model.boresight);
   const double angle = turn.norm();
   const Matrix3d across = cross_matrix(turn);
   const double factor =
@@ -526,7 +516,7 @@ void apply(const FlightSystem::Step& step, FlightModel& model) {
                  model.planes.size());
   model.corrections += Eigen::Map<const MatrixXd>(step.unknowns.data(), kCorrections, knots);
   const VectorXd own = step.unknowns.tail(model.unknowns().size());
-  const Eigen::Quaterniond turned(model.boresight * rotation_of(own.head<3>()));
+  const Eigen::Quaterniond turned(model.boresight * algebra::rotation_by(own.head<3>()));
   model.boresight = turned.normalized().toRotationMatrix();
   model.lever_arm += own.segment<3>(FlightUnknowns::lever_arm(0));
   model.range_offset += own[FlightUnknowns::range_offset()];

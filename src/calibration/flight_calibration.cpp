@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
@@ -82,12 +83,6 @@ constexpr CoarseRound kCellRounds[] = {
 constexpr int kAllRounds = 3, kManySteps = 2, kLastSteps = 8;
 
 double flight_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
-
-Eigen::Matrix3d rotation_by(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  if (!(angle > 0)) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
-}
 
 /// What sigmas of corrections are in the words of a trajectory.
 trajectories::PoseAccuracy accuracy_of(const Eigen::Matrix<double, kCorrections, 1>& sigma,
@@ -870,7 +865,8 @@ void FlightWork::fill_trajectory() {
         model_.knots, model_.corrections, priors_.process, corrected.time_ns[i] - clock_ns);
     corrected.position[i] += error.head<3>();
     corrected.attitude[i] =
-        (Eigen::Quaterniond(rotation_by(error.tail<3>())) * corrected.attitude[i]).normalized();
+        (Eigen::Quaterniond(algebra::rotation_by(error.tail<3>())) * corrected.attitude[i])
+            .normalized();
     corrected.accuracy[i] =
         accuracy_of(correction_sigma_at(model_.knots, result_.correction_sigma, priors_.process,
                                         corrected.time_ns[i] - clock_ns),

@@ -12,6 +12,7 @@
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/observation_model.hpp"
@@ -81,9 +82,7 @@ void take_true_planes(const GroundCells& truth, GroundCells& cells) {
     std::vector<std::int32_t>& own = seen[cell];
     if (own.empty()) continue;
     // Noise moves few points into a neighbour.
-    const auto middle = own.begin() + static_cast<std::ptrdiff_t>(own.size() / 2);
-    std::nth_element(own.begin(), middle, own.end());
-    cells.planes[cell] = truth.planes[static_cast<std::size_t>(*middle)];
+    cells.planes[cell] = truth.planes[static_cast<std::size_t>(upper_median(own))];
   }
 }
 
@@ -329,7 +328,6 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   take_true_planes(ground_cells(clean, work.shots.strip, cells), work.cells);
   result.cells = work.cells.planes.size();
   result.rough_cells = work.cells.rough;
-  result.steep_cells = work.cells.steep;
   result.cell_size = calibration.cell_size;
   if (work.cells.planes.size() < kFewestCells) {
     throw EstimationError(fmt::format(

@@ -10,6 +10,7 @@
 
 #include <Eigen/Geometry>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/calibration_plan.hpp"
 #include "risley/core/error.hpp"
@@ -22,12 +23,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-Eigen::Matrix3d boresight_by(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  if (!(angle > 0)) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
-}
 
 /// The process of a trajectory's errors by the recording's clock.
 trajectories::ErrorProcess process_of(const trajectories::ErrorModel& errors,
@@ -65,7 +60,7 @@ void set_model(const FlightCalibrationOptions& options, FlightStart& start) {
     boresight[i] = options.mount.boresight[at].value;
     start.model.lever_arm[i] = options.mount.lever_arm[at].value;
   }
-  start.model.boresight = boresight_by(boresight);
+  start.model.boresight = algebra::rotation_by(boresight);
   start.model.range_offset = sensor.range_offset;
   start.model.clock_offset = options.mount.clock_offset.value;
   AdjustedParameters adjusted =

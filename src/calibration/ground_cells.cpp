@@ -129,18 +129,14 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
 /// The plane of some points, or why there is none.
 struct Outcome {
   std::optional<FittedGround> ground;
-  bool rough = false, steep = false;
+  bool rough = false;
 };
 
 Outcome plane_of(const ShotPoints& points, std::span<const std::uint32_t> rows,
                  const GroundCellOptions& options) {
   Outcome result;
   std::optional<FittedGround> ground = fit(points, rows);
-  if (!ground) return result;
-  if (ground->plane.normal.z() < std::cos(options.steepest)) {
-    result.steep = true;
-    return result;
-  }
+  if (!ground || ground->plane.normal.z() < std::cos(options.steepest)) return result;
   std::vector<double> distance = ground->distance;
   const double points_fitted = static_cast<double>(distance.size());
   const double significant =
@@ -303,7 +299,6 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
   std::vector<double> distances;
   for (std::size_t cell = 0; cell < numbers.size(); ++cell) {
     cells.rough += outcome[cell].rough;
-    cells.steep += outcome[cell].steep;
     if (!outcome[cell].ground) continue;
     number[cell] = static_cast<std::int32_t>(cells.planes.size());
     cells.planes.push_back(outcome[cell].ground->plane);

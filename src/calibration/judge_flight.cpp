@@ -11,6 +11,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/datum.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
+#include "risley/core/median.hpp"
 #include "risley/estimation/weak_directions.hpp"
 
 namespace risley::calibration {
@@ -65,9 +66,7 @@ FlightDatum datum_of(const FlightEvidence& e, const MatrixXd& movement) {
   datum.rotation = formal.gauge;
   datum.shape = formal.shape;
   datum.total = std::hypot(formal.gauge, formal.shape);
-  const auto middle = ranges.begin() + static_cast<std::ptrdiff_t>(ranges.size() / 2);
-  std::nth_element(ranges.begin(), middle, ranges.end());
-  datum.height = *middle;
+  datum.height = upper_median(ranges);
   return datum;
 }
 

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "risley/algebra/products.hpp"
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -39,13 +40,6 @@ constexpr double kSmallPromise = 1e-2;
 /// that is small enough to be the last.
 constexpr int kMostShapeSteps = 6;
 constexpr double kSmallShapeStep = 1e-2;
-
-/// Rotation by a vector: its direction is the axis, its length the angle.
-Eigen::Matrix3d rotation(const Eigen::Vector3d& by) {
-  const double angle = by.norm();
-  if (angle == 0.0) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, by / angle).toRotationMatrix();
-}
 
 /// Chi-square that a sound sample with so many degrees of freedom exceeds once in 10,000.
 double critical_chi2(int degrees_of_freedom) {
@@ -93,7 +87,7 @@ void move(PlanarProblem& p, const Unknowns& at, const Step& step) {
   for (std::size_t s = 0; s < p.stations.size(); ++s) {
     if (at.rotation(s) < 0) continue;
     Eigen::Matrix3d& turn = p.stations[s].scene_from_sensor;
-    turn = rotation(step.shared.segment<3>(at.rotation(s))) * turn;
+    turn = algebra::rotation_by(step.shared.segment<3>(at.rotation(s))) * turn;
   }
   for (std::size_t v = 0; v < p.views.size(); ++v) {
     p.views[v].distance += step.own[p.views[v].wall][at.distance(v)];

@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "risley/algebra/products.hpp"
+#include "risley/algebra/rotation_vector.hpp"
 
 #include "calibration/eigen_vectors.hpp"
 
@@ -17,11 +18,6 @@ namespace risley::calibration {
 using Eigen::Index;
 
 namespace {
-
-Eigen::Vector3d rotation_vector(const Eigen::Matrix3d& matrix) {
-  const Eigen::AngleAxisd turn(matrix);
-  return turn.angle() * turn.axis();
-}
 
 /// Columns of one wall's sums: its own unknowns, and then those of the whole system that its views
 /// have to do with.
@@ -355,7 +351,7 @@ Eigen::Vector2d misfit_of(const Wall& wall) {
 }
 
 Eigen::Vector3d misfit_of(const StationPose& station) {
-  return rotation_vector(station.scene_from_sensor * station.stated.transpose());
+  return algebra::rotation_vector(station.scene_from_sensor * station.stated.transpose());
 }
 
 PlanarSystem build_system(const PlanarProblem& p, const HeldQuantities& held, const Unknowns& at,

@@ -397,7 +397,7 @@ SurfaceReport inspect_surface(const SurfaceResiduals& residuals) {
     const SmoothSurface surface(grid.cells, grid.full);
     report.steps = StepSearch(grid, surface, residuals).run();
   }
-  double normalized = 0, excess = 0, count = 0;
+  double normalized = 0, count = 0;
   for (const Cell& cell : grid.cells) {
     const auto around = grid.around(cell);
     // Cells beside a step hold some of its rows, too few to move their median.
@@ -405,15 +405,10 @@ SurfaceReport inspect_surface(const SurfaceResiduals& residuals) {
                         return grid.cells[c].region >= 0;
                       });
     if (!cell.full || step) continue;
-    const double square = cell.mean * cell.mean, variance = cell.mean_sigma * cell.mean_sigma;
-    normalized += square / variance;
-    excess += square - variance;
+    normalized += cell.mean * cell.mean / (cell.mean_sigma * cell.mean_sigma);
     count += 1.0;
   }
-  if (count > 0) {
-    report.unevenness = normalized / count;
-    report.unevenness_rms = std::sqrt(std::max(0.0, excess / count));
-  }
+  if (count > 0) report.unevenness = normalized / count;
   return report;
 }
 

@@ -12,6 +12,7 @@
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/chi_square.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/random.hpp"
 
@@ -35,11 +36,10 @@ bool contradicts(const PriorTest& test) {
   return test.degrees_of_freedom != 0 && !(test.chi2 <= test.critical);
 }
 
-/// Chi2 that chance exceeds once in a thousand times (Wilson and Hilferty 1931).
+/// Chi2 that chance exceeds once in a thousand times.
 double significant_chi2(double degrees_of_freedom) {
   constexpr double kNormalQuantile = 3.0902;
-  const double share = 2.0 / (9.0 * degrees_of_freedom);
-  return degrees_of_freedom * std::pow(1.0 - share + kNormalQuantile * std::sqrt(share), 3);
+  return degrees_of_freedom * chi_square_per_degree(degrees_of_freedom, kNormalQuantile);
 }
 
 /// A root mean square error that a verdict judges, rad.

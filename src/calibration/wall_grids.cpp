@@ -7,6 +7,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/calibration/rays.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/plane.hpp"
 #include "risley/parallel/parallel.hpp"
 
@@ -59,14 +60,9 @@ struct PlaceExtent {
   explicit PlaceExtent(std::vector<double> values) {
     std::erase_if(values, [](double value) { return !std::isfinite(value); });
     if (values.empty()) return;
-    const auto at = [&](std::size_t rank) {
-      const auto place = values.begin() + static_cast<std::ptrdiff_t>(rank);
-      std::nth_element(values.begin(), place, values.end());
-      return *place;
-    };
     const std::size_t beyond = values.size() / 1000;
-    least = at(beyond);
-    most = at(values.size() - 1 - beyond);
+    least = nth_value(values, beyond);
+    most = nth_value(values, values.size() - 1 - beyond);
     const double margin = 0.1 * (most - least);
     least -= margin;
     most += margin;

@@ -15,6 +15,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/sensors/scan_pattern.hpp"
@@ -665,14 +666,8 @@ class PointDistribution::Work {
     if (result.density > 0) result.spacing = 1 / std::sqrt(result.density);
     result.covered = covered / cells;
     result.overlap = several / cells;
-    const auto quantile = [&](double share) {
-      const auto at = counts.begin() +
-                      static_cast<std::ptrdiff_t>(share * static_cast<double>(counts.size() - 1));
-      std::nth_element(counts.begin(), at, counts.end());
-      return *at / cell_area;
-    };
-    result.low_density = quantile(0.05);
-    result.median_density = quantile(0.5);
+    result.low_density = quantile(counts, 0.05) / cell_area;
+    result.median_density = quantile(counts, 0.5) / cell_area;
   }
 
   void fill_map(PointDistributionSummary& result, std::size_t most_squares) const {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 
@@ -20,13 +21,6 @@ namespace {
 
 constexpr double kClassBegin[] = {0, 2, 5, 10, 20, 50, 100, 200, 500};  // m
 constexpr double kHighShare = 0.95;
-
-double quantile(std::vector<double>& values, double share) {
-  const double place = std::floor(share * static_cast<double>(values.size() - 1));
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 RangeClass class_of(const PointSample& sample, std::span<const std::size_t> rows, double from,
                     double to) {

@@ -12,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/diagnostics.hpp"
 
@@ -33,9 +34,7 @@ double median_square(std::span<const double> residual, std::span<const float> ro
     squares.push_back(std::isfinite(square) ? square : std::numeric_limits<double>::infinity());
   }
   if (squares.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return *middle;
+  return upper_median(squares);
 }
 
 double robust_sigma(std::span<const double> residual, std::span<const float> rounding) {

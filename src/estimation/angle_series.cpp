@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 
 namespace risley::estimation {
@@ -108,9 +109,7 @@ std::int64_t median_step_ns(std::span<const std::int64_t> time_ns) {
   for (std::size_t i = 1; i < std::min(time_ns.size(), kMedianSteps); ++i) {
     steps.push_back(time_ns[i] - time_ns[i - 1]);
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return upper_median(steps);
 }
 
 void mirror(AngleSeries& series) {

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/angle_series.hpp"
 
@@ -108,9 +109,7 @@ double robust_scale(std::span<const double> azimuth, std::span<const double> zen
     squares.push_back(std::isfinite(square) ? square : std::numeric_limits<double>::infinity());
   }
   if (squares.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return std::sqrt(*middle) / kMedian;
+  return std::sqrt(upper_median(squares)) / kMedian;
 }
 
 std::vector<ShotRange> autocorrelation_windows(std::size_t shots) {

@@ -14,10 +14,10 @@
 #include "risley/core/golden_section.hpp"
 #include "risley/estimation/angle_noise.hpp"
 #include "risley/optics/batch.hpp"
+#include "risley/optics/observation_model.hpp"
 
 #include "estimation/entry_checks.hpp"
 #include "estimation/filter.hpp"
-#include "estimation/residual_model.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -38,15 +38,24 @@ std::vector<RotorProcess> processes(const std::vector<double>& decades) {
   return result;
 }
 
+/// Observed minus modelled of a shot, azimuth first, rad; NaN when the beam does not get through.
+Eigen::Vector2d residual_of(const AngleSeries& series, std::size_t shot, const PrismTrain& train,
+                            std::span<const double> rotation_angles) {
+  const auto modelled =
+      angles_from_unit_vector(observe(train, rotation_angles, series.beam[shot]).direction);
+  return {wrap_to_pi(series.azimuth[shot] - modelled.azimuth),
+          series.zenith[shot] - modelled.zenith};
+}
+
 /// Shots that no filter may take although its prior is still wide enough to swallow them: those
 /// among the first that lie far from what the start, or the pass before, expects.
 std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
                                   const EkfOptions& options, const FilterReference* reference) {
   std::vector<unsigned char> outlier(series.size(), 0);
-  const PrismTrain& start_train = start.train;
-  ResidualModel model(start_train, options.free);
-  model.set(reference ? reference->before.parameters : free_values(start_train, options.free));
-  std::vector<double> angle(static_cast<std::size_t>(start_train.prisms()));
+  const PrismTrain train =
+      reference ? with_free_values(start.train, options.free, reference->before.parameters)
+                : start.train;
+  std::vector<double> angle(static_cast<std::size_t>(train.prisms()));
   const double start_limit = std::max(radians_from_degrees(0.1), 8.0 * start.residual_rms);
   for (std::size_t i = 0; i < std::min(options.gate_after, series.size()); ++i) {
     const double t = 1e-9 * static_cast<double>(series.time_ns[i] - start.time_ns);
@@ -55,12 +64,11 @@ std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
       angle[k] = reference ? reference->angles(i)[k]
                            : start.rotation_angle[k] + t * start.angular_velocity[k];
     }
-    model.linearise(angle, series.beam[i]);
     const double variance = options.angle_noise * options.angle_noise +
                             static_cast<double>(series.azimuth_rounding_variance[i] +
                                                 series.zenith_rounding_variance[i]);
     const double limit = reference ? 6.0 * std::sqrt(variance) : start_limit;
-    outlier[i] = !(model.residual(series.azimuth[i], series.zenith[i]).norm() < limit);
+    outlier[i] = !(residual_of(series, i, train, angle).norm() < limit);
   }
   return outlier;
 }
@@ -181,26 +189,12 @@ class Combination {
   Eigen::VectorXd pull_;          ///< y
 };
 
-/// Observed minus modelled of a shot, rad; NaN when the beam does not get through.
-Eigen::Vector2d residual_at(ResidualModel& model, const AngleSeries& series, std::size_t shot,
-                            const Eigen::VectorXd& mean, Eigen::Index statics) {
-  std::array<double, kMaxPrisms> angle{};
-  const auto prisms = static_cast<std::size_t>((mean.size() - statics) / 2);
-  for (std::size_t k = 0; k < prisms; ++k) {
-    angle[k] = mean[statics + 2 * static_cast<Eigen::Index>(k)];
-  }
-  model.set(mean.head(statics));
-  model.linearise({angle.data(), prisms}, series.beam[shot]);
-  return model.residual(series.azimuth[shot], series.zenith[shot]);
-}
-
 /// One forward and one backward filter and their combination.
 Solution run_pass(const AngleSeries& series, const FilterState& first, const PrismTrain& train,
                   const EkfOptions& options, const std::vector<RotorProcess>& process,
                   const FilterReference* reference, std::vector<unsigned char> screened,
                   const Progress& progress) {
   const Filter filter(series, train, options, process, reference);
-  ResidualModel model(train, options.free);
   const std::size_t shots = series.size();
   const Eigen::Index statics = filter.statics();
   const Eigen::Index prisms = filter.prisms();
@@ -256,6 +250,7 @@ Solution run_pass(const AngleSeries& series, const FilterState& first, const Pri
   Eigen::VectorXd mean_parameters = Eigen::VectorXd::Zero(statics);
   Eigen::MatrixXd mean_covariance = Eigen::MatrixXd::Zero(statics, statics);
   Combination both(filter.size());
+  std::vector<double> angle(static_cast<std::size_t>(prisms));
   const auto size = static_cast<std::size_t>(filter.size()), kept = size * (1 + size);
   std::vector<double> filtered(kept * std::min(kBlock, shots)), predicted(filtered.size());
   for (std::size_t block = before_block.size(); block-- > 0;) {
@@ -276,7 +271,11 @@ Solution run_pass(const AngleSeries& series, const FilterState& first, const Pri
       mean_parameters += both.mean.head(statics);
       mean_covariance += both.covariance.topLeftCorner(statics, statics);
       take_motion(both.mean, both.covariance, statics, motion, i);
-      const Eigen::Vector2d residual = residual_at(model, series, i, both.mean, statics);
+      for (Eigen::Index k = 0; k < prisms; ++k) {
+        angle[static_cast<std::size_t>(k)] = both.mean[statics + 2 * k];
+      }
+      const Eigen::Vector2d residual = residual_of(
+          series, i, with_free_values(train, options.free, both.mean.head(statics)), angle);
       result.azimuth_residual[i] = residual[0];
       result.zenith_residual[i] = residual[1];
     }

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/optics/parameters.hpp"
 
@@ -23,12 +24,8 @@ FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor) {
 }
 
 Eigen::Matrix3d turned_further(const Eigen::Matrix3d& rotation, const Eigen::Vector2d& step) {
-  const Eigen::Vector3d small(0.0, step[1], step[0]);
-  const double angle = small.norm();
-  if (!(angle > 0)) return rotation;
-  const Eigen::Matrix3d moved =
-      rotation * Eigen::AngleAxisd(angle, small / angle).toRotationMatrix();
-  return recording_from_sensor(turn_of(moved));
+  if (step.isZero(0)) return rotation;
+  return recording_from_sensor(turn_of(rotation * algebra::rotation_by({0, step[1], step[0]})));
 }
 
 void turn(AngleSeries& series, const Eigen::Matrix3d& rotation) {

@@ -66,10 +66,6 @@ std::array<double, 3> RotorTrajectory::speed_variance_terms(std::size_t knot,
           covariance_entry(knot, speed + 1, speed + 1)};
 }
 
-double RotorTrajectory::speed_variance(std::size_t knot, std::size_t rotor, double seconds) const {
-  return polynomial_at(speed_variance_terms(knot, rotor), seconds);
-}
-
 RotorTrajectory make_knots(const PackedSeries& series, std::span<const ShotRange> ranges,
                            int prisms, double interval) {
   require_between("number of prisms", prisms, 1, kMaxPrisms);

@@ -158,7 +158,6 @@ bool RunningEstimate::Work::add(const recordings::Observations& rows, const Prog
     last_ns_ = time_ns;
     ++state_.shots;
     if (!ticks_.take(time_ns, rows.beam[i])) continue;
-    ++state_.used_shots;
     series_.append(time_ns, rows.azimuth[i], rows.zenith[i], rows.beam[i],
                    variance(rows.azimuth_resolution[i]), variance(rows.zenith_resolution[i]));
     series_.range.push_back(rows.range[i]);

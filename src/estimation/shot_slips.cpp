@@ -545,9 +545,7 @@ bool find_firing_order(const NumberedShots& shots, ShotRange range, const PrismT
   std::vector<double> median;
   for (std::vector<double>& of_phase : steps) {
     if (of_phase.size() < 5) return false;
-    const auto middle = of_phase.begin() + static_cast<std::ptrdiff_t>(of_phase.size() / 2);
-    std::nth_element(of_phase.begin(), middle, of_phase.end());
-    median.push_back(*middle);
+    median.push_back(upper_median(of_phase));
   }
   double mean = 0;
   for (const double one : median) mean += one / static_cast<double>(emitters);

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 
 namespace risley::identification {
@@ -38,9 +39,7 @@ ShotGrid shot_grid(const estimation::AngleSeries& series, estimation::ShotRange 
   }
   std::vector<double> steps;
   for (std::size_t i = 1; i < stamp.size(); ++i) steps.push_back(stamp[i] - stamp[i - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  grid.step = *middle;
+  grid.step = upper_median(steps);
   if (!(grid.step > 0)) {
     throw EstimationError(
         "more than half of the shots have the same time as the shot before: give their rate "

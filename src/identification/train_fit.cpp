@@ -12,6 +12,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/observation_adjoint.hpp"
 #include "risley/optics/observation_model.hpp"
@@ -604,14 +605,9 @@ double outlier_limit(const TrainFit& fit) {
   for (std::size_t i = 0; i < fit.azimuth_residual.size(); ++i) {
     size.push_back(std::max(std::abs(fit.azimuth_residual[i]), std::abs(fit.zenith_residual[i])));
   }
-  const auto quantile = [&](double share) {
-    const auto at =
-        size.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(size.size() - 1));
-    std::nth_element(size.begin(), at, size.end());
-    return *at;
-  };
   // Of the larger of two normal values the median is 1.05 and this quantile 2.24 sigmas.
-  return std::max(kOutlierSigmas / 1.05 * quantile(0.5), kOutlierSigmas / 2.24 * quantile(0.95));
+  return std::max(kOutlierSigmas / 1.05 * quantile(size, 0.5),
+                  kOutlierSigmas / 2.24 * quantile(size, 0.95));
 }
 
 double mean_square(const TrainFit& fit, double limit) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "io/read_bytes.hpp"
+#include "risley/io/read_bytes.hpp"
 
 #include <cerrno>
 #include <cstring>

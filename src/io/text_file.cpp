@@ -10,8 +10,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/output_file.hpp"
-
-#include "io/read_bytes.hpp"
+#include "risley/io/read_bytes.hpp"
 
 namespace risley::io {
 

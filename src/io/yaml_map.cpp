@@ -223,6 +223,55 @@ long double YamlMap::number(std::string_view key, long double lower, long double
   return value;
 }
 
+double YamlMap::real(std::string_view key, long double lower, long double upper,
+                     std::string_view unit, std::optional<double> absent) const {
+  if (absent && find(key) == nullptr) return *absent;
+  return static_cast<double>(number(key, lower, upper, unit));
+}
+
+std::vector<double> YamlMap::reals(std::string_view key, std::size_t count, long double lower,
+                                   long double upper, std::string_view unit) const {
+  const Entry& entry = at(key);
+  const std::vector<YamlNode>& items = entry.value.items;
+  if (!entry.value.is_list() || (count == 0 ? items.empty() : items.size() != count)) {
+    const std::string numbers = count == 0 ? "" : fmt::format(" of {} numbers", count);
+    fail_at(path_, entry.line,
+            fmt::format("{}: expected a list{} in {}", field(key), numbers, unit));
+  }
+  std::vector<double> values;
+  for (const YamlNode& item : items) {
+    const std::string name = fmt::format("{}[{}]", field(key), values.size());
+    values.push_back(static_cast<double>(yaml_number(item, path_, name)));
+    if (values.back() < lower || values.back() > upper) {
+      fail_at(path_, entry.line,
+              fmt::format("{} = {:g} {}, allowed {:g} to {:g}", name, values.back(), unit, lower,
+                          upper));
+    }
+  }
+  return values;
+}
+
+std::string YamlMap::words(std::string_view key) const {
+  std::string text = this->text(key);
+  if (text.empty()) fail_at(path_, at(key).line, field(key) + " is empty");
+  return text;
+}
+
+YamlMap YamlMap::section(std::string_view key) const { return {at(key).value, path_, field(key)}; }
+
+std::vector<YamlMap> YamlMap::maps(std::string_view key) const {
+  std::vector<YamlMap> list;
+  const Entry* entry = find(key);
+  if (entry == nullptr) return list;
+  if (!entry->value.is_list()) {
+    fail_at(path_, entry->line, fmt::format("{}: expected a list", field(key)));
+  }
+  for (const YamlNode& item : entry->value.items) {
+    list.emplace_back(item, path_, fmt::format("{}[{}]", field(key), list.size()));
+  }
+  return list;
+}
+
 int YamlMap::integer(std::string_view key, int lower, int upper) const {
   const Entry& entry = at(key);
   const long double value = yaml_number(entry.value, path_, field(key));

@@ -11,8 +11,8 @@
 #include <nlohmann/json.hpp>
 
 #include "risley/core/error.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/io/json_text.hpp"
-#include "risley/io/sha256.hpp"
 #include "risley/io/text_file.hpp"
 
 namespace risley::jobs {
@@ -86,7 +86,7 @@ void save_chunk(const std::string& path, const ChunkHead& head,
                               {"first", head.first},
                               {"cells", head.cells}});
   for (const CellOutcome& outcome : outcomes) text += line_of(to_json(outcome));
-  text += line_of({{"sha256", io::sha256(text)}});
+  text += line_of({{"sha256", hashes::sha256(text)}});
   io::write_text_file(path, text);
 }
 
@@ -129,7 +129,7 @@ ChunkHead read_chunk(const std::string& path, const Progress& progress,
       if (call) call(head, std::move(outcome));
     }
     const std::size_t whole = begin;
-    if (next().at("sha256") != io::sha256(std::string_view(text).substr(0, whole))) {
+    if (next().at("sha256") != hashes::sha256(std::string_view(text).substr(0, whole))) {
       fail("the SHA-256 is not that of the lines above: the file was changed");
     }
     if (begin != text.size()) fail("there is more after the end");

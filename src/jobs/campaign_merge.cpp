@@ -12,10 +12,11 @@
 #include <unsupported/Eigen/SpecialFunctions>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/chi_square.hpp"
 #include "risley/core/error.hpp"
-#include "risley/io/table_file.hpp"
 #include "risley/jobs/campaign.hpp"
 #include "risley/optics/parameters.hpp"
+#include "risley/tables/table_file.hpp"
 
 #include "jobs/campaign_chunk.hpp"
 
@@ -43,17 +44,10 @@ double chi2_per_degree(double degrees, double exceeded) {
   return high;
 }
 
-/// The same where the degrees are many, by Wilson and Hilferty (1931): to 1e-6 from a thousand on,
-/// where the series of the exact one grows long.
-double chi2_per_many_degrees(double degrees, double normal_quantile) {
-  const double ninth = 2.0 / (9.0 * degrees);
-  return std::pow(1.0 - ninth + normal_quantile * std::sqrt(ninth), 3);
-}
-
 BandedFigure mean_square(double value, double degrees) {
-  if (degrees > 1000) {
-    return {value, chi2_per_many_degrees(degrees, -kTwoSided95),
-            chi2_per_many_degrees(degrees, kTwoSided95)};
+  if (degrees > 1000) {  // where the series of the exact one grows long
+    return {value, chi_square_per_degree(degrees, -kTwoSided95),
+            chi_square_per_degree(degrees, kTwoSided95)};
   }
   return {value, chi2_per_degree(degrees, 0.975), chi2_per_degree(degrees, 0.025)};
 }
@@ -183,9 +177,9 @@ class CellTable {
     for (const CellErrors& one : outcome.errors) errors_.note(one.name);
   }
 
-  std::vector<io::TableColumn> columns() const {
-    using io::CellKind;
-    std::vector<io::TableColumn> columns = {
+  std::vector<tables::TableColumn> columns() const {
+    using tables::CellKind;
+    std::vector<tables::TableColumn> columns = {
         {"cell", CellKind::integer, "1", "number of the cell, from 0"},
         {"setting", CellKind::integer, "1", "number of the setting, from 0"},
         {"seed", CellKind::integer, "1", "seed of the simulation"}};
@@ -221,10 +215,10 @@ class CellTable {
     return columns;
   }
 
-  std::vector<io::TableCell> row(const CellOutcome& outcome) const {
+  std::vector<tables::TableCell> row(const CellOutcome& outcome) const {
     const CampaignSetting& setting = plan_.settings.at(outcome.cell.setting);
-    std::vector<io::TableCell> row = {integer(outcome.cell.number), integer(outcome.cell.setting),
-                                      integer(outcome.cell.seed)};
+    std::vector<tables::TableCell> row = {
+        integer(outcome.cell.number), integer(outcome.cell.setting), integer(outcome.cell.seed)};
     for (const auto& [name, value] : setting.grid) row.emplace_back(value);
     row.emplace_back(integer(outcome.answered ? 1 : 0));
     row.emplace_back(outcome.verdict);
@@ -239,7 +233,7 @@ class CellTable {
       }
     }
     row.emplace_back(outcome.nees);
-    row.push_back(outcome.answered ? integer(outcome.degrees_of_freedom) : io::TableCell());
+    row.push_back(outcome.answered ? integer(outcome.degrees_of_freedom) : tables::TableCell());
     row.emplace_back(outcome.nees_rotation_angles);
     const std::size_t errors = row.size();
     row.resize(errors + 2 * errors_.all().size());
@@ -252,7 +246,7 @@ class CellTable {
   }
 
  private:
-  static io::TableCell integer(std::uint64_t value) { return static_cast<std::int64_t>(value); }
+  static tables::TableCell integer(std::uint64_t value) { return static_cast<std::int64_t>(value); }
 
   const CampaignPlan& plan_;
   Names grid_, parameters_, errors_;
@@ -332,7 +326,7 @@ std::string name_with_unit(const std::string& errors) {
 
 CampaignResult merge_chunks(const CampaignPlan& plan, const std::string& table,
                             const CampaignOptions& options, const Progress& progress) {
-  io::TableFile::check_name(table);
+  tables::TableFile::check_name(table);
   CampaignResult result;
   result.table = table;
   result.cells = plan.cells();
@@ -340,10 +334,10 @@ CampaignResult merge_chunks(const CampaignPlan& plan, const std::string& table,
   const std::vector<SoundChunk> chunks =
       find_chunks(plan, options, cells, result, progress.part(0, 0.5));
   std::vector<SettingSums> sums(plan.settings.begin(), plan.settings.end());
-  io::TableFile file(table, cells.columns(),
-                     {{"title", "cells of a Monte Carlo campaign"},
-                      {"plan_sha256", plan.work},
-                      {"source", options.program}});
+  tables::TableFile file(table, cells.columns(),
+                         {{"title", "cells of a Monte Carlo campaign"},
+                          {"plan_sha256", plan.work},
+                          {"source", options.program}});
   std::uint64_t next = 0;
   const auto pass_to = [&](std::uint64_t number) {
     if (next < number && result.missing.size() < kMostRanges) {

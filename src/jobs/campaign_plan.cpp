@@ -19,7 +19,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
 #include "risley/estimation/free_parameters.hpp"
-#include "risley/io/sha256.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
 #include "risley/jobs/simulation_settings.hpp"
@@ -434,9 +434,9 @@ CampaignPlan parse_campaign_plan(const std::string& text, const std::string& pat
   }
   for (const auto& [name, file] : reader.files()) {
     plan.files.push_back(file);
-    work.push_back(fmt::format("{} {}", name, io::sha256_of_file(file)));
+    work.push_back(fmt::format("{} {}", name, hashes::sha256_of_file(file)));
   }
-  plan.work = io::sha256(fmt::format("{}", fmt::join(work, "\n")));
+  plan.work = hashes::sha256(fmt::format("{}", fmt::join(work, "\n")));
   return plan;
 }
 

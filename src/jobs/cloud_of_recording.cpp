@@ -11,7 +11,7 @@
 
 #include "risley/cloud/map_projection.hpp"
 #include "risley/core/error.hpp"
-#include "risley/io/sha256.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/provenance.hpp"
 #include "risley/jobs/recording_input.hpp"
@@ -82,7 +82,7 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
     provenance.emplace_back("calibration", options.calibration);
     const std::string file = calibration_in(options.calibration).value_or(options.calibration);
     if (std::filesystem::is_regular_file(file)) {
-      provenance.emplace_back("calibration_sha256", io::sha256_of_file(file));
+      provenance.emplace_back("calibration_sha256", hashes::sha256_of_file(file));
     }
     return provenance;
   };

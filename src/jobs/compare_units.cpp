@@ -16,9 +16,9 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/io/table_input.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/parallel/parallel.hpp"
+#include "risley/tables/table_input.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -37,7 +37,7 @@ struct LoadedResults {
   }
 };
 
-std::string text_of(const io::TableCell& cell) {
+std::string text_of(const tables::TableCell& cell) {
   const auto* text = std::get_if<std::string>(&cell);
   return text == nullptr ? std::string() : *text;
 }
@@ -64,7 +64,7 @@ bool is_below_folder_of(const std::string& table, const std::string& path) {
 
 /// Follows one row to its result. @return why there is none, or nothing
 std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
-                                const std::vector<io::TableCell>& cells, bool anywhere,
+                                const std::vector<tables::TableCell>& cells, bool anywhere,
                                 LoadedResults& loaded) {
   const std::string input = text_of(cells[0]), output = text_of(cells[1]);
   const std::string name = input.empty() ? fmt::format("{} row {}", table, row) : input;
@@ -104,11 +104,11 @@ std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
 
 void load_table(const std::string& table, bool anywhere, LoadedResults& loaded,
                 std::vector<LeftOut>& left_out, const Progress& progress) {
-  const std::vector<io::TableColumn> columns = {
-      {"input"}, {"output"}, {"exit_status", io::CellKind::integer}, {"message"}};
+  const std::vector<tables::TableColumn> columns = {
+      {"input"}, {"output"}, {"exit_status", tables::CellKind::integer}, {"message"}};
   const std::size_t left_out_before = left_out.size();
   std::size_t row = 0;
-  for (const auto& cells : io::read_table(table, columns, progress)) {
+  for (const auto& cells : tables::read_table(table, columns, progress)) {
     progress.check();
     if (std::optional<LeftOut> none = load_row(table, ++row, cells, anywhere, loaded)) {
       left_out.push_back(*std::move(none));
@@ -132,7 +132,7 @@ LoadedResults load(const CompareUnitsOptions& options, std::vector<LeftOut>& lef
   for (const std::string& path : options.results) {
     progress.check();
     std::error_code ignored;
-    if (!fs::is_directory(path, ignored) && io::is_table(path)) {
+    if (!fs::is_directory(path, ignored) && tables::is_table(path)) {
       loaded.any_table = true;
       load_table(path, options.anywhere, loaded, left_out, progress);
     } else {

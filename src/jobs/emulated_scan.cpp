@@ -47,9 +47,8 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   const std::optional<ShotGrid> grid = grid_of(type);
   if (!grid) {
     throw InvalidArgument(fmt::format(
-        "option sensor = {}: the device type {} is none that can be emulated, allowed 1 (Mid-40), "
-        "2 (Tele-15), 3 (Horizon), 6 (Mid-70), 7 (Avia)",
-        options.sensor, type));
+        "option sensor = {}: the device type {} is none that can be emulated, allowed {}",
+        options.sensor, type, recordings::livox_types_text()));
   }
   settings.rate = 1e9 * grid->interval_denominator / grid->interval_numerator_ns;
   if (!settings.scene) settings.scene = scenes::parse_scene(kRoom, "the built-in room");

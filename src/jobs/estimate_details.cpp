@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/median.hpp"
 #include "risley/estimation/observability.hpp"
 
 namespace risley::jobs {
@@ -42,9 +43,7 @@ RotorSpeed rotor_speed(const estimation::RotorStates& states, std::size_t rotor)
 ResidualPlane plane_of(ResidualMap map) {
   ResidualPlane result;
   std::vector<std::uint64_t> counts = map.count;
-  const auto middle = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
-  std::nth_element(counts.begin(), middle, counts.end());
-  const double typical = counts.empty() ? 1.0 : static_cast<double>(*middle);
+  const double typical = counts.empty() ? 1.0 : static_cast<double>(upper_median(counts));
   // A rim cell that few beams graze would decide the colours of all others.
   result.fewest_shots = std::max(kFewestShotsInCell, std::ceil(kFewestOfTypical * typical));
   result.azimuth_noise = map.sigma_azimuth / std::sqrt(typical);

@@ -16,8 +16,8 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/io/file_identity.hpp"
-#include "risley/io/sha256.hpp"
 #include "risley/io/text_table.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -306,7 +306,7 @@ std::vector<std::pair<std::string, std::string>> input_hashes(const std::string&
                                                               const Progress& progress) {
   std::vector<std::pair<std::string, std::string>> hashes;
   for (const std::string& file : recordings::recording_files(path)) {
-    hashes.emplace_back(file, io::sha256_of_file(file, progress));
+    hashes.emplace_back(file, hashes::sha256_of_file(file, progress));
   }
   return hashes;
 }

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/require.hpp"
-#include "risley/io/sha256.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/parallel/parallel.hpp"
 
 namespace risley::jobs {
@@ -51,7 +51,8 @@ InputHashes::InputHashes(const std::vector<recordings::Source>& inputs, const Pr
     Input& input = *inputs_.emplace_back(new Input{source});
     input.task.run([&input, own = progress.silent()] {
       for (const std::string& file : recordings::recording_files(input.source)) {
-        input.hashes.emplace_back(file, is_read_once(file) ? "" : io::sha256_of_file(file, own));
+        input.hashes.emplace_back(file,
+                                  is_read_once(file) ? "" : hashes::sha256_of_file(file, own));
       }
     });
   }

@@ -45,9 +45,8 @@ RecordedScan::RecordedScan(std::string path, std::uint8_t sensor_type) : path_(s
   const auto grid = recordings::livox::shot_grid(device_.type, kTagged);
   if (!grid) {
     refuse(
-        fmt::format("its device type {} is none that can be emulated, allowed 1 (Mid-40), 2 "
-                    "(Tele-15), 3 (Horizon), 6 (Mid-70), 7 (Avia); name the sensor",
-                    device_.type));
+        fmt::format("its device type {} is none that can be emulated, allowed {}; name the sensor",
+                    device_.type, recordings::livox_types_text()));
   }
   grid_ = *grid;
   if (!find_row()) throw FileError(path_, {}, "holds no shots that could be sent");

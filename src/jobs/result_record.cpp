@@ -10,9 +10,9 @@
 #include <nlohmann/json.hpp>
 
 #include "risley/core/error.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/io/folder.hpp"
 #include "risley/io/json_text.hpp"
-#include "risley/io/sha256.hpp"
 #include "risley/io/text_file.hpp"
 
 namespace risley::jobs {
@@ -26,7 +26,7 @@ constexpr int kRecordVersion = 2;
 constexpr const char* kSeal = "sha256";  // of all the rest: a record that was edited is none
 
 std::string seal_of(const RecordJson& json) {
-  return io::sha256(json.dump(-1, ' ', false, RecordJson::error_handler_t::replace));
+  return hashes::sha256(json.dump(-1, ' ', false, RecordJson::error_handler_t::replace));
 }
 
 }  // namespace
@@ -78,7 +78,7 @@ bool is_whole(const ResultRecord& record, const std::string& work,
   if (record.work != work || record.inputs != inputs) return false;
   try {
     return std::all_of(record.outputs.begin(), record.outputs.end(), [&](const auto& output) {
-      return io::sha256_of_file(output.first, progress) == output.second;
+      return hashes::sha256_of_file(output.first, progress) == output.second;
     });
   } catch (const FileError&) {  // one is gone
     return false;
@@ -91,7 +91,7 @@ std::vector<std::pair<std::string, std::string>> hashes_of(const std::vector<std
   for (const std::string& file : files) {
     std::error_code ignored;
     if (fs::is_regular_file(file, ignored)) {
-      hashes.emplace_back(file, io::sha256_of_file(file, progress));
+      hashes.emplace_back(file, hashes::sha256_of_file(file, progress));
     }
   }
   return hashes;

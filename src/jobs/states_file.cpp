@@ -10,9 +10,9 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/io/netcdf.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/optics/parameters.hpp"
+#include "risley/tables/netcdf.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -21,9 +21,9 @@ constexpr std::size_t kBlockRows = 16384;
 
 /// A variable of one value per entry, in compressed blocks.
 template <class T>
-io::NetcdfVariable define(io::NetcdfOutput& file, const io::NetcdfDimension& along,
-                          const std::string& name, const std::string& units,
-                          const std::string& long_name) {
+tables::NetcdfVariable define(tables::NetcdfOutput& file, const tables::NetcdfDimension& along,
+                              const std::string& name, const std::string& units,
+                              const std::string& long_name) {
   auto variable = file.define<T>(name, {&along}, {std::min(along.length, kBlockRows), true, false});
   if (!units.empty()) file.put_text(variable, "units", units);
   file.put_text(variable, "long_name", long_name);
@@ -85,7 +85,7 @@ void write_states(const std::string& path, const StatesContent& content,
 
 void write_states(const io::OutputFile& output, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes) {
-  io::NetcdfOutput file(output);
+  tables::NetcdfOutput file(output);
   file.put_text("Conventions", "CF-1.9");
   file.put_text("title", "Estimated rotor states of a Risley-prism lidar");
   for (const auto& [name, value] : attributes) file.put_text(name, value);
@@ -98,7 +98,7 @@ void write_states(const io::OutputFile& output, const StatesContent& content,
       define<std::int64_t>(file, shots, "time_ns", "ns", "the same without rounding");
   estimation::RotorStates block;
   block.resize(content.prisms, 0);
-  std::vector<io::NetcdfVariable> variables;
+  std::vector<tables::NetcdfVariable> variables;
   for (const StateColumn& column : columns_of(block)) {
     variables.push_back(define<double>(file, shots, column.name, column.units, column.long_name));
   }
@@ -108,12 +108,12 @@ void write_states(const io::OutputFile& output, const StatesContent& content,
   file.put_text(outlier, "flag_meanings", "used left_out");
 
   struct Profile {
-    io::NetcdfVariable count, azimuth, zenith;
+    tables::NetcdfVariable count, azimuth, zenith;
   };
   std::vector<Profile> profiles;
   const auto& residuals = content.residuals_over_angle;
   const std::size_t bins = residuals.empty() ? 0 : residuals.front().count.size();
-  io::NetcdfVariable middle;
+  tables::NetcdfVariable middle;
   if (bins > 0) {
     const auto angles = file.define_dimension("prism_angle", bins);
     middle = define<double>(file, angles, "prism_angle", "degree",
@@ -156,7 +156,7 @@ void write_states(const io::OutputFile& output, const StatesContent& content,
     file.put(outlier, first, block.outlier);
   }
   values.resize(bins);
-  const auto put = [&](const io::NetcdfVariable& variable, const auto& value_of) {
+  const auto put = [&](const tables::NetcdfVariable& variable, const auto& value_of) {
     for (std::size_t i = 0; i < bins; ++i) values[i] = value_of(i);
     file.put(variable, 0, values);
   };

@@ -12,8 +12,8 @@
 namespace risley::json {
 namespace {
 
-using io::CellKind;
-using io::TableCell;
+using tables::CellKind;
+using tables::TableCell;
 
 constexpr int kMostPrisms = 4;
 
@@ -207,8 +207,8 @@ void ResultColumns::note(const Json& result) {
   note_parameters(result);
 }
 
-std::vector<io::TableColumn> ResultColumns::columns() const {
-  std::vector<io::TableColumn> shown;
+std::vector<tables::TableColumn> ResultColumns::columns() const {
+  std::vector<tables::TableColumn> shown;
   for (const std::vector<Column>* columns : {&before_, &parameters_, &after_}) {
     for (const Column& column : *columns) {
       if (column.used) shown.push_back(column.shown);

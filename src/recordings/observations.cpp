@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/observations.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <string_view>
 
 #include <fmt/format.h>
 
@@ -135,23 +135,24 @@ void Chunk::clear() {
   packet_begins.clear();
 }
 
+const LivoxType* livox_type(std::uint8_t number) {
+  const auto* const found =
+      std::find_if(kLivoxTypes.begin(), kLivoxTypes.end(),
+                   [number](const LivoxType& type) { return type.number == number; });
+  return found == kLivoxTypes.end() ? nullptr : found;
+}
+
+std::string livox_types_text() {
+  std::string text;
+  for (const LivoxType& type : kLivoxTypes)
+    text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", type.number, type.name);
+  return text;
+}
+
 std::string device_type_name(std::uint8_t type) {
-  switch (type) {
-    case 0:
-      return "Livox Hub";
-    case kMid40:
-      return "Livox Mid-40";
-    case kTele15:
-      return "Livox Tele-15";
-    case kHorizon:
-      return "Livox Horizon";
-    case kMid70:
-      return "Livox Mid-70";
-    case kAvia:
-      return "Livox Avia";
-    default:
-      return "unknown";
-  }
+  if (type == 0) return "Livox Hub";
+  const LivoxType* known = livox_type(type);
+  return known != nullptr ? fmt::format("Livox {}", known->name) : "unknown";
 }
 
 std::string to_string(TimeReference reference) {

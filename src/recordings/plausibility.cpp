@@ -13,6 +13,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 
 #include "recordings/reader_decorators.hpp"
@@ -26,13 +27,6 @@ constexpr double kNarrowest = radians_from_degrees(1.0), kNarrowestFar = radians
 /// Ranges of so many shots may be anything.
 constexpr double kFewFar = 0.01;
 constexpr std::size_t kFewestRanges = 20;
-
-/// The value below which this share of others lies.
-double quantile(std::vector<double>& values, double share) {
-  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + place, values.end());
-  return values[static_cast<std::size_t>(place)];
-}
 
 std::vector<double> finite(std::span<const double> values) {
   std::vector<double> result;

@@ -6,6 +6,7 @@
 #include <array>
 #include <limits>
 
+#include "risley/core/median.hpp"
 #include "risley/core/saturating.hpp"
 
 namespace risley::recordings {
@@ -40,11 +41,9 @@ bool is_gap(std::int64_t step_ns, std::int64_t nominal_ns) {
 
 /// Counts what rows hold, whatever their order.
 void count_columns(const Observations& o, TimeAuditResult& totals) {
-  std::array<std::uint64_t, 256> tags{};
   Extremes azimuth, zenith, range;
   for (std::size_t row = 0; row < o.size(); ++row) {
     ++totals.rows_by_return_number[o.return_number[row]];
-    ++tags[o.tag[row]];
     if (o.valid[row] == 0) {
       ++totals.no_return;
       continue;
@@ -56,12 +55,6 @@ void count_columns(const Observations& o, TimeAuditResult& totals) {
   azimuth.include_in(totals.azimuth);
   zenith.include_in(totals.zenith);
   range.include_in(totals.range);
-  for (unsigned tag = 0; tag < tags.size(); ++tag) {
-    totals.tags.position[tag & 3U] += tags[tag];
-    totals.tags.intensity[tag >> 2U & 3U] += tags[tag];
-    totals.tags.echo[tag >> 4U & 3U] += tags[tag];
-    totals.tags.reserved[tag >> 6U] += tags[tag];
-  }
 }
 
 }  // namespace
@@ -162,9 +155,7 @@ void TimeAudit::settle(DeviceState& state) {
     if (step.step_ns > 0) lengths.push_back(step.step_ns);
   }
   if (lengths.empty()) return;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  state.nominal_ns = *middle;
+  state.nominal_ns = upper_median(lengths);
   for (const TimeStep& step : steps) add_step(state, step);
 }
 

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/median.hpp"
 #include "risley/core/saturating.hpp"
 
 #include "recordings/time_order.hpp"
@@ -128,9 +129,7 @@ void TimeGrid::try_kinds(const Shots& shots) {
     const std::int64_t step = shots.time_ns[i] - shots.time_ns[i - 1];
     if (step > 0) steps.push_back(step);
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  const auto usual = static_cast<double>(*middle);
+  const auto usual = static_cast<double>(upper_median(steps));
   const auto mean = static_cast<double>(shots.time_ns[end - 1] - shots.time_ns[begin]) /
                     static_cast<double>(end - begin - 1);
   const auto is_it = [&](Kind kind, double step_ns) {

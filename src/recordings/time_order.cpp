@@ -7,6 +7,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "risley/core/median.hpp"
 #include "risley/core/saturating.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -47,9 +48,7 @@ class Judge {
       latest = std::max(latest, time(i));
     }
     if (steps.empty()) return;
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    usual_step_ = static_cast<double>(*middle);
+    usual_step_ = static_cast<double>(upper_median(steps));
   }
 
   OrderJudgement judgement(bool in_packets) const {

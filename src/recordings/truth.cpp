@@ -10,7 +10,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/io/netcdf.hpp"
+#include "risley/tables/netcdf.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -129,10 +129,10 @@ class TruthWriter::File {
   void close() { file_.close(); }
 
  private:
-  io::NetcdfOutput file_;
+  tables::NetcdfOutput file_;
   std::vector<Variable> variables_;
   int prisms_;
-  std::vector<io::NetcdfVariable> columns_;
+  std::vector<tables::NetcdfVariable> columns_;
   std::vector<double> buffer_;
   std::size_t written_ = 0;
 };
@@ -183,8 +183,8 @@ class TruthFile {
   }
 
  private:
-  io::NetcdfInput file_;
-  io::NetcdfDimension shot_;
+  tables::NetcdfInput file_;
+  tables::NetcdfDimension shot_;
   int prisms_ = 0;
   std::vector<double> block_;
 };

@@ -15,7 +15,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/estimation/diagnostics.hpp"
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 #include "risley/report/html.hpp"
 
 namespace risley::report {

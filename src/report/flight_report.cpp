@@ -14,7 +14,7 @@
 #include "risley/calibration/trajectory_knots.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 #include "risley/report/html.hpp"
 #include "risley/trajectories/error_process.hpp"
 

@@ -11,7 +11,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/text.hpp"
-#include "risley/io/sha256.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/report/html.hpp"
 
 #include "report/page_assets.hpp"
@@ -71,12 +71,12 @@ constexpr std::string_view kSizesScript = R"js(
 std::string policy(std::string_view style, const std::vector<std::string_view>& scripts) {
   std::string text = "default-src 'none'; script-src";
   for (const std::string_view script : scripts) {
-    text += fmt::format(" 'sha256-{}'", io::sha256_base64(script));
+    text += fmt::format(" 'sha256-{}'", hashes::sha256_base64(script));
   }
   return text + fmt::format(
                     "; style-src-elem 'sha256-{}'; style-src-attr 'unsafe-inline'; "
                     "img-src data: blob:; base-uri 'none'; form-action 'none'",
-                    io::sha256_base64(style));
+                    hashes::sha256_base64(style));
 }
 
 }  // namespace

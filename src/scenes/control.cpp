@@ -33,9 +33,9 @@ KnownGround read_known_ground(const YamlMap& map, Names& earlier) {
   ground.name = new_name(map, earlier);
   const auto [x, y, z] = numbers<3>(map, "place_m", -kFarthestPlace, kFarthestPlace);
   ground.place = {x, y, z};
-  ground.sigma = number(map, "sigma_m", kSmallestSigma, kLargestSigma, "m");
+  ground.sigma = map.real("sigma_m", kSmallestSigma, kLargestSigma, "m");
   if (map.find("radius_m") != nullptr) {
-    ground.radius = number(map, "radius_m", kSmallestRadius, kLargestRadius, "m");
+    ground.radius = map.real("radius_m", kSmallestRadius, kLargestRadius, "m");
   }
   bool leans = false;
   for (const char* key : {"normal_azimuth_deg", "normal_zenith_deg", "normal_sigma_deg"}) {
@@ -81,9 +81,8 @@ Control parse_control(const std::string& text, const std::string& path) {
   }
   root.at("ground");
   Names names;
-  for_each_map(root, "ground", [&](const YamlMap& map) {
+  for (const YamlMap& map : root.maps("ground"))
     control.ground.push_back(read_known_ground(map, names));
-  });
   if (control.ground.empty()) {
     io::fail_at(path, root.at("ground").line, "ground: the list is empty");
   }

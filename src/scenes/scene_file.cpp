@@ -24,8 +24,7 @@ using io::fail_at;
 using io::YamlMap;
 
 double reflectivity(const YamlMap& map) {
-  return map.find("reflectivity") == nullptr ? kMattReflectivity
-                                             : number(map, "reflectivity", 1e-3L, 1, "");
+  return map.real("reflectivity", 1e-3L, 1, "", kMattReflectivity);
 }
 
 Vector3<double> place(const YamlMap& map, std::string_view key) {
@@ -36,8 +35,8 @@ Vector3<double> place(const YamlMap& map, std::string_view key) {
 /// @param own_seed  for waves that state none
 WallWaves read_waves(const YamlMap& map, std::uint64_t own_seed) {
   map.allow_only({"peak_to_valley_m", "half_wave_m", "seed"});
-  return {number(map, "peak_to_valley_m", 0, 1, "m"),
-          number(map, "half_wave_m", 0.05L, kFarthestHit, "m"),
+  return {map.real("peak_to_valley_m", 0, 1, "m"),
+          map.real("half_wave_m", 0.05L, kFarthestHit, "m"),
           map.find("seed") == nullptr
               ? own_seed
               : static_cast<std::uint64_t>(map.integer("seed", 0, 2'147'483'647))};
@@ -49,7 +48,7 @@ Patch read_patch(const YamlMap& map, const ScenePlane& plane) {
   if (map.find("name") != nullptr) patch.name = map.text("name");
   patch.center = numbers<2>(map, "center_m", -kFarthestHit, kFarthestHit);
   patch.size = numbers<2>(map, "size_m", 1e-3L, kFarthestHit);
-  if (map.find("depth_m") != nullptr) patch.depth = number(map, "depth_m", -100, 100, "m");
+  patch.depth = map.real("depth_m", -100, 100, "m", patch.depth);
   if (map.find("reflectivity") != nullptr) patch.reflectivity = reflectivity(map);
   patch.glass = map.yes("glass");
   for (std::size_t i = 0; plane.extent && i < 2; ++i) {
@@ -72,12 +71,10 @@ void read_surface(const YamlMap& map, std::size_t number_of_plane, ScenePlane& p
   std::vector<WallWaves> waves;
   if (const auto* entry = map.find("waves")) {
     if (entry->value.is_list()) {
-      for_each_map(map, "waves", [&](const YamlMap& each) {
+      for (const YamlMap& each : map.maps("waves"))
         waves.push_back(read_waves(each, number_of_plane + 1000 * waves.size()));
-      });
     } else {
-      waves.push_back(
-          read_waves(YamlMap(entry->value, map.path(), map.field("waves")), number_of_plane));
+      waves.push_back(read_waves(map.section("waves"), number_of_plane));
     }
   }
   double bow = 0.0;
@@ -86,11 +83,10 @@ void read_surface(const YamlMap& map, std::size_t number_of_plane, ScenePlane& p
       fail_at(map.path(), entry->line,
               fmt::format("{} needs {}", map.field("bow_m"), map.field("extent_m")));
     }
-    bow = number(map, "bow_m", -10, 10, "m");
+    bow = map.real("bow_m", -10, 10, "m");
   }
   plane.shape = WallShape(waves, bow, plane.extent, plane.center);
-  for_each_map(map, "patches",
-               [&](const YamlMap& each) { plane.patches.push_back(read_patch(each, plane)); });
+  for (const YamlMap& each : map.maps("patches")) plane.patches.push_back(read_patch(each, plane));
   if (plane.patches.size() > kMostPatches) {
     fail_at(map.path(), map.at("patches").line,
             fmt::format("{} has {} entries, allowed {}", map.field("patches"), plane.patches.size(),
@@ -116,7 +112,7 @@ Person read_person(const YamlMap& map, Names& earlier) {
   person.name = new_name(map, earlier);
   person.from = place(map, "from_m");
   person.to = place(map, "to_m");
-  person.speed = number(map, "speed_m_per_s", 0, 100, "m/s");
+  person.speed = map.real("speed_m_per_s", 0, 100, "m/s");
   if (map.find("size_m") != nullptr) person.size = numbers<2>(map, "size_m", 0.01L, 100);
   person.reflectivity = reflectivity(map);
   return person;
@@ -131,7 +127,7 @@ ScenePlane read_plane(const YamlMap& map, std::size_t number_of_plane, Names& ea
   const double azimuth = angle(map, "normal_azimuth_deg", -360, 360);
   const double zenith = angle(map, "normal_zenith_deg", 0, 180);
   plane.plane =
-      plane_from_angles({azimuth, zenith}, number(map, "distance_m", 1e-3L, kFarthestHit, "m"));
+      plane_from_angles({azimuth, zenith}, map.real("distance_m", 1e-3L, kFarthestHit, "m"));
   plane.horizontal_axis = {-std::sin(azimuth), std::cos(azimuth), 0.0};
   plane.vertical_axis = cross(plane.plane.normal, plane.horizontal_axis);
   if (map.find("extent_m") != nullptr)
@@ -171,18 +167,15 @@ Scene parse_scene(const std::string& text, const std::string& path) {
       {"planes", "stations", "terrain", "boxes", "people", "footprint", "limit_by_reflectivity"});
   Scene scene;
   Names planes, stations;
-  for_each_map(root, "planes", [&](const YamlMap& map) {
+  for (const YamlMap& map : root.maps("planes"))
     scene.planes.push_back(read_plane(map, scene.planes.size(), planes));
-  });
-  for_each_map(root, "stations",
-               [&](const YamlMap& map) { scene.stations.push_back(read_station(map, stations)); });
-  if (const auto* entry = root.find("terrain")) {
-    scene.terrain = read_terrain(YamlMap(entry->value, path, "terrain"), planes);
+  for (const YamlMap& map : root.maps("stations"))
+    scene.stations.push_back(read_station(map, stations));
+  if (root.find("terrain") != nullptr) {
+    scene.terrain = read_terrain(root.section("terrain"), planes);
   }
-  for_each_map(root, "boxes",
-               [&](const YamlMap& map) { scene.boxes.push_back(read_box(map, planes)); });
-  for_each_map(root, "people",
-               [&](const YamlMap& map) { scene.people.push_back(read_person(map, planes)); });
+  for (const YamlMap& map : root.maps("boxes")) scene.boxes.push_back(read_box(map, planes));
+  for (const YamlMap& map : root.maps("people")) scene.people.push_back(read_person(map, planes));
   scene.footprint = root.yes("footprint");
   scene.limit_by_reflectivity = root.yes("limit_by_reflectivity");
   return scene;

@@ -22,7 +22,7 @@ using io::fail_at;
 using io::YamlMap;
 
 double within(const YamlMap& map, std::string_view key, const Limits& limits) {
-  return number(map, key, limits.lowest, limits.highest, "m");
+  return map.real(key, limits.lowest, limits.highest, "m");
 }
 
 double heading(const YamlMap& map) {
@@ -62,17 +62,17 @@ Ground read_ground(const YamlMap& map) {
   map.allow_only({"height_m", "relief", "waves"});
   Ground ground;
   if (map.find("height_m") != nullptr) ground.height = within(map, "height_m", kHeightLimits);
-  for_each_map(map, "relief", [&](const YamlMap& each) {
+  for (const YamlMap& each : map.maps("relief")) {
     each.allow_only({"amplitude_m", "wavelength_x_m", "wavelength_y_m"});
     ground.relief.push_back({within(each, "amplitude_m", kAmplitudeLimits),
                              within(each, "wavelength_x_m", kWavelengthLimits),
                              within(each, "wavelength_y_m", kWavelengthLimits)});
-  });
-  for_each_map(map, "waves", [&](const YamlMap& each) {
+  }
+  for (const YamlMap& each : map.maps("waves")) {
     each.allow_only({"amplitude_m", "wavelength_m", "heading_deg"});
     ground.waves.push_back({within(each, "amplitude_m", kAmplitudeLimits),
                             within(each, "wavelength_m", kWavelengthLimits), heading(each)});
-  });
+  }
   if (ground.relief.size() + ground.waves.size() > kMostSines) {
     fail_at(
         map.path(), map.line(),
@@ -122,7 +122,7 @@ VillageSettings read_village(const YamlMap& map) {
                         map.field("bushes")));
   }
   if (village.roofs > 0) {
-    village.minimum_distance = number(map, "minimum_distance_m", 0, kSizeLimits.highest, "m");
+    village.minimum_distance = map.real("minimum_distance_m", 0, kSizeLimits.highest, "m");
     village.length = within(map, "length_m", kSizeLimits);
     village.face_width = within(map, "face_width_m", kSizeLimits);
     const auto pitch_deg = range(map, "pitch_deg", kPitchLimits_deg, "deg");
@@ -142,33 +142,27 @@ VillageSettings read_village(const YamlMap& map) {
 Terrain read_terrain(const YamlMap& map, Names& names) {
   map.allow_only({"origin", "ground", "roofs", "buildings", "bushes", "village"});
   TerrainParts parts;
-  const auto part = [&](std::string_view key) {
-    const YamlMap::Entry* entry = map.find(key);
-    return entry == nullptr
-               ? std::optional<YamlMap>()
-               : std::optional<YamlMap>(std::in_place, entry->value, map.path(), map.field(key));
-  };
-  if (const auto origin = part("origin")) parts.origin = read_origin(*origin);
-  if (const auto ground = part("ground")) parts.ground = read_ground(*ground);
+  const auto has = [&](std::string_view key) { return map.find(key) != nullptr; };
+  if (has("origin")) parts.origin = read_origin(map.section("origin"));
+  if (has("ground")) parts.ground = read_ground(map.section("ground"));
   names.insert("ground");
-  for_each_map(map, "roofs", [&](const YamlMap& each) {
+  for (const YamlMap& each : map.maps("roofs"))
     parts.roofs.push_back(read_roof(each, name_of(each, "roof", parts.roofs.size() + 1, names)));
-  });
-  for_each_map(map, "buildings", [&](const YamlMap& each) {
+  for (const YamlMap& each : map.maps("buildings")) {
     each.allow_only({"name", "center_m", "size_m", "height_m", "heading_deg"});
     parts.buildings.push_back({name_of(each, "building", parts.buildings.size() + 1, names),
                                center(each),
                                numbers<2>(each, "size_m", kSizeLimits.lowest, kSizeLimits.highest),
                                within(each, "height_m", kSizeLimits), heading(each)});
-  });
-  for_each_map(map, "bushes", [&](const YamlMap& each) {
+  }
+  for (const YamlMap& each : map.maps("bushes")) {
     each.allow_only({"name", "center_m", "radius_m", "height_m"});
     parts.bushes.push_back({name_of(each, "bush", parts.bushes.size() + 1, names), center(each),
                             within(each, "radius_m", kSizeLimits),
                             within(each, "height_m", kSizeLimits)});
-  });
+  }
   try {
-    if (const auto village = part("village")) add_village(read_village(*village), parts);
+    if (has("village")) add_village(read_village(map.section("village")), parts);
     return Terrain(std::move(parts));
   } catch (const InvalidArgument& error) {  // what no single field tells
     fail_at(map.path(), map.line(), fmt::format("terrain: {}", error.what()));

@@ -10,6 +10,7 @@
 
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 
 namespace risley::sensors {
@@ -160,9 +161,7 @@ double PatternCoverage::time_to_cover(double share) const {
   const auto wanted =
       static_cast<std::size_t>(std::ceil(share * static_cast<double>(times.size()) * (1 - 1e-12)));
   if (wanted == 0) return 0;
-  const auto last = times.begin() + static_cast<std::ptrdiff_t>(wanted - 1);
-  std::nth_element(times.begin(), last, times.end());
-  return *last;
+  return nth_value(times, wanted - 1);
 }
 
 PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions& scan,

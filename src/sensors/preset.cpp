@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -112,6 +113,8 @@ io::ScaleOfName covariance_scale(const Sensor& sensor) {
   };
 }
 
+constexpr long double kAnyValue = std::numeric_limits<long double>::infinity();
+
 /// A value of the file with its line.
 struct Quantity {
   long double value = 0;
@@ -120,10 +123,11 @@ struct Quantity {
 
 /// Reads one {value, unit, sigma, total_sigma, source}; sigma and source come together or not at
 /// all, a total sigma only with them.
+/// @throws FileError also for a value beyond the limits
 Quantity read_quantity(const YamlMap& parent, std::string_view name, std::string_view unit,
-                       Sensor& sensor) {
-  const YamlMap::Entry& entry = parent.at(name);
-  const YamlMap map(entry.value, parent.path(), parent.field(name));
+                       Sensor& sensor, long double lower = -kAnyValue,
+                       long double upper = kAnyValue) {
+  const YamlMap map = parent.section(name);
   map.allow_only({"value", "unit", "sigma", "total_sigma", "source"});
   const std::string found_unit = map.text("unit");
   if (found_unit != unit) {
@@ -136,13 +140,16 @@ Quantity read_quantity(const YamlMap& parent, std::string_view name, std::string
     const long double sigma = map.number("sigma", 0.0L, 1e9L, unit);
     const long double total =
         map.find("total_sigma") != nullptr ? map.number("total_sigma", sigma, 1e9L, unit) : 0.0L;
-    std::string source = map.text("source");
-    if (source.empty())
-      fail_at(map.path(), map.at("source").line, map.field("source") + " is empty");
-    sensor.set_knowledge({std::string(name), si_from_file(sigma, scale_of(unit)), std::move(source),
-                          si_from_file(total, scale_of(unit))});
+    sensor.set_knowledge({std::string(name), si_from_file(sigma, scale_of(unit)),
+                          map.words("source"), si_from_file(total, scale_of(unit))});
   }
-  return {yaml_number(value.value, map.path(), map.field("value")), value.line};
+  const long double number = yaml_number(value.value, map.path(), map.field("value"));
+  if (!(number >= lower && number <= upper)) {
+    fail_at(map.path(), value.line,
+            fmt::format("{} = {:g} {}, allowed {:g} to {:g}", parent.field(name), number, unit,
+                        lower, upper));
+  }
+  return {number, value.line};
 }
 
 std::string rotation_angle_name(int prism) {
@@ -208,7 +215,7 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
 /// What the sensor adds to true ranges; absent values are 0.
 void read_range_values(const YamlMap& root, Sensor& sensor) {
   if (root.find("range") == nullptr) return;
-  const YamlMap map(root.at("range").value, root.path(), "range");
+  const YamlMap map = root.section("range");
   const std::vector<RangeValue> values = range_values(sensor.train.emitters());
   for (const YamlMap::Entry& entry : map.entries()) {
     const auto known = std::find_if(values.begin(), values.end(),
@@ -216,19 +223,15 @@ void read_range_values(const YamlMap& root, Sensor& sensor) {
     if (known == values.end()) {
       fail_at(map.path(), entry.line, fmt::format("unknown field {}", map.field(entry.key)));
     }
-    const Quantity quantity = read_quantity(map, known->name, known->unit, sensor);
-    if (quantity.value < known->lower || quantity.value > known->upper) {
-      fail_at(map.path(), quantity.line,
-              fmt::format("{} = {:g} {}, allowed {:g} to {:g}", map.field(known->name),
-                          quantity.value, known->unit, known->lower, known->upper));
-    }
+    const Quantity quantity =
+        read_quantity(map, known->name, known->unit, sensor, known->lower, known->upper);
     set_range_value(sensor, known->name, static_cast<double>(quantity.value));
   }
 }
 
 void read_specifications(const YamlMap& root, Sensor& sensor) {
   for (const std::string_view section : section_names()) {
-    const YamlMap map(root.at(section).value, root.path(), std::string(section));
+    const YamlMap map = root.section(section);
     for (const YamlMap::Entry& entry : map.entries()) {
       const bool known = std::any_of(
           kSpecifications.begin(), kSpecifications.end(),
@@ -239,12 +242,7 @@ void read_specifications(const YamlMap& root, Sensor& sensor) {
     }
     for (const Specification& s : kSpecifications) {
       if (s.section != section || (s.optional && map.find(s.name) == nullptr)) continue;
-      const Quantity quantity = read_quantity(map, s.name, s.unit, sensor);
-      if (quantity.value < s.lower || quantity.value > s.upper) {
-        fail_at(map.path(), quantity.line,
-                fmt::format("{} = {:g} {}, allowed {:g} to {:g}", map.field(s.name), quantity.value,
-                            s.unit, s.lower, s.upper));
-      }
+      const Quantity quantity = read_quantity(map, s.name, s.unit, sensor, s.lower, s.upper);
       sensor.*s.member = si_from_file(quantity.value, scale_of(s.unit));
     }
   }
@@ -261,7 +259,7 @@ constexpr long double kThickest = 1, kWidest = 10, kThinnest = -0.1L;
 
 /// Sizes of the prisms, each kind under its shared name or under the prisms' own.
 void read_geometry(const YamlMap& root, Sensor& sensor) {
-  const YamlMap map(root.at("geometry").value, root.path(), "geometry");
+  const YamlMap map = root.section("geometry");
   const auto own = own_prism_sizes(sensor.prisms());
   std::vector<std::string> read;
   for (const PrismSize& shared : shared_prism_sizes()) {
@@ -269,13 +267,8 @@ void read_geometry(const YamlMap& root, Sensor& sensor) {
     std::vector<double>& values =
         is_thickness ? sensor.geometry.thickness : sensor.geometry.spacing;
     const auto take = [&](const std::string& name) {
-      const Quantity quantity = read_quantity(map, name, "m", sensor);
-      const long double upper = is_thickness ? kThickest : kWidest;
-      if (!(quantity.value >= kThinnest && quantity.value <= upper)) {
-        fail_at(map.path(), quantity.line,
-                fmt::format("{} = {:g} m, allowed {:g} to {:g}", map.field(name), quantity.value,
-                            kThinnest, upper));
-      }
+      const Quantity quantity =
+          read_quantity(map, name, "m", sensor, kThinnest, is_thickness ? kThickest : kWidest);
       values.push_back(static_cast<double>(quantity.value));
       read.push_back(name);
     };
@@ -372,17 +365,12 @@ void read_combinations(const YamlMap& root, Sensor& sensor) {
 
 /// The start of the scan: rotation angles, first_shot and firing.
 void read_sequence(const YamlMap& root, Sensor& sensor) {
-  const YamlMap map(root.at("sequence").value, root.path(), "sequence");
+  const YamlMap map = root.section("sequence");
   ScanSequence sequence;
   std::vector<std::string> known{"first_shot", "firing"};
   for (int i = 0; i < sensor.prisms(); ++i) {
     known.push_back(rotation_angle_name(i));
-    const Quantity quantity = read_quantity(map, known.back(), "deg", sensor);
-    if (!(quantity.value >= -360 && quantity.value <= 360)) {
-      fail_at(map.path(), quantity.line,
-              fmt::format("{} = {:g} deg, allowed -360 to 360", map.field(known.back()),
-                          quantity.value));
-    }
+    const Quantity quantity = read_quantity(map, known.back(), "deg", sensor, -360, 360);
     sequence.rotation_angle.push_back(si_from_file(quantity.value, scale_of("deg")));
   }
   for (const YamlMap::Entry& entry : map.entries()) {
@@ -645,7 +633,7 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
   sensor.angular_velocity.assign(static_cast<std::size_t>(sensor.prisms()), 0.0);
   read_combinations(root, sensor);
   sensor.device_type = root.integer("device_type", 0, 255);
-  read_parameters(YamlMap(root.at("parameters").value, path, "parameters"), sensor);
+  read_parameters(root.section("parameters"), sensor);
   read_specifications(root, sensor);
   read_range_values(root, sensor);
   read_geometry(root, sensor);
@@ -667,7 +655,7 @@ Sensor parse_preset(const std::string& text, const std::string& path) {
     sensor.covariance = std::move(found.matrix);
   }
   if (root.find("provenance") != nullptr) {
-    const YamlMap provenance(root.at("provenance").value, path, "provenance");
+    const YamlMap provenance = root.section("provenance");
     for (const YamlMap::Entry& entry : provenance.entries()) {
       sensor.provenance.emplace_back(entry.key, provenance.text(entry.key));
     }

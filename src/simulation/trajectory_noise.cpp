@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/core/random.hpp"
 
 #include "simulation/streams.hpp"
@@ -29,12 +30,6 @@ std::vector<double> markov_process(const std::vector<std::int64_t>& time_ns,
     values[i] = std::exp(-steps) * values[i - 1] + std::sqrt(-std::expm1(-2 * steps)) * values[i];
   }
   return values;
-}
-
-Eigen::Quaterniond rotation_by(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  if (angle == 0.0) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, vector / angle));
 }
 
 }  // namespace
@@ -63,9 +58,10 @@ trajectories::Trajectory with_errors(const trajectories::Trajectory& truth,
     }
     const Eigen::Matrix3d ned = trajectories::ned_axes(truth.frame, truth.position[row]);
     noisy.position[row] += ned * Eigen::Vector3d(error[0], error[1], -error[2]);
-    noisy.attitude[row] =
-        (rotation_by(ned * Eigen::Vector3d(error[3], error[4], error[5])) * truth.attitude[row])
-            .normalized();
+    noisy.attitude[row] = (Eigen::Quaterniond(algebra::rotation_by(
+                               ned * Eigen::Vector3d(error[3], error[4], error[5]))) *
+                           truth.attitude[row])
+                              .normalized();
 
     const trajectories::PoseErrorVector variance = sigmas.cwiseAbs2() + process.white().cwiseAbs2();
     const double heading =

@@ -14,14 +14,11 @@
 #include "risley/core/saturating.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
-#include "risley/io/yaml_output.hpp"
 
 namespace risley::trajectories {
 namespace {
 
 using io::fail_at;
-using io::yaml_decimal;
-using io::yaml_quoted;
 using io::YamlMap;
 
 constexpr int kErrorModelVersion = 1;
@@ -47,7 +44,7 @@ constexpr double kLargestErrorSigma = 1e4;                                      
 constexpr double kLongestCorrelation = 1e9, kLongestSample = 1e4, kShortestTime = 1e-6;  // s
 
 ErrorTerm read_error_term(const YamlMap& root, const ErrorName& name) {
-  const YamlMap map(root.at(name.key).value, root.path(), name.key);
+  const YamlMap map = root.section(name.key);
   map.allow_only({"sigma", "correlation_time_s", "white", "source"});
   const auto number = [&](std::string_view key) {
     return static_cast<double>(map.number(key, 0, kLargestErrorSigma, name.unit) * name.scale);
@@ -55,12 +52,8 @@ ErrorTerm read_error_term(const YamlMap& root, const ErrorName& name) {
   ErrorTerm term;
   if (map.find("sigma") != nullptr) term.sigma = number("sigma");
   if (map.find("white") != nullptr) term.white = number("white");
-  term.correlation_time = static_cast<double>(
-      map.number("correlation_time_s", kShortestTime, kLongestCorrelation, "s"));
-  term.source = map.text("source");
-  if (term.source.empty()) {
-    fail_at(map.path(), map.at("source").line, map.field("source") + " is empty");
-  }
+  term.correlation_time = map.real("correlation_time_s", kShortestTime, kLongestCorrelation, "s");
+  term.source = map.words("source");
   return term;
 }
 
@@ -96,8 +89,7 @@ ErrorModel parse_error_model(const std::string& text, const std::string& path) {
     model.terms[i] = read_error_term(root, kErrorNames[i]);
   }
   if (root.find("sample_interval_s") != nullptr) {
-    model.sample_interval =
-        static_cast<double>(root.number("sample_interval_s", kShortestTime, kLongestSample, "s"));
+    model.sample_interval = root.real("sample_interval_s", kShortestTime, kLongestSample, "s");
   } else if (has_white(model)) {
     fail_at(path, root.line(),
             "sample_interval_s is missing: white parts are constant within a sample");
@@ -125,25 +117,6 @@ void require_error_model(const ErrorModel& model) {
   } else {
     require_between("sample_interval", model.sample_interval, 0, kLongestSample, "s");
   }
-}
-
-std::string error_model_text(const ErrorModel& model) {
-  require_error_model(model);
-  std::string text = fmt::format("risley_trajectory_errors: {}\n", kErrorModelVersion);
-  if (model.sample_interval > 0) {
-    text += fmt::format("sample_interval_s: {}\n", yaml_decimal(model.sample_interval));
-  }
-  for (std::size_t i = 0; i < kPoseErrors; ++i) {
-    const ErrorTerm& term = model.terms[i];
-    const ErrorName& name = kErrorNames[i];
-    text += fmt::format("{}: {{", name.key);
-    if (term.sigma) text += fmt::format("sigma: {}, ", yaml_decimal(*term.sigma, name.scale));
-    text += fmt::format("correlation_time_s: {}, ", yaml_decimal(term.correlation_time));
-    if (term.white > 0) text += fmt::format("white: {}, ", yaml_decimal(term.white, name.scale));
-    text += fmt::format("source: {}}}\n",
-                        yaml_quoted(term.source.empty() ? "not stated" : term.source));
-  }
-  return text;
 }
 
 ErrorProcess::ErrorProcess(const ErrorModel& model, const Trajectory& trajectory) {

@@ -27,7 +27,6 @@ using io::fail_at;
 using io::YamlMap;
 
 constexpr int kFlightVersion = 1, kStripsVersion = 1;
-constexpr std::int64_t kLatestTime_ns = std::int64_t{1} << 62;  // 146 years
 /// Numbers of the random streams; those of scenes and simulations are others.
 constexpr std::uint64_t kAttitudeMotion = 300, kVelocityMotion = 301;
 
@@ -172,47 +171,15 @@ void require_motion(std::string_view name, const SinusoidMotion& motion, double 
 
 // The file.
 
-double plan_number(const YamlMap& map, std::string_view key, long double lower, long double upper,
-                   std::string_view unit) {
-  return static_cast<double>(map.number(key, lower, upper, unit));
-}
-
-double plan_number_or(const YamlMap& map, std::string_view key, double fallback, long double lower,
-                      long double upper, std::string_view unit) {
-  return map.find(key) == nullptr ? fallback : plan_number(map, key, lower, upper, unit);
-}
-
-/// A list of numbers.
-std::vector<double> plan_numbers(const YamlMap& map, std::string_view key, double lower,
-                                 long double upper, std::string_view unit) {
-  const YamlMap::Entry& entry = map.at(key);
-  if (!entry.value.is_list() || entry.value.items.empty()) {
-    fail_at(map.path(), entry.line, fmt::format("{}: expected a list in {}", map.field(key), unit));
-  }
-  std::vector<double> values;
-  for (std::size_t i = 0; i < entry.value.items.size(); ++i) {
-    const std::string field = fmt::format("{}[{}]", map.field(key), i);
-    values.push_back(static_cast<double>(io::yaml_number(entry.value.items[i], map.path(), field)));
-    if (values.back() < lower || values.back() > upper) {
-      fail_at(map.path(), entry.line,
-              fmt::format("{} = {:g} {}, allowed {:g} to {:g}", field, values.back(), unit, lower,
-                          upper));
-    }
-  }
-  return values;
-}
-
 void read_strips(const YamlMap& map, const Strip& usual, std::vector<Strip>& strips) {
   map.allow_only({"name", "headings_deg", "heading_deg", "count", "spacing_m", "center_m",
                   "length_m", "height_m", "speed_m_per_s"});
   Strip strip = usual;
-  strip.length = plan_number(map, "length_m", 1, kLongestStrip, "m");
-  strip.height =
-      plan_number_or(map, "height_m", usual.height, -kHighestFlight, kHighestFlight, "m");
-  strip.speed =
-      plan_number_or(map, "speed_m_per_s", usual.speed, kLowestSpeed, kHighestSpeed, "m/s");
+  strip.length = map.real("length_m", 1, kLongestStrip, "m");
+  strip.height = map.real("height_m", -kHighestFlight, kHighestFlight, "m", usual.height);
+  strip.speed = map.real("speed_m_per_s", kLowestSpeed, kHighestSpeed, "m/s", usual.speed);
   if (map.find("center_m") != nullptr) {
-    const auto center = plan_numbers(map, "center_m", -kFarthestPlace, kFarthestPlace, "m");
+    const auto center = map.reals("center_m", 0, -kFarthestPlace, kFarthestPlace, "m");
     if (center.size() != 2) {
       fail_at(map.path(), map.at("center_m").line,
               fmt::format("{}: expected [x, y] in m", map.field("center_m")));
@@ -238,15 +205,15 @@ void read_strips(const YamlMap& map, const Strip& usual, std::vector<Strip>& str
   }
   const std::size_t first = strips.size();
   if (several) {
-    for (const double heading_deg : plan_numbers(map, "headings_deg", -360, 360, "deg")) {
+    for (const double heading_deg : map.reals("headings_deg", 0, -360, 360, "deg")) {
       strip.heading = radians_from_degrees(heading_deg);
       strips.push_back(strip);
     }
   } else {
-    const double heading = radians_from_degrees(plan_number(map, "heading_deg", -360, 360, "deg"));
+    const double heading = radians_from_degrees(map.real("heading_deg", -360, 360, "deg"));
     const bool parallel = map.find("count") != nullptr;
     const int count = parallel ? map.integer("count", 1, kMostStrips) : 1;
-    const double spacing = parallel ? plan_number(map, "spacing_m", 0, kFarthestPlace, "m") : 0.0;
+    const double spacing = parallel ? map.real("spacing_m", 0, kFarthestPlace, "m") : 0.0;
     const std::array<double, 2> center = strip.center;
     for (int i = 0; i < count; ++i) {
       const double right = spacing * (i - 0.5 * (count - 1));
@@ -275,11 +242,10 @@ SinusoidMotion read_motion(const YamlMap& map, const std::array<std::string, 3>&
                            std::string_view unit) {
   map.allow_only({axes[0], axes[1], axes[2], "lowest_hz", "highest_hz", "sinusoids"});
   SinusoidMotion motion;
-  for (std::size_t i = 0; i < 3; ++i) motion.rms[i] = plan_number(map, axes[i], 0, limit, unit);
-  motion.lowest_frequency =
-      plan_number(map, "lowest_hz", kLowestFrequency, kHighestFrequency, "Hz");
+  for (std::size_t i = 0; i < 3; ++i) motion.rms[i] = map.real(axes[i], 0, limit, unit);
+  motion.lowest_frequency = map.real("lowest_hz", kLowestFrequency, kHighestFrequency, "Hz");
   motion.highest_frequency =
-      plan_number(map, "highest_hz", motion.lowest_frequency, kHighestFrequency, "Hz");
+      map.real("highest_hz", motion.lowest_frequency, kHighestFrequency, "Hz");
   motion.sinusoids = map.integer("sinusoids", 1, kMostSinusoids);
   return motion;
 }
@@ -300,7 +266,7 @@ void read_start(const YamlMap& map, FlightPlan& plan) {
             fmt::format("{} = \"{}\"{}, allowed {}", map.field("scale"), word,
                         did_you_mean(word, known), fmt::join(known, ", ")));
   }
-  plan.start = plan_number(map, "time_s", -kLargestStart, kLargestStart, "s");
+  plan.start = map.real("time_s", -kLargestStart, kLargestStart, "s");
   if (map.find("gps_week") == nullptr) return;
   if (plan.time_scale != TimeScale::gps_second_of_week) {
     fail_at(map.path(), map.at("gps_week").line,
@@ -402,38 +368,6 @@ Flight fly(const FlightPlan& plan) {
   return flight;
 }
 
-std::vector<StripTimes> parse_strip_times(const std::string& text, const std::string& path) {
-  const YamlMap root(io::parse_yaml(text, path), path, "");
-  root.allow_only({"risley_strips", "time_scale", "strips"});
-  root.integer("risley_strips", kStripsVersion, kStripsVersion);
-  root.text("time_scale");
-  const YamlMap::Entry& list = root.at("strips");
-  if (!list.value.is_list()) fail_at(path, list.line, "strips: expected a list");
-  std::vector<StripTimes> strips;
-  for (std::size_t i = 0; i < list.value.items.size(); ++i) {
-    const YamlMap map(list.value.items[i], path, fmt::format("strips[{}]", i));
-    map.allow_only({"name", "begin_ns", "end_ns"});
-    const auto time = [&](std::string_view key, std::int64_t earliest) {
-      const long double value =
-          map.number(key, static_cast<long double>(earliest), kLatestTime_ns, "ns");
-      if (value != std::floor(value)) {
-        fail_at(path, map.at(key).line, map.field(key) + ": expected whole nanoseconds");
-      }
-      return static_cast<std::int64_t>(value);
-    };
-    StripTimes strip;
-    strip.name = map.text("name");
-    strip.begin_ns = time("begin_ns", strips.empty() ? -kLatestTime_ns : strips.back().end_ns);
-    strip.end_ns = time("end_ns", strip.begin_ns);
-    strips.push_back(std::move(strip));
-  }
-  return strips;
-}
-
-std::vector<StripTimes> load_strip_times(const std::string& path) {
-  return parse_strip_times(io::read_text_file(path), path);
-}
-
 std::string strip_times_text(const std::vector<StripTimes>& strips, TimeScale scale) {
   std::string text = fmt::format(
       "# When strips are flown, in the time of their trajectory.\n"
@@ -453,44 +387,36 @@ FlightPlan parse_flight_plan(const std::string& text, const std::string& path) {
   root.integer("risley_flight", kFlightVersion, kFlightVersion);
   FlightPlan plan;
   if (root.find("name") != nullptr) plan.name = root.text("name");
-  const auto section = [&](const YamlMap& map, std::string_view key) {
-    return YamlMap(map.at(key).value, path, map.field(key));
-  };
   if (root.find("origin") != nullptr) {
-    const YamlMap map = section(root, "origin");
+    const YamlMap map = root.section("origin");
     map.allow_only({"latitude_deg", "longitude_deg", "ellipsoidal_height_m"});
-    plan.origin =
-        Geodetic{radians_from_degrees(plan_number(map, "latitude_deg", -90, 90, "deg")),
-                 radians_from_degrees(plan_number(map, "longitude_deg", -360, 360, "deg")),
-                 plan_number(map, "ellipsoidal_height_m", -1e4, 1e4, "m")};
+    plan.origin = Geodetic{radians_from_degrees(map.real("latitude_deg", -90, 90, "deg")),
+                           radians_from_degrees(map.real("longitude_deg", -360, 360, "deg")),
+                           map.real("ellipsoidal_height_m", -1e4, 1e4, "m")};
   }
-  if (root.find("start") != nullptr) read_start(section(root, "start"), plan);
-  plan.rate = plan_number(root, "rate_hz", kLowestRate, kHighestRate, "Hz");
-  plan.turn_duration = plan_number(root, "turn_duration_s", kShortestTurn, kLongestTurn, "s");
-  plan.lead = plan_number_or(root, "lead_s", plan.lead, 0, kLongestTurn, "s");
+  if (root.find("start") != nullptr) read_start(root.section("start"), plan);
+  plan.rate = root.real("rate_hz", kLowestRate, kHighestRate, "Hz");
+  plan.turn_duration = root.real("turn_duration_s", kShortestTurn, kLongestTurn, "s");
+  plan.lead = root.real("lead_s", 0, kLongestTurn, "s", plan.lead);
   Strip usual;
-  usual.height = plan_number(root, "height_m", -kHighestFlight, kHighestFlight, "m");
-  usual.speed = plan_number(root, "speed_m_per_s", kLowestSpeed, kHighestSpeed, "m/s");
+  usual.height = root.real("height_m", -kHighestFlight, kHighestFlight, "m");
+  usual.speed = root.real("speed_m_per_s", kLowestSpeed, kHighestSpeed, "m/s");
   const YamlMap::Entry& strips = root.at("strips");
   if (!strips.value.is_list() || strips.value.items.empty()) {
     fail_at(path, strips.line, "strips: expected a list of strips");
   }
-  for (std::size_t i = 0; i < strips.value.items.size(); ++i) {
-    read_strips(YamlMap(strips.value.items[i], path, fmt::format("strips[{}]", i)), usual,
-                plan.strips);
-  }
+  for (const YamlMap& map : root.maps("strips")) read_strips(map, usual, plan.strips);
   if (root.find("motion") != nullptr) {
-    const YamlMap map = section(root, "motion");
+    const YamlMap map = root.section("motion");
     map.allow_only({"seed", "attitude", "velocity"});
     plan.seed = static_cast<std::uint64_t>(map.integer("seed", 0, 2'147'483'647));
     if (map.find("attitude") != nullptr) {
-      plan.attitude =
-          read_motion(section(map, "attitude"), {"roll_deg", "pitch_deg", "heading_deg"},
-                      kLargestSwing_deg, "deg");
+      plan.attitude = read_motion(map.section("attitude"), {"roll_deg", "pitch_deg", "heading_deg"},
+                                  kLargestSwing_deg, "deg");
       for (double& rms : plan.attitude.rms) rms = radians_from_degrees(rms);
     }
     if (map.find("velocity") != nullptr) {
-      plan.velocity = read_motion(section(map, "velocity"), {"x_m_per_s", "y_m_per_s", "z_m_per_s"},
+      plan.velocity = read_motion(map.section("velocity"), {"x_m_per_s", "y_m_per_s", "z_m_per_s"},
                                   kLargestVelocity, "m/s");
     }
   }

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 
 namespace risley::trajectories {
@@ -87,9 +88,7 @@ std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
   std::vector<double> ways;
   ways.reserve(seconds.size());
   for (const SecondOfFlight& second : seconds) ways.push_back(second.way);
-  const auto middle = ways.begin() + static_cast<std::ptrdiff_t>(ways.size() / 2);
-  std::nth_element(ways.begin(), middle, ways.end());
-  const double least = options.slowest_share * *middle;
+  const double least = options.slowest_share * upper_median(ways);
 
   std::vector<Reach> reach;
   for (std::size_t i = 0; i < seconds.size(); ++i) {

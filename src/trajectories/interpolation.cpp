@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/core/angle.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
-
-#include "trajectories/rotation_vector.hpp"
 
 namespace risley::trajectories {
 namespace {
@@ -39,9 +39,7 @@ Interpolation::Interpolation(const Trajectory& trajectory, const InterpolationOp
   if (times.size() < 2) return;
   std::vector<std::int64_t> steps(times.size() - 1);
   for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = times[i + 1] - times[i];
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  median_step_ns_ = *middle;
+  median_step_ns_ = upper_median(steps);
   constexpr double kMost_ns = 0x1p62;
   longest_step_ns_ = static_cast<std::int64_t>(
       std::min(options.gap_steps * static_cast<double>(median_step_ns_), kMost_ns));
@@ -94,7 +92,7 @@ void Interpolation::Cursor::set_interval(std::size_t row) {
   std::size_t points = 0;
   const auto add = [&](std::size_t record, const Eigen::Vector3d& neighbour) -> Eigen::Vector3d {
     Eigen::Vector3d turn = nearest_turn(
-        rotation_vector(all.attitude[row].conjugate() * all.attitude[record]), neighbour);
+        algebra::rotation_vector(all.attitude[row].conjugate() * all.attitude[record]), neighbour);
     at[points] = 1e-9 * static_cast<double>(all.time_ns[record] - begin_ns_) / interval_;
     values[points++] << all.position[record] - all.position[row], turn;
     return turn;
@@ -146,10 +144,10 @@ std::optional<Pose> Interpolation::Cursor::at(std::int64_t time_ns) {
   const Eigen::Vector3d turn = value.tail<3>();
   Pose pose;
   pose.position = all.position[row_] + value.head<3>();
-  pose.attitude = all.attitude[row_] * turned_by(turn);
+  pose.attitude = all.attitude[row_] * algebra::turned_by(turn);
   pose.attitude.normalize();
   pose.velocity = slope.head<3>();
-  pose.angular_velocity = pose.attitude * angular_velocity_of(turn, slope.tail<3>());
+  pose.angular_velocity = pose.attitude * algebra::angular_velocity_of(turn, slope.tail<3>());
   return pose;
 }
 

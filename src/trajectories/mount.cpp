@@ -14,6 +14,7 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -22,8 +23,6 @@
 #include "risley/io/yaml_covariance.hpp"
 #include "risley/io/yaml_map.hpp"
 #include "risley/io/yaml_output.hpp"
-
-#include "trajectories/rotation_vector.hpp"
 
 namespace risley::trajectories {
 namespace {
@@ -72,29 +71,21 @@ std::optional<std::array<std::string, 3>> axes_words(const Eigen::Matrix3d& nomi
   return words;
 }
 
-std::string source_of(const YamlMap& map) {
-  std::string source = map.text("source");
-  if (source.empty()) {
-    fail_at(map.path(), map.at("source").line, map.field("source") + " is empty");
-  }
-  return source;
-}
-
 /// @param scale  SI units per unit of the file
 StatedValue read_stated(const YamlMap& parent, std::string_view key, double limit,
                         std::string_view unit, long double scale) {
-  const YamlMap map(parent.at(key).value, parent.path(), parent.field(key));
+  const YamlMap map = parent.section(key);
   map.allow_only({"value", "sigma", "source"});
   StatedValue stated;
   stated.value = static_cast<double>(map.number("value", -limit, limit, unit) * scale);
   stated.sigma = static_cast<double>(map.number("sigma", 0, kLargestSigma, unit) * scale);
-  stated.source = source_of(map);
+  stated.source = map.words("source");
   return stated;
 }
 
 std::array<StatedValue, 3> read_three(const YamlMap& root, std::string_view key,
                                       std::string_view suffix, double limit, long double scale) {
-  const YamlMap map(root.at(key).value, root.path(), std::string(key));
+  const YamlMap map = root.section(key);
   std::array<std::string, 3> names;
   for (std::size_t i = 0; i < 3; ++i) names[i] = fmt::format("{}_{}", kAxisLetters[i], suffix);
   map.allow_only({names[0], names[1], names[2]});
@@ -310,7 +301,7 @@ Eigen::Matrix3d body_from_sensor(const Mount& mount) {
   require_mount(mount);
   const Eigen::Vector3d turn(mount.boresight[0].value, mount.boresight[1].value,
                              mount.boresight[2].value);
-  return mount.nominal * turned_by(turn).toRotationMatrix();
+  return mount.nominal * algebra::turned_by(turn).toRotationMatrix();
 }
 
 Eigen::Vector3d lever_arm(const Mount& mount) {
@@ -343,10 +334,9 @@ Mount parse_mount(const std::string& text, const std::string& path) {
             "sensor_axes and body_from_sensor are two ways to state the same, expected only one of "
             "them");
   }
-  const YamlMap rotation(axes != nullptr ? axes->value : matrix->value, path,
-                         axes != nullptr ? "sensor_axes" : "body_from_sensor");
+  const YamlMap rotation = root.section(axes != nullptr ? "sensor_axes" : "body_from_sensor");
   mount.nominal = axes != nullptr ? read_axes(rotation) : read_matrix(rotation);
-  mount.nominal_source = source_of(rotation);
+  mount.nominal_source = rotation.words("source");
   mount.boresight = read_three(root, "boresight", "deg", kLargestBoresight_deg, kDegree);
   mount.lever_arm = read_three(root, "lever_arm", "m", kLongestLeverArm, 1);
   mount.clock_offset = read_stated(root, "clock_offset_s", kLargestClockOffset, "s", 1);

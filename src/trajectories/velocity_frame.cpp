@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/median.hpp"
+
 namespace risley::trajectories {
 namespace {
 
@@ -98,9 +100,7 @@ struct Comparison {
 std::int64_t median_step(const std::vector<std::int64_t>& times) {
   std::vector<std::int64_t> steps(times.size() - 1);
   for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = times[i + 1] - times[i];
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return upper_median(steps);
 }
 
 /// Velocities summed over spans of up to a second, against the change of the position: rounded

@@ -12,7 +12,7 @@
 
 #include "risley/core/number_text.hpp"
 #include "risley/estimation/diagnostics.hpp"
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 #include "risley/report/html.hpp"
 
 namespace risley::reproduction {

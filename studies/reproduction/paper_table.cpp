@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/chi_square.hpp"
 #include "risley/core/error.hpp"
 
 namespace risley::reproduction {
@@ -108,20 +109,14 @@ Check rms_ratio(std::string what, double ratio, double degrees_of_freedom, std::
 
 Check mean_square_ratio(std::string what, double ratio, double degrees_of_freedom,
                         std::string why) {
-  return within(std::move(what), ratio,
-                chi_square_quantile(degrees_of_freedom, -kBand) / degrees_of_freedom,
-                chi_square_quantile(degrees_of_freedom, kBand) / degrees_of_freedom,
+  return within(std::move(what), ratio, chi_square_per_degree(degrees_of_freedom, -kBand),
+                chi_square_per_degree(degrees_of_freedom, kBand),
                 fmt::format("{}: 99.9 % band of chi-square with {:.0f} degrees of freedom", why,
                             degrees_of_freedom));
 }
 
 Check holds(std::string what, bool so, std::string why) {
   return within(std::move(what), so ? 1.0 : 0.0, 1.0, 1.0, std::move(why));
-}
-
-double chi_square_quantile(double degrees_of_freedom, double z) {
-  const double spread = 2.0 / (9.0 * degrees_of_freedom);
-  return degrees_of_freedom * std::pow(std::max(0.0, 1.0 - spread + z * std::sqrt(spread)), 3);
 }
 
 Distribution distribution_of(std::vector<double> values, double papers_draw) {

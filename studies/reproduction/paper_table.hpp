@@ -46,10 +46,6 @@ Check mean_square_ratio(std::string what, double ratio, double degrees_of_freedo
 /// Something that is so or is not.
 Check holds(std::string what, bool so, std::string why);
 
-/// What chi-square of so many degrees of freedom stays below with the probability that belongs to
-/// `z` standard deviations of a normal distribution (Wilson and Hilferty's approximation).
-double chi_square_quantile(double degrees_of_freedom, double z);
-
 /// How ours scatters where the paper shows one random draw.
 struct Distribution {
   double low = 0, median = 0, high = 0;  ///< 5, 50 and 95 % quantiles

@@ -14,7 +14,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 
 #include "reproduction/runs.hpp"
 

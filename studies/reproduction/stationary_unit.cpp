@@ -12,7 +12,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/estimation/piecewise.hpp"
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 
 #include "reproduction/papers_unit.hpp"
 #include "reproduction/runs.hpp"

@@ -11,9 +11,12 @@ import check_layers  # noqa: E402
 
 LAYERS = """risley_add_layer(core)
 risley_add_layer(io LAYERS core)
+risley_add_layer(hashes LAYERS core)
+risley_add_layer(tables LAYERS core io)
 risley_add_layer(simulation LAYERS core)
 risley_add_layer(estimation   LAYERS core)
 risley_add_layer(report LAYERS core estimation)
+risley_layer_needs(core PUBLIC fmt BUILD random123)
 """
 
 
@@ -30,7 +33,8 @@ class CheckLayersTest(unittest.TestCase):
         self.assertEqual(self.errors({
             "include/risley/core/angle.hpp": "#include <cmath>\n",
             "include/risley/estimation/ekf.hpp": '#include "risley/core/angle.hpp"\n',
-            "src/io/netcdf.cpp": "#include <netcdf.h>\n#include <openssl/evp.h>\n",
+            "include/risley/report/text.hpp": "#include <fmt/format.h>\n",
+            "src/tables/netcdf.cpp": "#include <netcdf.h>\n#include <fmt/format.h>\n",
             "src/report/html.cpp": '#include "risley/estimation/ekf.hpp"\n#include "report/page.hpp"\n',
             "apps/risley/main.cpp": '#include <tbb/global_control.h>\n#include "risley/simulation/a.hpp"\n#include "verb.hpp"\n',
         }), [])
@@ -48,13 +52,17 @@ class CheckLayersTest(unittest.TestCase):
             ("apps/risley/main.cpp", '#include "risley/clouds/cloud.hpp"',
              "apps/risley/main.cpp:2: risley/clouds/cloud.hpp is in no declared layer"),
             ("src/report/states.cpp", "#include <netcdf.h>",
-             "src/report/states.cpp:2: only the layer io may include netcdf.h"),
+             "src/report/states.cpp:2: only the layer tables may include netcdf.h"),
             ("src/report/states.cpp", "#include <tbb/parallel_for.h>",
              "src/report/states.cpp:2: only the layer parallel may include tbb/parallel_for.h"),
             ("apps/risley/main.cpp", "#include <yaml-cpp/yaml.h>",
              "apps/risley/main.cpp:2: only the layer io may include yaml-cpp/yaml.h"),
             ("include/risley/core/hash.hpp", "#include <openssl/evp.h>",
-             "include/risley/core/hash.hpp:2: only the layer io may include openssl/evp.h"),
+             "include/risley/core/hash.hpp:2: only the layer hashes may include openssl/evp.h"),
+            ("include/risley/core/lanes.hpp", "#include <xsimd/xsimd.hpp>",
+             "include/risley/core/lanes.hpp:2: the layer core does not hand on xsimd/xsimd.hpp"),
+            ("include/risley/tables/netcdf.hpp", "#include <netcdf.h>",
+             "include/risley/tables/netcdf.hpp:2: the layer tables does not hand on netcdf.h"),
         ):
             with self.subTest(include=include):
                 errors = self.errors({name: f"// first line\n{include}\n"})
@@ -66,15 +74,15 @@ class CheckLayersTest(unittest.TestCase):
             "src/estimation/ekf.cpp": '#include "estimation/knots.hpp"\n',
             "include/risley/estimation/ekf.hpp": '#include "estimation/knots.hpp"\n',
             "src/report/html.cpp": '#include "estimation/knots.hpp"\n',
-            "apps/risley/main.cpp": '#include "report/charts.hpp"\n',
-            "studies/paper/run.cpp": '#include "report/charts.hpp"\n',
+            "apps/risley/main.cpp": '#include "report/chart.hpp"\n',
+            "studies/paper/run.cpp": '#include "report/chart.hpp"\n',
             "bench/steps_bench.cpp": '#include "estimation/knots.hpp"\n',
         }), [
             "include/risley/estimation/ekf.hpp:1: estimation/knots.hpp is a private header of the layer"
             " estimation",
             "src/report/html.cpp:1: estimation/knots.hpp is a private header of the layer estimation",
-            "apps/risley/main.cpp:1: report/charts.hpp is a private header of the layer report",
-            "studies/paper/run.cpp:1: report/charts.hpp is a private header of the layer report",
+            "apps/risley/main.cpp:1: report/chart.hpp is a private header of the layer report",
+            "studies/paper/run.cpp:1: report/chart.hpp is a private header of the layer report",
         ])
 
     def test_libraries_know_no_option_of_the_command(self):

@@ -46,14 +46,15 @@ file(REMOVE_RECURSE ${WORK})
 if(WAY STREQUAL "installed")
   run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
   consume(all)
-  # Optics needs no library but fmt and Eigen.
+  # Optics needs no library but fmt, xsimd and Eigen, sensors yaml-cpp beside them.
   set(hidden "")
-  foreach(package TBB yaml-cpp nlohmann_json OpenSSL xsimd SQLite3 ZLIB fastcdr PkgConfig)
+  foreach(package TBB nlohmann_json OpenSSL SQLite3 ZLIB fastcdr PkgConfig)
     list(APPEND hidden -DCMAKE_DISABLE_FIND_PACKAGE_${package}=ON)
   endforeach()
-  consume(optics -DCOMPONENTS=optics ${hidden})
+  consume(sensors -DCOMPONENTS=sensors ${hidden})
+  consume(optics -DCOMPONENTS=optics ${hidden} -DCMAKE_DISABLE_FIND_PACKAGE_yaml-cpp=ON)
   refuse(no_such_layer "risley has no component telescope; it has core, " -DCOMPONENTS=telescope)
-  refuse(no_package "risley::io needs packages that are missing.*libsqlite3-dev"
+  refuse(no_package "risley::tables needs packages that are missing.*libsqlite3-dev"
          -DCMAKE_DISABLE_FIND_PACKAGE_SQLite3=ON)
   consume_pkg_config(risley)
   consume_pkg_config(risley-optics)

@@ -84,8 +84,6 @@ TEST(SurfaceSteps, NoiseAloneIsEvenAndHasNoStep) {
       EXPECT_TRUE(report.steps.empty()) << shots << " shots, seed " << seed;
       EXPECT_NEAR(report.unevenness, 1.0, 0.15);
       EXPECT_GT(report.cells, 700u);
-      EXPECT_LT(report.unevenness_rms,
-                0.4 * kNoise * std::sqrt(1200.0 / static_cast<double>(shots)));
     }
   }
 }
@@ -183,7 +181,6 @@ TEST(SurfaceSteps, WavesAreUnevenAndNoSteps) {
     const SurfaceReport report = surface.inspect();
     EXPECT_TRUE(report.steps.empty());
     EXPECT_GT(report.unevenness, 2.0);
-    EXPECT_NEAR(report.unevenness_rms, amplitude / std::sqrt(2.0), 0.1 * amplitude);
   }
 }
 

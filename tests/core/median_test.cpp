@@ -17,4 +17,12 @@ TEST(Median, IsTheMiddleOrTheMeanOfTwo) {
   EXPECT_TRUE(std::isnan(median(none)));
 }
 
+TEST(Median, OrQuantilesAreValuesThemselves) {
+  std::vector<double> values{9, -1, 4, 5};
+  EXPECT_EQ(upper_median(values), 5);
+  EXPECT_EQ(quantile(values, 0.5), 4);
+  EXPECT_EQ(quantile(values, 1), 9);
+  EXPECT_EQ(nth_value(values, 0), -1);
+}
+
 }  // namespace risley::median_test

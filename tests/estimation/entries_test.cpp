@@ -175,7 +175,7 @@ TEST(Entries, TrajectoriesAskForCovariancesThatAreThere) {
   knots.covariance.resize(knots.size() * 21);
   EXPECT_EQ(refusal([&] { return knots.angle_covariance(0, 0, 2, 0.0); }),
             "rotor = 2, allowed 0 to 1");
-  EXPECT_EQ(refusal([&] { return knots.speed_variance(9, 0, 0.0); }),
+  EXPECT_EQ(refusal([&] { return knots.speed_variance_terms(9, 0); }),
             "knot = 9, allowed 0 to " + std::to_string(knots.size() - 1));
 }
 

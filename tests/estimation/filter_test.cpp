@@ -15,9 +15,8 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
-#include "risley/optics/observation_model.hpp"
+#include "risley/optics/observation_adjoint.hpp"
 
-#include "estimation/residual_model.hpp"
 #include "optics/trains.hpp"
 
 namespace risley::estimation::filter_test {
@@ -112,12 +111,45 @@ struct Result {
   std::vector<double> chi_square = std::vector<double>(kShots), determinant = chi_square, kept;
 };
 
+/// Azimuth and zenith of a shot, and how they depend on free parameters and rotation angles.
+struct Linearised {
+  Eigen::Vector2d angles;
+  Eigen::MatrixXd by_parameters, by_angles;  ///< [2, free], [2, prisms]
+
+  Linearised(const PrismTrain& train, const std::vector<FreeParameter>& free,
+             const std::vector<double>& rotation_angles, int beam)
+      : by_parameters(2, free.size()), by_angles(2, train.prisms()) {
+    with_prism_count(train.prisms(), [&]<int N>() {
+      const auto parameters = parameter_array<N>(train, beam);
+      const auto faces = face_order_array<N>(train);
+      std::array<double, N> rotation;
+      std::copy_n(rotation_angles.begin(), N, rotation.begin());
+      const auto result =
+          linearise_angles(prepare<double, N>(parameters, faces),
+                           prepare_derivatives<double, N>(parameters, faces), rotation);
+      angles = {result.angles.azimuth, result.angles.zenith};
+      by_parameters.setZero();
+      const std::array both{&result.azimuth, &result.zenith};
+      for (Eigen::Index row = 0; row < 2; ++row) {
+        const auto& gradient = *both[static_cast<std::size_t>(row)];
+        for (std::size_t i = 0; i < free.size(); ++i) {
+          for (const int at : free[i].places) {
+            by_parameters(row, static_cast<Eigen::Index>(i)) += derivative_by(gradient, at, beam);
+          }
+        }
+        for (std::size_t k = 0; k < N; ++k) {
+          by_angles(row, static_cast<Eigen::Index>(k)) = gradient.rotation_angles[k];
+        }
+      }
+    });
+  }
+};
+
 Result plain_filter(const Problem& s, const Case& c, const FilterReference* reference) {
   Result result;
   FilterState& state = result.state = s.first;
-  ResidualModel model(s.train, s.options.free);
   const auto prisms = static_cast<Eigen::Index>(s.train.prisms());
-  const Eigen::Index statics = model.d_parameters().cols(), size = statics + 2 * prisms;
+  const Eigen::Index statics = s.options.free.size(), size = statics + 2 * prisms;
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size, size);
   for (std::size_t n = 0; n < kShots; ++n) {
     const std::size_t shot = c.backwards ? kShots - 1 - n : n;
@@ -150,15 +182,16 @@ Result plain_filter(const Problem& s, const Case& c, const FilterReference* refe
       }
       std::vector<double> angles;
       for (Eigen::Index k = 0; k < prisms; ++k) angles.push_back(at[statics + 2 * k]);
-      model.set(at.head(statics));
-      model.linearise(angles, s.series.beam[shot]);
+      const Linearised model(with_free_values(s.train, s.options.free, at.head(statics)),
+                             s.options.free, angles, s.series.beam[shot]);
       Eigen::MatrixXd h = Eigen::MatrixXd::Zero(2, size);
-      h.leftCols(statics) = model.d_parameters();
-      for (Eigen::Index k = 0; k < prisms; ++k) h.col(statics + 2 * k) = model.d_angles().col(k);
+      h.leftCols(statics) = model.by_parameters;
+      for (Eigen::Index k = 0; k < prisms; ++k) h.col(statics + 2 * k) = model.by_angles.col(k);
       Eigen::VectorXd away = state.mean - at;
       for (Eigen::Index k = 0; k < prisms; ++k) away[statics + 2 * k + 1] = 0;
-      const Eigen::Vector2d innovation =
-          model.residual(s.series.azimuth[shot], s.series.zenith[shot]) - h * away;
+      const Eigen::Vector2d innovation{
+          wrap_to_pi(s.series.azimuth[shot] - model.angles[0]) - h.row(0) * away,
+          s.series.zenith[shot] - model.angles[1] - h.row(1) * away};
       Eigen::Matrix2d r = kNoise * kNoise * Eigen::Matrix2d::Identity();
       r(0, 0) += static_cast<double>(s.series.azimuth_rounding_variance[shot]);
       r(1, 1) += static_cast<double>(s.series.zenith_rounding_variance[shot]);

@@ -201,7 +201,7 @@ TEST(RotorTrajectory, CovariancesAreThoseOfTheParabolasDenseCovariance) {
             EXPECT_NEAR(t.angle_covariance(knot, rotor, static_cast<std::size_t>(b), seconds),
                         weights(a, angle).dot(dense[knot] * weights(b, angle)), 1e-12);
           }
-          EXPECT_NEAR(t.speed_variance(knot, rotor, seconds),
+          EXPECT_NEAR(polynomial_at(t.speed_variance_terms(knot, rotor), seconds),
                       weights(a, speed).dot(dense[knot] * weights(a, speed)), 1e-12);
         }
       }

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "risley/core/error.hpp"
-#include "risley/io/table_input.hpp"
 #include "risley/jobs/campaign_plan.hpp"
 #include "risley/report/report_file.hpp"
 #include "risley/scenes/scene.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/tables/table_input.hpp"
 
 #include "fuzz/invariants.hpp"
 #include "fuzz/memory_file.hpp"
@@ -75,17 +75,19 @@ void run_campaign_plan(std::span<const std::uint8_t> bytes) {
 /// Cells of a table that is accepted are of their columns' kinds, and no more than its bytes hold.
 void run_table(std::span<const std::uint8_t> bytes) {
   const MemoryFile file(bytes);
-  const std::vector<io::TableColumn> columns = {
-      {"input"}, {"exit_status", io::CellKind::integer}, {"wedge_angle_deg", io::CellKind::real}};
+  const std::vector<tables::TableColumn> columns = {{"input"},
+                                                    {"exit_status", tables::CellKind::integer},
+                                                    {"wedge_angle_deg", tables::CellKind::real}};
   try {
-    io::is_table(file.path());
-    const auto rows = io::read_table(file.path(), columns);
+    tables::is_table(file.path());
+    const auto rows = tables::read_table(file.path(), columns);
     require(rows.size() <= bytes.size(), "a row has a byte at least");
     for (const auto& row : rows) {
       require(row.size() == columns.size(), "a row has all columns");
       for (std::size_t k = 0; k < row.size(); ++k) {
-        require(row[k].index() == 0 || row[k].index() == (k == 0 ? io::TableCell("").index() : k),
-                "a cell is of its column's kind");
+        require(
+            row[k].index() == 0 || row[k].index() == (k == 0 ? tables::TableCell("").index() : k),
+            "a cell is of its column's kind");
       }
     }
   } catch (const Error&) {  // refused

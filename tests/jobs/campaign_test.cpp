@@ -16,8 +16,8 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/io/folder.hpp"
-#include "risley/io/sha256.hpp"
 
 #include "jobs/campaign_chunk.hpp"
 #include "refusal.hpp"
@@ -218,7 +218,7 @@ TEST_F(CampaignTest, CellsOfSettingsThatThePlanDoesNotHaveDoNotCount) {
   text.resize(text.rfind('\n', text.size() - 2) + 1);  // without the line of the hash
   const std::string name = "\"setting\":";
   text.insert(text.find_first_of("0123456789", text.find(name) + name.size()), "214748364");
-  text += "{\"sha256\": \"" + io::sha256(text) + "\"}\n";
+  text += "{\"sha256\": \"" + hashes::sha256(text) + "\"}\n";
   std::ofstream(chunk.file) << text;
   const CampaignResult merged = merge_chunks(all, file("a.csv"), options("a"));
   EXPECT_EQ(merged.done, 0U);

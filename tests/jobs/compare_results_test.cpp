@@ -13,10 +13,10 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
-#include "risley/io/table_file.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/compare_units.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/tables/table_file.hpp"
 
 #include "io/test_folder.hpp"
 
@@ -215,10 +215,10 @@ TEST_F(CompareResults, OfASeriesEachIsComparedWithTheOneBeforeAndTheFirst) {
 
 /// A table whose rows lead to results, as a fleet's.
 std::string table_of(const std::filesystem::path& path,
-                     const std::vector<std::vector<io::TableCell>>& rows) {
-  io::TableFile table(path.string(),
-                      {{"input"}, {"output"}, {"exit_status", io::CellKind::integer}, {"message"}},
-                      {});
+                     const std::vector<std::vector<tables::TableCell>>& rows) {
+  tables::TableFile table(
+      path.string(),
+      {{"input"}, {"output"}, {"exit_status", tables::CellKind::integer}, {"message"}}, {});
   for (const auto& row : rows) table.add(row);
   table.close();
   return path.string();
@@ -284,7 +284,7 @@ TEST_F(CompareResults, OfATableWithoutResultsSaysWhy) {
 }
 
 TEST_F(CompareResults, OfManyUnitsEachStandsBesideTheOthers) {
-  std::vector<std::vector<io::TableCell>> rows;
+  std::vector<std::vector<tables::TableCell>> rows;
   CompareUnitsOptions named;
   const auto add = [&](const std::string& name, const sensors::Sensor& sensor) {
     named.results.push_back(saved(name, sensor));

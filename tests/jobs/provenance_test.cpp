@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/sha256.hpp"
+#include "risley/hashes/sha256.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -42,7 +42,7 @@ TEST_F(InputHashesTest, AreThoseOfTheFilesInTheirOrderForEveryNumberOfThreads) {
       {"input_sha256", "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"},
       {"input_2", "in memory"},
       {"input_3", b},
-      {"input_3_sha256", io::sha256(std::string(3'000'000, 'x'))}};
+      {"input_3_sha256", hashes::sha256(std::string(3'000'000, 'x'))}};
   for (const int threads : {1, 2, 4}) {
     parallel::Threads(threads).run([&] {
       InputHashes hashes(inputs);

@@ -138,7 +138,6 @@ TEST(TimeAudit, ReturnsOfOneShotAreOneShot) {
   chunk.observations.return_number = {1, 2, 3, 1, 2, 3, 1, 2};
   chunk.observations.valid[1] = 0;
   chunk.observations.valid[2] = 0;
-  chunk.observations.tag = {0x00, 0x10, 0x20, 0x04, 0x15, 0xC2, 0x03, 0x30};
   const TimeAuditResult result = audit(chunk);
   EXPECT_EQ(result.observations, 8U);
   EXPECT_EQ(result.shots, 3U);
@@ -147,10 +146,6 @@ TEST(TimeAudit, ReturnsOfOneShotAreOneShot) {
   EXPECT_EQ(result.rows_by_return_number[1], 3U);
   EXPECT_EQ(result.rows_by_return_number[2], 3U);
   EXPECT_EQ(result.rows_by_return_number[3], 2U);
-  EXPECT_THAT(result.tags.position, ::testing::ElementsAre(5, 1, 1, 1));
-  EXPECT_THAT(result.tags.intensity, ::testing::ElementsAre(6, 2, 0, 0));
-  EXPECT_THAT(result.tags.echo, ::testing::ElementsAre(4, 2, 1, 1));
-  EXPECT_THAT(result.tags.reserved, ::testing::ElementsAre(7, 0, 0, 1));
 }
 
 TEST(TimeAudit, ExtremesAreThoseOfValidRows) {

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 
 namespace risley::report::chart_fields_test {
 

@@ -110,23 +110,6 @@ TEST(ErrorProcess, CovariancesOfManyTimesArePositive) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(all).eigenvalues().minCoeff(), 0);
 }
 
-TEST(ErrorModel, WritesWhatItReads) {
-  ErrorModel model = parse_error_model(kStated, "errors.yaml");
-  model.terms[1].sigma.reset();
-  model.terms[3].sigma = 1.0 / 3e4;
-  model.terms[3].source = "a: \"b\"";
-  const ErrorModel again = parse_error_model(error_model_text(model), "again.yaml");
-  EXPECT_EQ(again.sample_interval, 0.005);
-  for (std::size_t i = 0; i < kPoseErrors; ++i) {
-    EXPECT_EQ(again.terms[i].sigma, model.terms[i].sigma);
-    EXPECT_EQ(again.terms[i].white, model.terms[i].white);
-    EXPECT_EQ(again.terms[i].correlation_time, model.terms[i].correlation_time);
-    EXPECT_EQ(again.terms[i].source, model.terms[i].source);
-  }
-  const ErrorModel assumed = parse_error_model(error_model_text(assumed_error_model()), "a.yaml");
-  EXPECT_THAT(assumed.terms[2].source, HasSubstr("assumed"));
-}
-
 std::string mistake(const std::string& what, const std::string& by) {
   std::string text = kStated;
   const std::size_t at = text.find(what);
@@ -161,7 +144,6 @@ TEST(ErrorModel, EntriesRefuseWhatMakesNoSense) {
     ErrorModel model = parse_error_model(kStated, "errors.yaml");
     change(model);
     const std::string message = refusal([&] { require_error_model(model); });
-    EXPECT_EQ(message, refusal([&] { error_model_text(model); }));
     EXPECT_EQ(message, refusal([&] { ErrorProcess(model, t); }));
     return message;
   };

@@ -278,26 +278,13 @@ TEST(FlightPlan, MistakesAreToldWithTheirLine) {
   EXPECT_THAT(message("strips:\n", "strips: none\nx:\n"), HasSubstr("unknown field x"));
 }
 
-TEST(FlightPlan, StripTimesComeBackFromTheirFile) {
-  const std::vector<StripTimes> strips{{"a: \"b\", {c}", -5, 1'700'000'000'123'456'789},
-                                       {"strip 2", 1'700'000'000'123'456'789, 1LL << 61}};
-  const std::string text = strip_times_text(strips, TimeScale::utc_unix);
-  const auto again = parse_strip_times(text, "strips.yaml");
-  ASSERT_EQ(again.size(), 2u);
-  for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_EQ(again[i].name, strips[i].name);
-    EXPECT_EQ(again[i].begin_ns, strips[i].begin_ns);
-    EXPECT_EQ(again[i].end_ns, strips[i].end_ns);
-  }
-  EXPECT_TRUE(parse_strip_times(strip_times_text({}, TimeScale::gps), "none.yaml").empty());
-  for (const char* wrong :
-       {"strips: []", "risley_strips: 1\ntime_scale: gps\nstrips: 3",
-        "risley_strips: 1\ntime_scale: gps\nstrips: [{name: a, begin_ns: 5, end_ns: 4}]",
-        "risley_strips: 1\ntime_scale: gps\nstrips: [{name: a, begin_ns: 0.5, end_ns: 4}]",
-        "risley_strips: 1\ntime_scale: gps\nstrips: [{name: a, begin_ns: 1, end_ns: 4}, {name: b, "
-        "begin_ns: 3, end_ns: 9}]"}) {
-    EXPECT_THROW(parse_strip_times(wrong, "wrong.yaml"), FileError) << wrong;
-  }
+TEST(FlightPlan, StripTimesAreWritten) {
+  const std::vector<StripTimes> strips{{"a: \"b\", {c}", -5, 1'700'000'000'123'456'789}};
+  EXPECT_THAT(
+      strip_times_text(strips, TimeScale::utc_unix),
+      HasSubstr("risley_strips: 1\ntime_scale: utc-unix\nstrips:\n  - {name: \"a: \\\"b\\\", "
+                "{c}\", begin_ns: -5, end_ns: 1700000000123456789}\n"));
+  EXPECT_THAT(strip_times_text({}, TimeScale::gps), HasSubstr("strips: []\n"));
 }
 
 TEST(FlightPlan, RefusesPlansThatMakeNoSense) {

@@ -42,7 +42,7 @@ struct FlightForecast : FlightJudgement {
   std::vector<std::uint64_t> strip_shots;  ///< used, that end on the terrain
   std::uint64_t fired = 0, shots = 0;      ///< of all strips: fired, and ending on the terrain
   std::size_t used = 0;                    ///< of these: on ground that several strips see
-  std::size_t cells = 0, rough_cells = 0, steep_cells = 0;
+  std::size_t cells = 0, rough_cells = 0;
   double cell_size = 0;     ///< m
   double knot_spacing = 0;  ///< s
   double rate = 0;          ///< shots per second

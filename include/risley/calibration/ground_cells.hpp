@@ -39,9 +39,9 @@ struct GroundCellOptions {
 /// Squares of a map's grid that several strips have seen, each with a plane of its own.
 struct GroundCells {
   std::vector<GroundPlane> planes;
-  PlaneOfShot plane;                 ///< of every shot
-  double scatter = 0;                ///< of the points about the planes, robust 1 sigma, m
-  std::size_t rough = 0, steep = 0;  ///< cells left out
+  PlaneOfShot plane;      ///< of every shot
+  double scatter = 0;     ///< of the points about the planes, robust 1 sigma, m
+  std::size_t rough = 0;  ///< cells left out, those too rough
 };
 
 /// Sorts points into cells and fits a plane to each that takes no notice of strays: weights fall

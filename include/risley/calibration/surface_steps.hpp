@@ -33,8 +33,7 @@ struct SurfaceReport {
   /// Mean square of cell means over their variances, less the step regions and the cells beside
   /// them: 1 for a flat wall.
   double unevenness = 1;
-  std::size_t cells = 0;      ///< that had enough points
-  double unevenness_rms = 0;  ///< of the cell means beyond what noise explains, m
+  std::size_t cells = 0;  ///< that had enough points
 };
 
 /// Cells are this wide, rad (1 degree): smaller ones have too few points at 1 kHz.

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <vector>
 
 namespace risley {
 
@@ -19,6 +20,28 @@ inline double median(std::span<double> values) {
   std::nth_element(values.begin(), middle, values.end());
   if (values.size() % 2 == 1) return *middle;
   return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+/// What stands at a place once the values are in order, counted from 0. Orders the values anew.
+template <class T>
+T nth_value(std::vector<T>& values, std::size_t place) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// The middle value, of two the greater; there must be one. Orders the values anew.
+template <class T>
+T upper_median(std::vector<T>& values) {
+  return nth_value(values, values.size() / 2);
+}
+
+/// The value that this share of the others is below, without interpolation; there must be one.
+/// Orders the values anew.
+template <class T>
+T quantile(std::vector<T>& values, double share) {
+  return nth_value(values,
+                   static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));
 }
 
 }  // namespace risley

@@ -73,8 +73,6 @@ struct RotorTrajectory {
   /// Variance of the speed of one rotor as a polynomial in the seconds from a knot: (rad/s)^2 times
   /// s^0, s^-1, s^-2.
   std::array<double, 3> speed_variance_terms(std::size_t knot, std::size_t rotor) const;
-  /// Variance of the speed of one rotor, (rad/s)^2, seconds from a knot.
-  double speed_variance(std::size_t knot, std::size_t rotor, double seconds) const;
 
  private:
   double covariance_entry(std::size_t knot, std::size_t row, std::size_t column) const;

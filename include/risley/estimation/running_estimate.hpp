@@ -81,7 +81,6 @@ struct RunningState {
   double window = 0;                         ///< s of shots that the parameters come from
   std::int64_t time_ns = 0;                  ///< of the last shot of the last piece
   std::uint64_t shots = 0;                   ///< with a direction
-  std::uint64_t used_shots = 0;              ///< that are left after thinning
   std::uint64_t pieces = 0;                  ///< that were estimated
   std::uint64_t short_pieces = 0;            ///< with too few shots, or cut off by a gap
   std::uint64_t unfit_pieces = 0;  ///< whose shots the model does not describe, or not settled

@@ -6,6 +6,7 @@
 #include <functional>
 #include <initializer_list>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -68,8 +69,21 @@ class YamlMap {
   /// @throws FileError with value, unit and range unless lower <= number <= upper
   long double number(std::string_view key, long double lower, long double upper,
                      std::string_view unit) const;
+  /// The same as a double. @param absent  what its absence means, where it may be absent
+  double real(std::string_view key, long double lower, long double upper, std::string_view unit,
+              std::optional<double> absent = {}) const;
+  /// A list of so many numbers, or of any number but none for 0, each within the limits.
+  std::vector<double> reals(std::string_view key, std::size_t count, long double lower,
+                            long double upper, std::string_view unit) const;
   /// As number(), for a whole number without unit.
   int integer(std::string_view key, int lower, int upper) const;
+
+  /// A text that is not empty, such as a source.
+  std::string words(std::string_view key) const;
+  /// The map below a key.
+  YamlMap section(std::string_view key) const;
+  /// The maps of a list, which may be absent.
+  std::vector<YamlMap> maps(std::string_view key) const;
 
   /// Whether an entry is "yes"; otherwise it has to be "no".
   /// @param absent  what its absence means

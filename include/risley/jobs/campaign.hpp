@@ -137,7 +137,7 @@ struct CampaignResult {
 /// with a row for each cell, each once and in order. A file that is damaged or was made of another
 /// plan or by another program does not count, and a warning says so. Memory does not grow with the
 /// number of cells.
-/// @param table  its ending chooses the format, see io::TableFile
+/// @param table  its ending chooses the format, see tables::TableFile
 /// @throws InvalidArgument for another ending; FileError, also where there is no chunk; Cancelled
 CampaignResult merge_chunks(const CampaignPlan& plan, const std::string& table,
                             const CampaignOptions& options, const Progress& progress = {});

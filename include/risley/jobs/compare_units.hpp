@@ -14,8 +14,8 @@ namespace risley::jobs {
 
 /// The results that are compared, and how rarely chance may be taken for a change.
 struct CompareUnitsOptions {
-  /// As load_result(), in order of time; also tables of results (io::is_table()), of which each row
-  /// without a failure stands for the result in its `output`.
+  /// As load_result(), in order of time; also tables of results (tables::is_table()), of which each
+  /// row without a failure stands for the result in its `output`.
   std::vector<std::string> results;
   /// Probability that at least one pair of results is called changed where nothing changed, and
   /// that at least one unit is called an outlier where none is one, each.

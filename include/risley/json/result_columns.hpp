@@ -7,8 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "risley/io/table_file.hpp"
 #include "risley/json/results.hpp"
+#include "risley/tables/table_file.hpp"
 
 namespace risley::json {
 
@@ -23,13 +23,13 @@ class ResultColumns {
   void note(const Json& result);
 
   /// Names, kinds, units and descriptions.
-  std::vector<io::TableColumn> columns() const;
+  std::vector<tables::TableColumn> columns() const;
   /// One cell per column; what a result does not have, or has of another kind, is empty.
-  std::vector<io::TableCell> cells(const Json& result) const;
+  std::vector<tables::TableCell> cells(const Json& result) const;
 
  private:
   struct Column {
-    io::TableColumn shown;
+    tables::TableColumn shown;
     std::vector<std::string> places;  ///< JSON pointers, of which the first with a value counts
     bool used = false;
   };

@@ -115,38 +115,6 @@ BeamPathAdjoint<T, N> beam_path_adjoint(const Trace<T, N>& trace, const BeamPath
   return out;
 }
 
-/// A point at some range along the beam and how two of its components depend on everything: those
-/// along two vectors across the beam. Its third component moves by less than a hundredth of a
-/// degree's worth of the beam's origin and is left out.
-template <ModelScalar T, int N>
-struct PointLinearisation {
-  std::array<Gradient<T, N>, 2> across;
-  std::array<std::array<T, 2 * N>, 2> face_position;  ///< d component / d position of each face
-};
-
-/// @param across  two vectors [3], perpendicular to the beam and to each other
-/// @param range   from the origin, m
-template <ModelScalar T, int N>
-PointLinearisation<T, N> linearise_point(const PreparedTrain<T, N>& train,
-                                         const PreparedDerivatives<T, N>& derivatives,
-                                         const Trace<T, N>& trace, const BeamPath<T, N>& path,
-                                         const std::array<T, 2 * N>& face_position,
-                                         const std::array<Vector3<T>, 2>& across, const T& range) {
-  std::array<BeamPathAdjoint<T, N>, 2> paths;
-  for (std::size_t r = 0; r < 2; ++r) {
-    paths[r] = beam_path_adjoint(trace, path, face_position, across[r]);
-  }
-  PointLinearisation<T, N> out;
-  out.across = trace_adjoint(
-      train, derivatives, trace, std::array<Vector3<T>, 2>{range * across[0], range * across[1]},
-      [&paths](std::size_t face, std::size_t r, Vector3<T>& beam, Vector3<T>& normal) {
-        beam = beam + paths[r].incident[face];
-        normal = normal + paths[r].normal[face];
-      });
-  for (std::size_t r = 0; r < 2; ++r) out.face_position[r] = paths[r].face_position;
-  return out;
-}
-
 /// A beam as a line in space.
 struct Ray {
   Vector3<double> origin;     ///< where it leaves the last face, m, sensor frame

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace risley::recordings {
@@ -101,6 +102,21 @@ inline constexpr std::uint8_t kMid40 = 1,  ///< Mid-40
     kHorizon = 3,                          ///< Horizon
     kMid70 = 6,                            ///< Mid-70
     kAvia = 7;                             ///< Avia
+/// A type of Livox's first generation of sensors.
+struct LivoxType {
+  std::uint8_t number;    ///< Device::type
+  std::string_view name;  ///< "Mid-40"
+  bool fast;              ///< 240,000 shots a second instead of 100,000, and inertial samples
+};
+/// All of them.
+inline constexpr std::array kLivoxTypes{
+    LivoxType{kMid40, "Mid-40", false}, LivoxType{kTele15, "Tele-15", true},
+    LivoxType{kHorizon, "Horizon", true}, LivoxType{kMid70, "Mid-70", false},
+    LivoxType{kAvia, "Avia", true}};
+/// One by its number, or nullptr.
+const LivoxType* livox_type(std::uint8_t number);
+/// "1 (Mid-40), 2 (Tele-15), ...": what messages allow.
+std::string livox_types_text();
 /// Device::type of a sensor about which a format tells nothing, or only that it is no Mid-40.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;
 

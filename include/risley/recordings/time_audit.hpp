@@ -27,14 +27,6 @@ struct TimeGaps {
   std::uint64_t largest_at_row = 0;   ///< first row after it, from 0
 };
 
-/// Rows by the four fields of the tag byte, each with the values 0 to 3.
-struct TagCounts {
-  std::array<std::uint64_t, 4> position{};   ///< bits 0-1: noise by position
-  std::array<std::uint64_t, 4> intensity{};  ///< bits 2-3: noise by intensity
-  std::array<std::uint64_t, 4> echo{};       ///< bits 4-5: number of the echo
-  std::array<std::uint64_t, 4> reserved{};   ///< bits 6-7
-};
-
 /// What a recording holds and how sound its times are.
 struct TimeAuditResult {
   std::uint64_t observations = 0;  ///< rows: one per return
@@ -55,7 +47,6 @@ struct TimeAuditResult {
   std::optional<ValueRange> azimuth, zenith;  ///< of valid rows, rad
   std::optional<ValueRange> range;            ///< of valid rows that have one, m
   std::array<std::uint64_t, 256> rows_by_return_number{};
-  TagCounts tags;
   std::vector<std::uint64_t> rows_by_device;            ///< up to the last device with rows
   std::array<std::uint64_t, 9> packets_by_data_type{};  ///< data types 0 to 8
   std::uint64_t imu = 0;                                ///< inertial samples

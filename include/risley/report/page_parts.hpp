@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 
 #include "risley/optics/parameters.hpp"
-#include "risley/report/charts.hpp"
+#include "risley/report/chart.hpp"
 #include "risley/report/report_facts.hpp"
 
 namespace risley::report {

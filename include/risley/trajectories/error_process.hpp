@@ -64,10 +64,6 @@ ErrorModel parse_error_model(const std::string& text, const std::string& path);
 /// parse_error_model of a file. @throws FileError
 ErrorModel load_error_model(const std::string& path);
 
-/// The file of a model; reading it gives the same bits.
-/// @throws InvalidArgument as require_error_model
-std::string error_model_text(const ErrorModel& model);
-
 /// @throws InvalidArgument for sigmas below 0, correlation times that are not above 0, white parts
 ///         without a sample interval and what is not finite
 void require_error_model(const ErrorModel& model);

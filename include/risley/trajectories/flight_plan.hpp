@@ -60,16 +60,8 @@ struct StripTimes {
   std::int64_t begin_ns = 0, end_ns = 0;
 };
 
-/// Reads strips: [{name, begin_ns, end_ns}] beside risley_strips: 1 and time_scale, ordered by
-/// time.
-/// @param path  for messages only
-/// @throws FileError with the line for anything else
-std::vector<StripTimes> parse_strip_times(const std::string& text, const std::string& path);
-
-/// parse_strip_times of a file. @throws FileError
-std::vector<StripTimes> load_strip_times(const std::string& path);
-
-/// The file of strips. @param scale  of their times
+/// The file of strips: [{name, begin_ns, end_ns}] beside risley_strips: 1 and time_scale.
+/// @param scale  of their times
 std::string strip_times_text(const std::vector<StripTimes>& strips, TimeScale scale);
 
 /// A flight as it was flown.

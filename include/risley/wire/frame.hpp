@@ -45,8 +45,6 @@ enum class FrameFault : std::uint8_t {
   type,             ///< neither command, reply nor message
   checksum,         ///< CRC-32
 };
-/// Number of FrameFault's values.
-inline constexpr std::size_t kFrameFaults = 7;
 
 /// What was expected and what was found.
 struct FrameRefusal {

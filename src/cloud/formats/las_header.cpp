@@ -48,12 +48,6 @@ std::string plain(std::string text) {
 
 std::string system_identifier(const CloudHeader& header) {
   std::string text = header.sensor.empty() ? "OTHER" : header.sensor;
-  for (const std::string_view model : {"mid-40", "mid-70", "avia", "horizon", "tele-15"}) {
-    if (!text.starts_with(model)) continue;
-    text[0] = static_cast<char>(text[0] - 'a' + 'A');
-    text.insert(0, "Livox ");
-    break;
-  }
   if (!header.serial.empty()) text += " " + header.serial;
   return plain(text.substr(0, 32));
 }

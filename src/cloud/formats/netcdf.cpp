@@ -3,7 +3,7 @@
 // NetCDF-4 after the CF conventions: one variable per field along the dimension "point", loadings
 // along "point" and "factor". Equal points give equal bytes, in whatever pieces they are written:
 // only whole blocks go to the file.
-#include "risley/io/netcdf.hpp"
+#include "risley/tables/netcdf.hpp"
 
 #include <algorithm>
 #include <array>
@@ -90,9 +90,9 @@ class NetcdfWriter final : public CloudWriter {
   /// @param value  of one entry: value(points, point, column), column in [0, width)
   /// @param inner  dimension of the columns, if there are several
   template <class T, class Value>
-  io::NetcdfVariable define(const Description& what, Value value,
-                            const io::NetcdfDimension* inner = nullptr) {
-    const io::NetcdfStorage storage{kChunkRows, true, false};
+  tables::NetcdfVariable define(const Description& what, Value value,
+                                const tables::NetcdfDimension* inner = nullptr) {
+    const tables::NetcdfStorage storage{kChunkRows, true, false};
     auto variable = inner == nullptr ? file_.define<T>(what.name, {&point_}, storage)
                                      : file_.define<T>(what.name, {&point_, inner}, storage);
     file_.put_text(variable, "units", what.units);
@@ -116,8 +116,8 @@ class NetcdfWriter final : public CloudWriter {
 
   /// As define, with the attribute that leads to the coordinates.
   template <class T, class Value>
-  io::NetcdfVariable define_data(const Description& what, Value value,
-                                 const io::NetcdfDimension* inner = nullptr) {
+  tables::NetcdfVariable define_data(const Description& what, Value value,
+                                     const tables::NetcdfDimension* inner = nullptr) {
     auto variable = define<T>(what, value, inner);
     file_.put_text(variable, "coordinates", "time x_m y_m z_m");
     return variable;
@@ -209,7 +209,7 @@ class NetcdfWriter final : public CloudWriter {
                           {"east", list(errors.axes_from_ned[1])},
                           {"down", list(errors.axes_from_ned[2])}});
     const auto record = file_.define_dimension("trajectory_record", errors.time_ns.size());
-    const io::NetcdfStorage storage{0, true, false};
+    const tables::NetcdfStorage storage{0, true, false};
     trajectory_.push_back(file_.define<std::int64_t>("trajectory_time_ns", {&record}, storage));
     file_.put_text(trajectory_.back(), "units", "ns");
     file_.put_text(trajectory_.back(), "long_name", "time of a place of the trajectory");
@@ -288,12 +288,12 @@ class NetcdfWriter final : public CloudWriter {
     rows_ = 0;
   }
 
-  io::NetcdfOutput file_;
-  io::NetcdfDimension point_;
+  tables::NetcdfOutput file_;
+  tables::NetcdfDimension point_;
   std::vector<Variable> variables_;
-  std::vector<io::NetcdfVariable> trajectory_;  ///< time, x, y, z, sigmas
-  std::size_t rows_ = 0;                        ///< in the block
-  std::size_t written_ = 0;                     ///< in the file
+  std::vector<tables::NetcdfVariable> trajectory_;  ///< time, x, y, z, sigmas
+  std::size_t rows_ = 0;                            ///< in the block
+  std::size_t written_ = 0;                         ///< in the file
 };
 
 }  // namespace

@@ -379,9 +379,8 @@ void Lvx11Writer::start_packet(std::size_t device, std::int64_t time_ns, std::ui
   const auto grid = shot_grid(table.type, header.data_type);
   if (!grid) {
     throw InvalidArgument(fmt::format(
-        "device {} has the type {} ({}), whose shot rate LVX readers cannot know; allowed 1 "
-        "(Mid-40), 2 (Tele-15), 3 (Horizon), 6 (Mid-70), 7 (Avia)",
-        device, table.type, device_type_name(table.type)));
+        "device {} has the type {} ({}), whose shot rate LVX readers cannot know; allowed {}",
+        device, table.type, device_type_name(table.type), livox_types_text()));
   }
   packet.grid = *grid;
   check_pps(device, header, time_ns, row_number);

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/median.hpp"
 #include "risley/core/saturating.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/seconds.hpp"
@@ -53,9 +54,7 @@ double median_step(const std::vector<Decimal>& samples) {
     if (step > 0.0) steps.push_back(step);
   }
   if (steps.empty()) return 0.0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return upper_median(steps);
 }
 
 }  // namespace

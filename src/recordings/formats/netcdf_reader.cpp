@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/netcdf.hpp"
 #include "risley/recordings/livox/packet.hpp"
+#include "risley/tables/netcdf.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/netcdf_layout.hpp"
@@ -18,7 +18,7 @@
 namespace risley::recordings::netcdf {
 namespace {
 
-using Variables = std::map<std::string_view, io::NetcdfVariable>;
+using Variables = std::map<std::string_view, tables::NetcdfVariable>;
 
 /// As many as the columns of rows can name.
 constexpr std::size_t kMostDevices = std::size_t{std::numeric_limits<std::uint8_t>::max()} + 1;
@@ -26,9 +26,9 @@ constexpr std::uint32_t kMostReturns = std::numeric_limits<std::uint8_t>::max();
 
 /// Finds the variables of one table, and refuses a file whose variables are not of this layout.
 struct RequireColumns {
-  const io::NetcdfInput& file;
+  const tables::NetcdfInput& file;
   Variables& variables;
-  const io::NetcdfDimension& dimension;
+  const tables::NetcdfDimension& dimension;
   std::size_t block;  ///< entries that are read together
 
   template <class T>
@@ -44,7 +44,7 @@ struct RequireColumns {
 
 /// Reads entries [start, start + count) into the columns.
 struct GetColumns {
-  const io::NetcdfInput& file;
+  const tables::NetcdfInput& file;
   const Variables& variables;
   std::size_t start, count;
 
@@ -264,7 +264,7 @@ class NetcdfReader final : public Reader {
     chunk.imu.resize(samples);
   }
 
-  io::NetcdfInput file_;
+  tables::NetcdfInput file_;
   Variables variables_;
   std::size_t row_count_ = 0, packet_count_ = 0, imu_count_ = 0;
   std::size_t row_ = 0, imu_sample_ = 0, packets_read_ = 0, next_packet_ = 0;

@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/io/netcdf.hpp"
 #include "risley/recordings/livox/packet.hpp"
+#include "risley/tables/netcdf.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/netcdf_layout.hpp"
@@ -21,21 +21,21 @@
 namespace risley::recordings::netcdf {
 namespace {
 
-using Variables = std::map<std::string_view, io::NetcdfVariable>;
-using Dimensions = std::map<std::string_view, io::NetcdfDimension>;
+using Variables = std::map<std::string_view, tables::NetcdfVariable>;
+using Dimensions = std::map<std::string_view, tables::NetcdfDimension>;
 
 /// Defines variables of one table, whose entries run along `dimension`.
 /// @param block  entries per compressed block; 0 for a table of fixed length, kept in one piece
 struct DefineColumns {
-  io::NetcdfOutput& file;
+  tables::NetcdfOutput& file;
   Variables& variables;
   const Dimensions& inner;
-  const io::NetcdfDimension& dimension;
+  const tables::NetcdfDimension& dimension;
   std::size_t block;
 
   template <class T>
   void operator()(const NetcdfColumn& column, const std::vector<T>&) const {
-    const io::NetcdfStorage storage{block, block > 0, block > 0};
+    const tables::NetcdfStorage storage{block, block > 0, block > 0};
     const auto variable =
         column.inner_dimension == nullptr
             ? file.define<T>(column.name, {&dimension}, storage)
@@ -48,7 +48,7 @@ struct DefineColumns {
 
 /// Writes entries [offset, offset + count) of the given columns at entry `start` of the file.
 struct PutColumns {
-  io::NetcdfOutput& file;
+  tables::NetcdfOutput& file;
   const Variables& variables;
   std::size_t start, offset, count;
 
@@ -233,7 +233,7 @@ class NetcdfWriter final : public Writer {
     });
   }
 
-  io::NetcdfOutput file_;
+  tables::NetcdfOutput file_;
   Variables variables_;
   Observations rows_;
   std::vector<Packet> packets_;

@@ -50,23 +50,16 @@ std::uint8_t data_type_of(bool cartesian, bool tagged, int returns) {
 
 std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_type) {
   if (data_type < 2) return kGrid100kHz;
-  switch (device_type) {
-    case kMid40:
-    case kMid70:
-      return kGrid100kHz;
-    case kTele15:
-    case kHorizon:
-    case kAvia:
-      return kGrid240kHz;
-    default:
-      break;
+  if (const LivoxType* type = livox_type(device_type)) {
+    return type->fast ? kGrid240kHz : kGrid100kHz;
   }
   if (data_type > kImuDataType) return kGrid240kHz;  // only the Avia has three returns
   return std::nullopt;
 }
 
 bool has_imu(std::uint8_t device_type) {
-  return device_type == kAvia || device_type == kHorizon || device_type == kTele15;
+  const LivoxType* type = livox_type(device_type);
+  return type != nullptr && type->fast;
 }
 
 std::optional<ShotGrid> grid_of_firmware(std::string_view firmware) {

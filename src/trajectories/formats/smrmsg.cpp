@@ -8,6 +8,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/io/block_file.hpp"
 #include "risley/io/little_endian.hpp"
@@ -161,9 +162,7 @@ void add_accuracies(Trajectory& trajectory, const AccuracyRecords& accuracies,
   for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
   std::int64_t margin = 0;
   if (!steps.empty()) {
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), middle, steps.end());
-    margin = 2 * *middle;
+    margin = 2 * upper_median(steps);
   }
   const std::int64_t first = trajectory.time_ns.front() - shift;
   const std::int64_t last = trajectory.time_ns.back() - shift;

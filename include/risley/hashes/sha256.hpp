@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "risley/core/progress.hpp"
+
+namespace risley::hashes {
+
+/// SHA-256 of a file's bytes as 64 hexadecimal digits. @throws FileError, Cancelled
+std::string sha256_of_file(const std::string& path, const Progress& progress = {});
+
+/// SHA-256 of a text as 64 hexadecimal digits.
+std::string sha256(std::string_view text);
+
+/// SHA-256 of a text in base64, as browsers take it.
+std::string sha256_base64(std::string_view text);
+
+}  // namespace risley::hashes
