@@ -82,7 +82,6 @@ void read(benchmark::State& state, const char* ending) {
 BENCHMARK_CAPTURE(read, lvx, ".lvx")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read, netcdf, ".nc")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read, sequence_csv, ".sequence.csv")->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(read, openpylivox_bin, ".bin")->Unit(benchmark::kMillisecond);
 
 void audit(benchmark::State& state, const char* ending) {
   const Recording recording(ending);

@@ -36,7 +36,6 @@ const std::vector<Ending>& endings() {
       });
       if (!known) list.push_back(ending);
     };
-    add({".openpylivox.bin", &kOpenpylivoxBinFormat, ""});
     add({".openpylivox.csv", &kOpenpylivoxCsvFormat, ""});
     add({".sequence.csv", &kScanSequenceCsvFormat, ""});
     add({kSharedEnding, &kOpenpylivoxCsvFormat, " (recordings with ranges)"});

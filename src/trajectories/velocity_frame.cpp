@@ -20,65 +20,31 @@ using Eigen::Vector3d;
 constexpr std::array kCandidates{
     VelocityAxes::north_east_down,
     VelocityAxes::east_north_up,
-    VelocityAxes::north_west_up,
-    VelocityAxes::north_east_up,
     VelocityAxes::north_west_up_wander,
-    VelocityAxes::north_east_down_wander,
-    VelocityAxes::east_north_up_wander,
     VelocityAxes::body,
     VelocityAxes::body_up,
-    VelocityAxes::level,
-    VelocityAxes::level_up,
 };
 
 constexpr std::size_t kFewestRecords = 10, kMostSpans = 2000, kMostSteps = 400;
 constexpr double kWantedSpan_ns = 1e9, kSpansOfAll = 5, kGapSteps = 3.5;
 
-bool uses_wander(VelocityAxes axes) {
-  return axes == VelocityAxes::north_west_up_wander ||
-         axes == VelocityAxes::north_east_down_wander || axes == VelocityAxes::east_north_up_wander;
-}
-
-/// Rotation about the vertical among north, east, down: its x axis is at this azimuth.
-Matrix3d at_azimuth(double azimuth) {
-  Matrix3d turn;
-  turn << std::cos(azimuth), -std::sin(azimuth), 0, std::sin(azimuth), std::cos(azimuth), 0, 0, 0,
-      1;
-  return turn;
-}
-
 /// North, east, down of a velocity of a file.
 /// @param wander  rad  @param body  ned from body
 Vector3d ned_of(VelocityAxes axes, const Vector3d& v, double wander,
                 const Eigen::Quaterniond& body) {
-  const auto heading = [&] {
-    const Vector3d nose = body * Vector3d::UnitX();
-    return std::atan2(nose.y(), nose.x());
-  };
   switch (axes) {
     case VelocityAxes::north_east_down:
     case VelocityAxes::frame:
       return v;
     case VelocityAxes::east_north_up:
       return {v.y(), v.x(), -v.z()};
-    case VelocityAxes::north_west_up:
-      return {v.x(), -v.y(), -v.z()};
-    case VelocityAxes::north_east_up:
-      return {v.x(), v.y(), -v.z()};
     case VelocityAxes::north_west_up_wander:
-      return at_azimuth(-wander) * Vector3d(v.x(), -v.y(), -v.z());
-    case VelocityAxes::north_east_down_wander:
-      return at_azimuth(-wander) * v;
-    case VelocityAxes::east_north_up_wander:
-      return at_azimuth(-wander) * Vector3d(v.y(), v.x(), -v.z());
+      return {std::cos(wander) * v.x() - std::sin(wander) * v.y(),
+              -std::sin(wander) * v.x() - std::cos(wander) * v.y(), -v.z()};
     case VelocityAxes::body:
       return body * v;
     case VelocityAxes::body_up:
       return body * Vector3d(v.x(), -v.y(), -v.z());
-    case VelocityAxes::level:
-      return at_azimuth(heading()) * v;
-    case VelocityAxes::level_up:
-      return at_azimuth(heading()) * Vector3d(v.x(), -v.y(), -v.z());
   }
   return v;
 }
@@ -180,24 +146,12 @@ std::string_view words_of(VelocityAxes axes) {
       return "north-east-down";
     case VelocityAxes::east_north_up:
       return "east-north-up";
-    case VelocityAxes::north_west_up:
-      return "north-west-up";
-    case VelocityAxes::north_east_up:
-      return "north-east-up";
     case VelocityAxes::north_west_up_wander:
       return "north-west-up, turned by the wander angle";
-    case VelocityAxes::north_east_down_wander:
-      return "north-east-down, turned by the wander angle";
-    case VelocityAxes::east_north_up_wander:
-      return "east-north-up, turned by the wander angle";
     case VelocityAxes::body:
       return "forward-right-down of the body";
     case VelocityAxes::body_up:
       return "forward-left-up of the body";
-    case VelocityAxes::level:
-      return "forward-right-down, levelled";
-    case VelocityAxes::level_up:
-      return "forward-left-up, levelled";
     case VelocityAxes::frame:
       return "axes of the frame";
   }
@@ -214,9 +168,6 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
                                  [](const Vector3d& v) { return v.isZero(0); });
   const bool few = trajectory.size() < kFewestRecords;
   std::vector<VelocityAxes> tried(kCandidates.begin(), kCandidates.end());
-  const bool wanders =
-      std::any_of(wander.begin(), wander.end(), [](double angle) { return angle != 0; });
-  if (!wanders) std::erase_if(tried, uses_wander);
   if (stated == VelocityAxes::frame) tried.push_back(VelocityAxes::frame);
   Comparison comparison;
   if (!few && !still) comparison = compare(trajectory, wander, tried);
@@ -282,7 +233,7 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
   if (total(best) > largest) {
     drop(
         fmt::format("none of {} frames fits the change of the positions: with the best, {}, they "
-                    "differ by {} (north, east, down)",
+                    "differ by {} (north, east, down); the columns of a CSV state theirs",
                     candidates.size(), words_of(best.first), in_mm(*found.residual)));
     return;
   }

@@ -14,16 +14,10 @@ namespace risley::trajectories {
 enum class VelocityAxes : std::uint8_t {
   north_east_down,
   east_north_up,
-  north_west_up,
-  north_east_up,
-  north_west_up_wander,  ///< north turned by the wander angle
-  north_east_down_wander,
-  east_north_up_wander,
-  body,      ///< forward, right, down
-  body_up,   ///< forward, left, up
-  level,     ///< forward within the horizon, right, down
-  level_up,  ///< forward within the horizon, left, up
-  frame,     ///< those of the trajectory itself
+  north_west_up_wander,  ///< north turned by the wander angle, as Applanix writes them
+  body,                  ///< forward, right, down
+  body_up,               ///< forward, left, up
+  frame,                 ///< those of the trajectory itself
 };
 
 /// "north-west-up, turned by the wander angle"

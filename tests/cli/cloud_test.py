@@ -135,8 +135,6 @@ class CloudTest(CommandTest):
             found = self.cloud("wall.nc", f"format.{ending}")
             self.assertEqual(found["points"], 15000 - found["outliers"])
             self.assertTrue((self.folder / f"format.{ending}").stat().st_size > 15000)
-        self.assertEqual(self.cloud("wall.nc", "old.las", "--format", "las-1.2")["format"],
-                         "las-1.2")
 
     def test_common_factors_are_named_and_written(self):
         found = self.cloud("wall.nc", "factors.csv", "--common-factors", "yes")

@@ -72,21 +72,20 @@ class ShareTest(CommandTest):
         self.assertEqual(self.names(), before | {"own.nc"})
 
     def test_a_cloud_is_a_recording(self):
-        for version in ("las-1.4", "las-1.2"):
-            cloud = self.expect_json(0, "cloud", "short.lvx", "--calibration", SENSOR, "--format",
-                                     version, "-o", "cloud.las")
-            info = self.expect_json(0, "info", "cloud.las")
-            self.assertEqual(info["format"], "las")
-            self.assertEqual(info["observations"], cloud["points"])
-            self.assertEqual(info["sensor"], "Livox Mid-40")
-            self.assertEqual(info["devices"][0]["serial"], self.serial)
-            self.assertEqual(info["warnings"], [])
-            original = self.expect_json(0, "info", "short.lvx")
-            for key in ("first_time_ns", "last_time_ns", "time_resets", "gaps"):
-                self.assertEqual(info[key], original[key], key)
-            for key, tolerance in (("range_m", 0.05), ("azimuth_deg", 0.1), ("zenith_deg", 0.1)):
-                for end in ("min", "max"):
-                    self.assertAlmostEqual(info[key][end], original[key][end], delta=tolerance)
+        cloud = self.expect_json(0, "cloud", "short.lvx", "--calibration", SENSOR, "-o",
+                                 "cloud.las")
+        info = self.expect_json(0, "info", "cloud.las")
+        self.assertEqual(info["format"], "las")
+        self.assertEqual(info["observations"], cloud["points"])
+        self.assertEqual(info["sensor"], "Livox Mid-40")
+        self.assertEqual(info["devices"][0]["serial"], self.serial)
+        self.assertEqual(info["warnings"], [])
+        original = self.expect_json(0, "info", "short.lvx")
+        for key in ("first_time_ns", "last_time_ns", "time_resets", "gaps"):
+            self.assertEqual(info[key], original[key], key)
+        for key, tolerance in (("range_m", 0.05), ("azimuth_deg", 0.1), ("zenith_deg", 0.1)):
+            for end in ("min", "max"):
+                self.assertAlmostEqual(info[key][end], original[key][end], delta=tolerance)
 
     def test_directions_survive_a_cloud_and_an_excerpt_of_it(self):
         # Reported directions from the origin, in millimetres as a Cartesian recording has them.

@@ -16,8 +16,8 @@
 
 #include <fmt/format.h>
 
-/// A strict reader of LAS 1.2 (point format 1) and LAS 1.4 (point format 6), from the ASPRS
-/// specifications and not from the writer: every rule that a file can be held to is checked.
+/// A strict reader of LAS 1.4 (point format 6), from the ASPRS specification and not from the
+/// writer: every rule that a file can be held to is checked.
 namespace risley::cloud::las_checker {
 
 struct Record {
@@ -41,7 +41,6 @@ struct Point {
 };
 
 struct File {
-  int minor_version = 0;
   bool gps_time = false, wkt = false;
   std::string system_identifier, generating_software;
   int creation_day = 0, creation_year = 0;
@@ -128,17 +127,15 @@ class Checker {
   }
 
   void read_header() {
-    require(bytes_.size() >= 227, "shorter than a header");
+    require(bytes_.size() >= kHeaderBytes, "shorter than a header");
     require(std::memcmp(bytes_.data(), "LASF", 4) == 0, "wrong signature");
     require(number<std::uint8_t>(24) == 1, "major version");
-    file_.minor_version = number<std::uint8_t>(25);
-    require(file_.minor_version == 2 || file_.minor_version == 4, "minor version");
-    modern_ = file_.minor_version == 4;
+    require(number<std::uint8_t>(25) == 4, "minor version");
 
     const int encoding = number<std::uint16_t>(6);
     file_.gps_time = (encoding & 1) != 0;
     file_.wkt = (encoding & 16) != 0;
-    require((encoding & ~(modern_ ? 0x1f : 0x01)) == 0, "reserved bits of the global encoding");
+    require((encoding & ~0x1f) == 0, "reserved bits of the global encoding");
     require((encoding & 0x0e) == 0, "waveforms or synthetic returns announced");
     require_zero(8, 16, "project ID");
     file_.system_identifier = text(26, 32);
@@ -153,29 +150,19 @@ class Checker {
     require((file_.creation_day == 0) == (year == 0), "a creation day without year");
     require(file_.creation_day <= (leap ? 366 : 365), "creation day");
 
-    header_bytes_ = number<std::uint16_t>(94);
-    require(header_bytes_ == (modern_ ? 375U : 227U), "header size");
-    require(bytes_.size() >= header_bytes_, "shorter than its header");
+    require(number<std::uint16_t>(94) == kHeaderBytes, "header size");
     points_at_ = number<std::uint32_t>(96);
     record_count_ = number<std::uint32_t>(100);
-    require(number<std::uint8_t>(104) == (modern_ ? 6 : 1), "point format");
+    require(number<std::uint8_t>(104) == 6, "point format");
     record_bytes_ = number<std::uint16_t>(105);
-    base_bytes_ = modern_ ? 30 : 28;
-    require(record_bytes_ >= base_bytes_, "point record length");
+    require(record_bytes_ >= kBaseBytes, "point record length");
 
-    count_ = number<std::uint32_t>(107);
-    for (std::size_t k = 0; k < 5; ++k) {
-      file_.points_by_return.push_back(number<std::uint32_t>(111 + 4 * k));
-    }
-    if (modern_) {
-      require_zero(107, 24, "legacy counts with point format 6");
-      require_zero(227, 8, "start of waveforms");
-      require_zero(235, 12, "extended variable length records");
-      count_ = number<std::uint64_t>(247);
-      file_.points_by_return.clear();
-      for (std::size_t k = 0; k < 15; ++k) {
-        file_.points_by_return.push_back(number<std::uint64_t>(255 + 8 * k));
-      }
+    require_zero(107, 24, "legacy counts with point format 6");
+    require_zero(227, 8, "start of waveforms");
+    require_zero(235, 12, "extended variable length records");
+    count_ = number<std::uint64_t>(247);
+    for (std::size_t k = 0; k < 15; ++k) {
+      file_.points_by_return.push_back(number<std::uint64_t>(255 + 8 * k));
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       file_.scale[axis] = number<double>(131 + 8 * axis);
@@ -192,7 +179,7 @@ class Checker {
   }
 
   void read_records() {
-    std::size_t at = header_bytes_;
+    std::size_t at = kHeaderBytes;
     std::set<std::pair<std::string, int>> seen;
     for (std::uint32_t k = 0; k < record_count_; ++k) {
       require(at + 54 <= points_at_, "a record reaches into the points");
@@ -212,17 +199,10 @@ class Checker {
     require(at == points_at_, "bytes between the last record and the points");
 
     const Record* wkt = file_.record("LASF_Projection", 2112);
-    const Record* keys = file_.record("LASF_Projection", 34735);
-    require(file_.wkt == modern_, "point format 6 needs WKT, LAS 1.2 does not know it");
-    require((wkt != nullptr) == modern_ && (keys != nullptr) == !modern_,
-            "the coordinate system is not where the header says");
-    if (wkt != nullptr) {
-      require(wkt->data.size() > 1 && wkt->data.find('\0') == wkt->data.size() - 1,
-              "WKT does not end with its only zero");
-      check_brackets(wkt->data);
-    } else {
-      check_keys(*keys);
-    }
+    require(file_.wkt && wkt != nullptr, "point format 6 needs WKT");
+    require(wkt->data.size() > 1 && wkt->data.find('\0') == wkt->data.size() - 1,
+            "WKT does not end with its only zero");
+    check_brackets(wkt->data);
   }
 
   static void check_brackets(const std::string& wkt) {
@@ -238,25 +218,14 @@ class Checker {
     require(depth == 0 && !quoted, "WKT does not close what it opens");
   }
 
-  static void check_keys(const Record& record) {
-    require(record.data.size() >= 8 && record.data.size() % 8 == 0, "length of the GeoTIFF keys");
-    std::vector<std::uint16_t> keys(record.data.size() / 2);
-    std::memcpy(keys.data(), record.data.data(), record.data.size());
-    require(keys[0] == 1 && keys[1] == 1 && keys[2] == 0, "version of the GeoTIFF keys");
-    require(std::size_t{keys[3]} + 1 == keys.size() / 4, "number of the GeoTIFF keys");
-    for (std::size_t k = 8; k < keys.size(); k += 4) {
-      require(keys[k] > keys[k - 4], "GeoTIFF keys are not in order");
-    }
-  }
-
   void read_extra_bytes() {
     const Record* record = file_.record("LASF_Spec", 4);
-    std::size_t offset = base_bytes_;
+    std::size_t offset = kBaseBytes;
     if (record != nullptr) {
       require(record->data.size() % 192 == 0 && !record->data.empty(), "length of extra bytes");
       // The record was copied from there; text() and number() look into the file.
       const auto found =
-          std::search(bytes_.begin() + static_cast<std::ptrdiff_t>(header_bytes_), bytes_.end(),
+          std::search(bytes_.begin() + static_cast<std::ptrdiff_t>(kHeaderBytes), bytes_.end(),
                       record->data.begin(), record->data.end(),
                       [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); });
       auto at = static_cast<std::size_t>(found - bytes_.begin());
@@ -290,34 +259,20 @@ class Checker {
       }
       point.intensity = number<std::uint16_t>(at + 12);
       const int bits = number<std::uint8_t>(at + 14);
-      if (modern_) {
-        point.return_number = bits & 15;
-        point.number_of_returns = bits >> 4;
-        const int flags = number<std::uint8_t>(at + 15);
-        require((flags & 0x0f) == 0, "classification flags");
-        point.scanner_channel = (flags >> 4) & 3;
-        require((flags & 0xc0) == 0, "scan direction or edge of flight line");
-        point.classification = number<std::uint8_t>(at + 16);
-        point.user_data = number<std::uint8_t>(at + 17);
-        point.scan_angle = number<std::int16_t>(at + 18);
-        require(std::abs(point.scan_angle) <= 30000, "scan angle");
-        point.point_source = number<std::uint16_t>(at + 20);
-        point.gps_time = number<double>(at + 22);
-      } else {
-        point.return_number = bits & 7;
-        point.number_of_returns = (bits >> 3) & 7;
-        require((bits & 0xc0) == 0, "scan direction or edge of flight line");
-        point.classification = number<std::uint8_t>(at + 15) & 31;
-        require((number<std::uint8_t>(at + 15) & 0xe0) == 0, "classification flags");
-        point.scan_angle = number<std::int8_t>(at + 16);
-        require(std::abs(point.scan_angle) <= 90, "scan angle");
-        point.user_data = number<std::uint8_t>(at + 17);
-        point.point_source = number<std::uint16_t>(at + 18);
-        point.gps_time = number<double>(at + 20);
-      }
+      point.return_number = bits & 15;
+      point.number_of_returns = bits >> 4;
+      const int flags = number<std::uint8_t>(at + 15);
+      require((flags & 0x0f) == 0, "classification flags");
+      point.scanner_channel = (flags >> 4) & 3;
+      require((flags & 0xc0) == 0, "scan direction or edge of flight line");
+      point.classification = number<std::uint8_t>(at + 16);
+      point.user_data = number<std::uint8_t>(at + 17);
+      point.scan_angle = number<std::int16_t>(at + 18);
+      require(std::abs(point.scan_angle) <= 30000, "scan angle");
+      point.point_source = number<std::uint16_t>(at + 20);
+      point.gps_time = number<double>(at + 22);
       require(std::isfinite(point.gps_time), "GPS time");
-      require(point.number_of_returns >= 1 && point.number_of_returns <= (modern_ ? 15 : 5),
-              "number of returns");
+      require(point.number_of_returns >= 1, "number of returns");
       require(point.return_number >= 1 && point.return_number <= point.number_of_returns,
               "return number");
       point.bytes.assign(bytes_.begin() + static_cast<std::ptrdiff_t>(at),
@@ -348,8 +303,8 @@ class Checker {
 
   std::vector<std::uint8_t> bytes_;
   File file_;
-  bool modern_ = false;
-  std::size_t header_bytes_ = 0, points_at_ = 0, record_bytes_ = 0, base_bytes_ = 0;
+  static constexpr std::size_t kHeaderBytes = 375, kBaseBytes = 30;
+  std::size_t points_at_ = 0, record_bytes_ = 0;
   std::uint32_t record_count_ = 0;
   std::uint64_t count_ = 0;
 };

@@ -18,9 +18,7 @@
 #include "risley/core/error.hpp"
 
 #include "cloud/file_size_limit.hpp"
-#include "cloud/formats/las_layout.hpp"
 #include "cloud/las_checker.hpp"
-#include "parameter_name.hpp"
 
 namespace risley::cloud::las_test {
 
@@ -234,9 +232,8 @@ class LasTest : public ::testing::Test {
   CloudWriterOptions options_;
 };
 
-/// Format, whether there are covariances and rotation angles, prisms, common factors.
+/// Whether there are covariances and rotation angles, prisms, common factors.
 struct Variant {
-  const char* format;
   bool covariance, angles;
   int prisms;
   std::size_t factors;
@@ -245,7 +242,6 @@ struct Variant {
 class LasVariants : public LasTest, public ::testing::WithParamInterface<Variant> {
  protected:
   LasVariants() {
-    options_.format = GetParam().format;
     header_.has_covariance = GetParam().covariance;
     header_.has_rotation_angles = GetParam().angles;
     header_.prisms = GetParam().prisms;
@@ -258,7 +254,6 @@ TEST_P(LasVariants, KeepsEveryFieldOfEveryPoint) {
     const Points points = random_points(header_, rows);
     write(points, {1, 300, 0, 5, 1021});
     const las_checker::File file = las_checker::read(path());
-    EXPECT_EQ(file.minor_version, GetParam().format == std::string("las-1.4") ? 4 : 2);
     EXPECT_FALSE(file.gps_time);
     EXPECT_EQ(file.creation_year, 0);
     ASSERT_NO_FATAL_FAILURE(expect_equal(file, points)) << rows;
@@ -275,15 +270,14 @@ TEST_P(LasVariants, PiecesMakeNoDifference) {
   EXPECT_TRUE(bytes() == whole);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, LasVariants,
-    ::testing::Values(Variant{"las-1.4", true, true, 2, 0}, Variant{"las-1.4", false, true, 3, 0},
-                      Variant{"las-1.4", true, false, 2, 4}, Variant{"las-1.4", false, false, 2, 0},
-                      Variant{"las-1.2", true, true, 3, 2}, Variant{"las-1.2", false, false, 2, 0}),
-    [](const auto& variant) {
-      return parameter_name(variant.param.format) + (variant.param.covariance ? "Covariance" : "") +
-             (variant.param.angles ? "Angles" : "") + (variant.param.factors > 0 ? "Factors" : "");
-    });
+INSTANTIATE_TEST_SUITE_P(All, LasVariants,
+                         ::testing::Values(Variant{true, true, 2, 0}, Variant{false, true, 3, 0},
+                                           Variant{true, false, 2, 4}, Variant{false, false, 2, 0}),
+                         [](const auto& variant) {
+                           return std::string(variant.param.covariance ? "Covariance" : "Plain") +
+                                  (variant.param.angles ? "Angles" : "") +
+                                  (variant.param.factors > 0 ? "Factors" : "");
+                         });
 
 TEST_F(LasTest, ManyBlocksOfTheBuffer) {
   const Points points = random_points(header_, 40'000);  // several MB
@@ -413,9 +407,6 @@ TEST_F(LasTest, RefusesReturnsThatDoNotFit) {
               HasSubstr("point 512: return_number = 4, allowed 1 to 3"));
   points.number_of_returns[511] = 16;
   EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("allowed 1 to 15"));
-  points.number_of_returns[511] = 6;
-  options_.format = "las-1.2";
-  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("allowed 1 to 5"));
 }
 
 TEST_F(LasTest, AllReturnsThatLas14Counts) {
@@ -452,18 +443,6 @@ TEST_F(LasTest, RefusesMoreFactorsAndProvenanceThanThereIsRoomFor) {
   EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("provenance"));
 }
 
-TEST_F(LasTest, Las12CountsWith32Bits) {
-  las::Layout layout(las::Version::las_1_2, header_, options_);
-  const Points points = random_points(header_, 2);
-  std::vector<std::uint8_t> record(2 * layout.record_bytes());
-  las::Summary summary;
-  summary.points = 4'294'967'294;
-  EXPECT_THROW(layout.pack(points, 0, 2, record.data(), summary), InvalidArgument);
-  EXPECT_NO_THROW(layout.pack(points, 0, 1, record.data(), summary));
-  EXPECT_EQ(summary.points, 4'294'967'295);
-  EXPECT_THROW(layout.pack(points, 1, 1, record.data(), summary), InvalidArgument);
-}
-
 TEST_F(LasTest, FoldersThatAreNotThere) {
   EXPECT_THROW(create_cloud(path("missing/cloud.las"), header_, options_), FileError);
   EXPECT_THROW(create_cloud(folder_.string() + "/.", header_, {"las-1.4", 1e-4, true}), FileError);
@@ -484,29 +463,26 @@ TEST_F(LasTest, GpsTime) {
   Points points = random_points(header_, 5);
   points.time_ns = {1'629'961'201'500'000'000, 1'483'228'800'000'000'000, 1'483'228'799'000'000'000,
                     1'435'708'799'750'000'000, 1'341'100'799'000'000'000};
-  for (const char* format : {"las-1.4", "las-1.2"}) {
-    options_.format = format;
-    options_.gps_time = true;
-    write(points);
-    las_checker::File file = las_checker::read(path());
-    EXPECT_TRUE(file.gps_time);
-    EXPECT_EQ(file.creation_day, 238);
-    EXPECT_EQ(file.creation_year, 2021);
-    EXPECT_EQ(file.points[0].gps_time, 313'996'419.5);
-    // GPS time at leap seconds: 1167264018 s at 2017-01-01, 1119744017 s at 2015-07-01 and
-    // 1025136016 s at 2012-07-01 is the first second after each.
-    EXPECT_EQ(file.points[1].gps_time, 167'264'018.0);
-    EXPECT_EQ(file.points[2].gps_time, 167'264'018.0 - 2);
-    EXPECT_EQ(file.points[3].gps_time, 119'744'017.0 - 1.25);
-    EXPECT_EQ(file.points[4].gps_time, 25'136'016.0 - 2);
+  options_.gps_time = true;
+  write(points);
+  las_checker::File file = las_checker::read(path());
+  EXPECT_TRUE(file.gps_time);
+  EXPECT_EQ(file.creation_day, 238);
+  EXPECT_EQ(file.creation_year, 2021);
+  EXPECT_EQ(file.points[0].gps_time, 313'996'419.5);
+  // GPS time at leap seconds: 1167264018 s at 2017-01-01, 1119744017 s at 2015-07-01 and
+  // 1025136016 s at 2012-07-01 is the first second after each.
+  EXPECT_EQ(file.points[1].gps_time, 167'264'018.0);
+  EXPECT_EQ(file.points[2].gps_time, 167'264'018.0 - 2);
+  EXPECT_EQ(file.points[3].gps_time, 119'744'017.0 - 1.25);
+  EXPECT_EQ(file.points[4].gps_time, 25'136'016.0 - 2);
 
-    options_.gps_time = false;
-    write(points);
-    file = las_checker::read(path());
-    EXPECT_FALSE(file.gps_time);
-    EXPECT_EQ(file.points[0].gps_time, 1'629'961'201.5);
-    EXPECT_EQ(file.creation_day, 238);
-  }
+  options_.gps_time = false;
+  write(points);
+  file = las_checker::read(path());
+  EXPECT_FALSE(file.gps_time);
+  EXPECT_EQ(file.points[0].gps_time, 1'629'961'201.5);
+  EXPECT_EQ(file.creation_day, 238);
 }
 
 TEST_F(LasTest, OtherClocksAreNotGpsTime) {

@@ -33,7 +33,7 @@ if not SANITIZED:
 
 # Name, arguments, output; inputs are made by make_inputs().
 FILES = [(f"convert to {ending}", ["convert", "walls.nc", "-o"], f"out.{ending}")
-         for ending in ("nc", "lvx", "bin", "openpylivox.csv", "sequence.csv")]
+         for ending in ("nc", "lvx", "openpylivox.csv", "sequence.csv")]
 FILES += [(f"cloud to {ending}", ["cloud", "walls.nc", "--calibration", "mid-40", "-o"],
            f"out.{ending}") for ending in ("las", "ply", "pcd", "csv", "npy", "nc", "bag")]
 FILES += [(f"pattern to {name}", ["pattern", "--sensor", "avia", "--duration-s", "0.002", "--format",

@@ -107,8 +107,8 @@ void write_and_read(const Format& format, const recordings::RecordingHeader& hea
 void convert(const recordings::RecordingHeader& header, const std::vector<Chunk>& chunks,
              std::size_t choice) {
   static const io::TestFolder folder;
-  constexpr std::array kEndings = {".lvx", ".openpylivox.csv", ".openpylivox.bin", ".sequence.csv",
-                                   ".csv", ".no-format"};
+  constexpr std::array kEndings = {".lvx", ".openpylivox.csv", ".sequence.csv", ".csv",
+                                   ".no-format"};
   const std::string path = folder.file(std::string("other") + kEndings[choice % kEndings.size()]);
   std::uint64_t written = 0;
   try {

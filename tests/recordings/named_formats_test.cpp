@@ -800,7 +800,7 @@ TEST(ShotRate, WritersOfTimesNeedThem) {
   const std::string path = folder.file("a.csv");
   put_bytes(path, "index,x_m,y_m,z_m\n3,1.500,2.500,3.500\n4,0,0,0\n9,1.500,2.500,3.500\n");
   const Recording recording = load_recording(path);
-  for (const char* name : {"a.lvx", "a.openpylivox.csv", "a.bin"}) {
+  for (const char* name : {"a.lvx", "a.openpylivox.csv"}) {
     EXPECT_THROW(create_recording(folder.file(name), recording.header), MissingTimes) << name;
   }
   const auto writer = create_recording(folder.file("a.nc"), recording.header);

@@ -83,8 +83,6 @@ TEST_F(RegistryTest, FilesThatCannotBeARecordingAreNamed) {
 TEST_F(RegistryTest, TheEndingChoosesTheFormat) {
   EXPECT_EQ(format_written("a.lvx", true), "lvx-1.1");
   EXPECT_EQ(format_written("A.LVX", true), "lvx-1.1");
-  EXPECT_EQ(format_written("a.bin", true), "openpylivox-bin");
-  EXPECT_EQ(format_written("a.openpylivox.bin", true), "openpylivox-bin");
   EXPECT_EQ(format_written("a.csv", true), "openpylivox-csv");
   EXPECT_EQ(format_written("a.csv", false), "scan-sequence-csv");
   EXPECT_EQ(format_written("a.sequence.csv", true), "scan-sequence-csv");
@@ -95,7 +93,7 @@ TEST_F(RegistryTest, TheEndingChoosesTheFormat) {
 }
 
 TEST_F(RegistryTest, FormatsThatNeedRangesSaySo) {
-  for (const char* name : {"a.lvx", "a.openpylivox.csv", "a.bin"}) {
+  for (const char* name : {"a.lvx", "a.openpylivox.csv"}) {
     EXPECT_THROW(format_written(name, false), InvalidArgument) << name;
     EXPECT_FALSE(std::filesystem::exists(folder_.file(name)));
   }
@@ -120,9 +118,8 @@ TEST_F(RegistryTest, TheListOfWritableFormatsIsComplete) {
     endings.insert(format.ending);
     EXPECT_FALSE(format.name.empty() || format.description.empty());
   }
-  EXPECT_THAT(endings,
-              ::testing::UnorderedElementsAre(".lvx", ".nc", ".bin", ".openpylivox.bin", ".csv",
-                                              ".sequence.csv", ".openpylivox.csv"));
+  EXPECT_THAT(endings, ::testing::UnorderedElementsAre(".lvx", ".nc", ".csv", ".sequence.csv",
+                                                       ".openpylivox.csv"));
 }
 
 TEST_F(RegistryTest, AWholeRecordingIsLoadedWithItsWarnings) {
@@ -190,7 +187,7 @@ void expect_changes_survived(const std::string& ending, bool shrinks) {
 }
 
 TEST(Registry, FilesThatShrinkOrGrowWhileTheyAreRead) {
-  for (const char* ending : {".lvx", ".nc", ".sequence.csv", ".openpylivox.csv", ".bin"}) {
+  for (const char* ending : {".lvx", ".nc", ".sequence.csv", ".openpylivox.csv"}) {
     expect_changes_survived(ending, true);
     expect_changes_survived(ending, false);
   }

@@ -92,21 +92,10 @@ TEST(Sbet, FramesOfVelocitiesAreFound) {
        [](const Vector3d& v, const RollPitchHeading&, double) {
          return Vector3d(v.y(), v.x(), -v.z());
        }},
-      {"north-west-up", 0.5,
+      {"north-west-up, turned by the wander angle", 0,
        [](const Vector3d& v, const RollPitchHeading&, double) { return flipped(v); }},
-      {"north-east-up", 0.5,
-       [](const Vector3d& v, const RollPitchHeading&, double) {
-         return Vector3d(v.x(), v.y(), -v.z());
-       }},
       {"north-west-up, turned by the wander angle", 0.018,
        [](const Vector3d& v, const RollPitchHeading&, double a) { return flipped(along(v, -a)); }},
-      {"north-east-down, turned by the wander angle", 0.5,
-       [](const Vector3d& v, const RollPitchHeading&, double a) { return along(v, -a); }},
-      {"east-north-up, turned by the wander angle", 0.5,
-       [](const Vector3d& v, const RollPitchHeading&, double a) {
-         const Vector3d turned = along(v, -a);
-         return Vector3d(turned.y(), turned.x(), -turned.z());
-       }},
       {"forward-right-down of the body", 0.5,
        [](const Vector3d& v, const RollPitchHeading& angles, double) {
          return Vector3d(ned_from_body(angles).conjugate() * v);
@@ -114,14 +103,6 @@ TEST(Sbet, FramesOfVelocitiesAreFound) {
       {"forward-left-up of the body", 0,
        [](const Vector3d& v, const RollPitchHeading& angles, double) {
          return flipped(ned_from_body(angles).conjugate() * v);
-       }},
-      {"forward-right-down, levelled", 0.5,
-       [](const Vector3d& v, const RollPitchHeading& angles, double) {
-         return along(v, angles.heading);
-       }},
-      {"forward-left-up, levelled", 0,
-       [](const Vector3d& v, const RollPitchHeading& angles, double) {
-         return flipped(along(v, angles.heading));
        }},
   };
   for (const VelocityCase& each : cases) {
@@ -153,7 +134,7 @@ TEST(Sbet, FramesThatCannotBeToldStayUndecided) {
   for (SbetRecord& n : records) n[4] += 15;
   t = read(records);
   EXPECT_EQ(t.velocity_frame->name, "undecided");
-  EXPECT_THAT(t.velocity_frame->reason, HasSubstr("none of 8 frames fits"));
+  EXPECT_THAT(t.velocity_frame->reason, HasSubstr("none of 5 frames fits"));
   EXPECT_THAT(t.velocity, IsEmpty());
   // Zeros, as some programs write.
   for (SbetRecord& n : records) n[4] = n[5] = n[6] = 0;

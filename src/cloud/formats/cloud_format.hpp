@@ -21,8 +21,7 @@ struct CloudWriterFormat {
                                          const CloudWriterOptions& options);
 };
 
-extern const CloudWriterFormat kLas14Format;   // las.cpp
-extern const CloudWriterFormat kLas12Format;   // las.cpp
+extern const CloudWriterFormat kLasFormat;     // las.cpp
 extern const CloudWriterFormat kLazFormat;     // laz.cpp, where there is LASzip
 extern const CloudWriterFormat kPlyFormat;     // ply.cpp
 extern const CloudWriterFormat kPcdFormat;     // pcd.cpp

@@ -59,19 +59,13 @@ class LasWriter final : public CloudWriter {
   bool sound_ = true, closed_ = false;
 };
 
-template <las::Version kVersion>
-std::unique_ptr<CloudWriter> create_las(const std::string& path, const CloudHeader& header,
-                                        const CloudWriterOptions& options) {
-  return std::make_unique<LasWriter>(path, las::Layout(kVersion, header, options));
-}
-
 }  // namespace
 
-const CloudWriterFormat kLas14Format{"las-1.4", ".las",
-                                     "LAS 1.4, point format 6, uncertainty as extra bytes",
-                                     create_las<las::Version::las_1_4>};
-const CloudWriterFormat kLas12Format{"las-1.2", ".las",
-                                     "LAS 1.2, point format 1, uncertainty as extra bytes",
-                                     create_las<las::Version::las_1_2>};
+const CloudWriterFormat kLasFormat{
+    "las-1.4", ".las", "LAS 1.4, point format 6, uncertainty as extra bytes",
+    [](const std::string& path, const CloudHeader& header,
+       const CloudWriterOptions& options) -> std::unique_ptr<CloudWriter> {
+      return std::make_unique<LasWriter>(path, las::Layout(header, options));
+    }};
 
 }  // namespace risley::cloud

@@ -69,37 +69,22 @@ void append_descriptor(std::string& data, const PointField& field) {
 }
 
 /// The coordinate system of the points: a map, or the sensor's own or another frame in metres.
-VariableLengthRecord coordinate_system(Version version, const CloudHeader& header) {
-  if (!header.frame.wkt.empty()) {
-    if (version != Version::las_1_4) {
-      throw InvalidArgument(
-          "LAS 1.2 cannot name the map that points stand on as this program has it (WKT), allowed "
-          "las-1.4");
-    }
-    return {"LASF_Projection", 2112, "OGC WKT coordinate system", header.frame.wkt + '\0'};
-  }
-  if (version == Version::las_1_4) {
-    if (header.trajectory) {
-      std::string text =
-          "LOCAL_CS[\"frame of the trajectory\",LOCAL_DATUM[\"trajectory origin\",32767],"
-          "UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH],AXIS[\"Z\",UP]]";
-      text.push_back('\0');
-      return {"LASF_Projection", 2112, "OGC WKT coordinate system", std::move(text)};
-    }
+VariableLengthRecord coordinate_system(const CloudHeader& header) {
+  std::string text = header.frame.wkt;
+  if (text.empty() && header.trajectory) {
+    text =
+        "LOCAL_CS[\"frame of the trajectory\",LOCAL_DATUM[\"trajectory origin\",32767],"
+        "UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH],AXIS[\"Z\",UP]]";
+  } else if (text.empty()) {
     std::string name = plain(header.sensor.empty() ? "sensor" : header.sensor + " sensor");
     std::replace(name.begin(), name.end(), '"', '\'');
-    std::string text = fmt::format(
+    text = fmt::format(
         "LOCAL_CS[\"{} frame\",LOCAL_DATUM[\"sensor origin\",32767],UNIT[\"metre\",1],"
         "AXIS[\"X (forward)\",OTHER],AXIS[\"Y (left)\",OTHER],AXIS[\"Z (up)\",UP]]",
         name);
-    text.push_back('\0');
-    return {"LASF_Projection", 2112, "OGC WKT coordinate system", std::move(text)};
   }
-  // GeoTIFF: version 1.1.0 with two keys, a user-defined model and linear units of metres.
-  constexpr std::uint16_t kKeys[] = {1, 1, 0, 2, 1024, 0, 1, 32767, 3076, 0, 1, 9001};
-  std::string data(sizeof kKeys, '\0');
-  std::memcpy(data.data(), kKeys, sizeof kKeys);
-  return {"LASF_Projection", 34735, "GeoTIFF GeoKeyDirectoryTag", std::move(data)};
+  text.push_back('\0');
+  return {"LASF_Projection", 2112, "OGC WKT coordinate system", std::move(text)};
 }
 
 /// The trajectory's errors: what they are as text in record 100, where the sensor was as packed
@@ -141,9 +126,8 @@ void append_trajectory(const TrajectoryErrors& errors, std::vector<VariableLengt
 
 }  // namespace
 
-Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOptions& options)
-    : version_(version),
-      scale_(options.las_scale),
+Layout::Layout(const CloudHeader& header, const CloudWriterOptions& options)
+    : scale_(options.las_scale),
       offset_(header.frame.offset),
       has_point_source_(header.has_point_source),
       utc_(header.time_reference == recordings::TimeReference::utc),
@@ -171,7 +155,7 @@ Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOpti
   }
   records_.push_back(
       {kSpecificationUser, kExtraBytesNumber, "Extra bytes", std::move(descriptors)});
-  records_.push_back(coordinate_system(version_, header));
+  records_.push_back(coordinate_system(header));
   if (header.trajectory) append_trajectory(*header.trajectory, records_);
   std::string text;
   for (const auto& [name, value] : header.provenance) text += fmt::format("{} = {}\n", name, value);
@@ -186,8 +170,8 @@ Layout::Layout(Version version, const CloudHeader& header, const CloudWriterOpti
 }
 
 std::uint16_t Layout::global_encoding() const {
-  const unsigned wkt = version_ == Version::las_1_4 ? 1U << 4 : 0U;
-  return static_cast<std::uint16_t>(wkt | (gps_time_ ? kAdjustedGpsTime : 0U));
+  constexpr unsigned kWkt = 1U << 4;
+  return static_cast<std::uint16_t>(kWkt | (gps_time_ ? kAdjustedGpsTime : 0U));
 }
 
 HeaderNumbers Layout::numbers(const Summary& summary) const {
@@ -216,14 +200,13 @@ std::vector<std::uint8_t> Layout::head(const Summary& summary) const {
     length += kRecordHeaderBytes + record.data.size();
   std::vector<std::uint8_t> bytes(length, 0);
   const HeaderNumbers numbers = this->numbers(summary);
-  const bool modern = version_ == Version::las_1_4;
 
   std::uint8_t* out = put_text(bytes.data(), "LASF", 4);
   out = put<std::uint16_t>(out, 1);  // file source
   out = put<std::uint16_t>(out, global_encoding());
   out += 16;  // project: none
   out = put<std::uint8_t>(out, 1);
-  out = put<std::uint8_t>(out, modern ? 4 : 2);
+  out = put<std::uint8_t>(out, 4);
   out = put_text(out, system_identifier_, 32);
   out = put_text(out, generating_software_, 32);
   out = put<std::uint16_t>(out, numbers.creation_day);
@@ -233,25 +216,16 @@ std::vector<std::uint8_t> Layout::head(const Summary& summary) const {
   out = put<std::uint32_t>(out, static_cast<std::uint32_t>(records_.size()));
   out = put<std::uint8_t>(out, point_format());
   out = put<std::uint16_t>(out, static_cast<std::uint16_t>(record_bytes_));
-  // The counters of old; point formats from 6 on leave them 0.
-  out = put<std::uint32_t>(out, modern ? 0 : static_cast<std::uint32_t>(summary.points));
-  for (std::size_t k = 0; k < 5; ++k) {
-    const std::uint64_t count = modern ? 0 : summary.points_by_return[k];
-    out = put<std::uint32_t>(out, static_cast<std::uint32_t>(count));
-  }
+  out += 6 * 4;  // the counters of old, which point formats from 6 on leave 0
   for (int axis = 0; axis < 3; ++axis) out = put<double>(out, scale_);
   for (const double offset : offset_) out = put<double>(out, offset);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     out = put<double>(out, numbers.high[axis]);
     out = put<double>(out, numbers.low[axis]);
   }
-  if (modern) {
-    out += 8 + 8 + 4;  // no waveforms, no extended variable length records
-    out = put<std::uint64_t>(out, summary.points);
-    for (const std::uint64_t count : summary.points_by_return) {
-      out = put<std::uint64_t>(out, count);
-    }
-  }
+  out += 8 + 8 + 4;  // no waveforms, no extended variable length records
+  out = put<std::uint64_t>(out, summary.points);
+  for (const std::uint64_t count : summary.points_by_return) out = put<std::uint64_t>(out, count);
   for (const VariableLengthRecord& record : records_) {
     out += 2;  // reserved
     out = put_text(out, record.user, 16);

@@ -18,9 +18,6 @@
 
 namespace risley::cloud::las {
 
-/// LAS 1.2 with point format 1, or LAS 1.4 with point format 6 [ASPRS LAS 1.2; ASPRS LAS 1.4-R15].
-enum class Version : std::uint8_t { las_1_2, las_1_4 };
-
 /// What the public header tells of the points, gathered while they are packed.
 struct Summary {
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -47,7 +44,8 @@ struct HeaderNumbers {
   std::array<double, 3> low{}, high{};                ///< m; 0 without points
 };
 
-/// Header (las_header.cpp) and point records (las_records.cpp) of one LAS file.
+/// Header (las_header.cpp) and point records (las_records.cpp) of one LAS 1.4 file with point
+/// format 6 [ASPRS LAS 1.4-R15].
 ///
 /// - X, Y, Z: multiples of the scale from the frame's offset on. The bounding box is that of the
 ///   stored numbers.
@@ -66,17 +64,14 @@ class Layout {
  public:
   /// @throws InvalidArgument for a scale that is not positive, and for more common factors or
   /// provenance than a variable length record has room for
-  Layout(Version version, const CloudHeader& header, const CloudWriterOptions& options);
+  Layout(const CloudHeader& header, const CloudWriterOptions& options);
 
-  Version version() const { return version_; }
   double scale() const { return scale_; }
   const std::array<double, 3>& offset() const { return offset_; }
-  std::size_t header_bytes() const {
-    return recordings::las::header_bytes(version_ == Version::las_1_4 ? 4 : 2);
-  }
+  std::size_t header_bytes() const { return recordings::las::header_bytes(4); }
   std::size_t base_record_bytes() const { return recordings::las::kRecordBytes[point_format()]; }
   std::size_t record_bytes() const { return record_bytes_; }
-  std::uint8_t point_format() const { return version_ == Version::las_1_4 ? 6 : 1; }
+  std::uint8_t point_format() const { return 6; }
   std::uint16_t global_encoding() const;
   const std::string& system_identifier() const { return system_identifier_; }
   const std::string& generating_software() const { return generating_software_; }
@@ -91,8 +86,8 @@ class Layout {
 
   /// Packs the rows [first, first + rows), at most kBlock, into records one after another. Points
   /// are counted from 1 over the whole file in what it throws.
-  /// @throws InvalidArgument for a coordinate or a return that the format cannot hold, and for
-  /// more points than its counter can hold; the summary is then of no use
+  /// @throws InvalidArgument for a coordinate or a return that the format cannot hold; the summary
+  /// is then of no use
   void pack(const Points& points, std::size_t first, std::size_t rows, std::uint8_t* out,
             Summary& summary);
 
@@ -102,7 +97,6 @@ class Layout {
   void pack_returns(const Points& points, std::size_t first, std::size_t rows, Summary& summary);
   void pack_times(const Points& points, std::size_t first, std::size_t rows);
 
-  Version version_;
   double scale_;
   std::array<double, 3> offset_;
   bool has_point_source_;

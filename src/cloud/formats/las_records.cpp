@@ -81,13 +81,12 @@ void Layout::pack_coordinates(const Points& points, std::size_t first, std::size
 
 void Layout::pack_returns(const Points& points, std::size_t first, std::size_t rows,
                           Summary& summary) {
-  const bool modern = version_ == Version::las_1_4;
-  const unsigned most = modern ? 15 : 5;
+  constexpr unsigned kMost = 15;
   const std::uint8_t* number = points.return_number.data() + first;
   const std::uint8_t* total = points.number_of_returns.data() + first;
   const auto possible = [=](std::size_t i) {
     return static_cast<unsigned>(number[i] >= 1) & static_cast<unsigned>(number[i] <= total[i]) &
-           static_cast<unsigned>(total[i] <= most);
+           static_cast<unsigned>(total[i] <= kMost);
   };
   unsigned all_possible = 1;
   for (std::size_t i = 0; i < rows; ++i) all_possible &= possible(i);
@@ -95,17 +94,16 @@ void Layout::pack_returns(const Points& points, std::size_t first, std::size_t r
     std::size_t i = 0;
     while (possible(i) != 0) ++i;
     const std::uint64_t point = summary.points + i + 1;
-    if (total[i] < 1 || total[i] > most) {
+    if (total[i] < 1 || total[i] > kMost) {
       throw InvalidArgument(
-          fmt::format("point {}: number_of_returns = {}, allowed 1 to {}", point, total[i], most));
+          fmt::format("point {}: number_of_returns = {}, allowed 1 to {}", point, total[i], kMost));
     }
     throw InvalidArgument(
         fmt::format("point {}: return_number = {}, allowed 1 to {}", point, number[i], total[i]));
   }
   const std::uint8_t* intensity = points.intensity.data() + first;
-  const int shift = modern ? 4 : 3;
   for (std::size_t i = 0; i < rows; ++i) {
-    const std::uint32_t bits = std::uint32_t{number[i]} | (std::uint32_t{total[i]} << shift);
+    const std::uint32_t bits = std::uint32_t{number[i]} | (std::uint32_t{total[i]} << 4);
     returns_[i] = (std::uint32_t{intensity[i]} * kIntensityFactor) | (bits << 16);
   }
   // Two tables, because a count must not wait for the one just before it.
@@ -130,13 +128,6 @@ void Layout::pack_times(const Points& points, std::size_t first, std::size_t row
 void Layout::pack(const Points& points, std::size_t first, std::size_t rows, std::uint8_t* out,
                   Summary& summary) {
   if (rows == 0) return;
-  constexpr std::uint64_t kMaxPoints = std::numeric_limits<std::uint32_t>::max();
-  if (version_ == Version::las_1_2 && summary.points + rows > kMaxPoints) {
-    throw InvalidArgument(
-        fmt::format("point {}: allowed up to {} points in LAS 1.2, which LAS 1.4 "
-                    "has no limit for",
-                    kMaxPoints + 1, kMaxPoints));
-  }
   pack_coordinates(points, first, rows, summary);
   pack_returns(points, first, rows, summary);
   pack_times(points, first, rows);
@@ -145,32 +136,25 @@ void Layout::pack(const Points& points, std::size_t first, std::size_t rows, std
   }
 
   // Classification, flags, scan angle and user data are 0, the point source is 1 for one file.
-  constexpr std::uint8_t kModern[] = {0, 0, 0, 0, 1, 0}, kOld[] = {0, 0, 1, 0};
+  constexpr std::uint8_t kConstant[] = {0, 0, 0, 0, 1, 0};
   const std::uint8_t* tag = points.tag.data() + first;
   const std::uint8_t* beam = points.beam.data() + first;
   const std::uint16_t* source = has_point_source_ ? points.point_source.data() + first : nullptr;
-  const auto assemble = [&](const auto& constant) {
-    const std::size_t floats = floats_.size();
-    std::uint8_t* to = out;
-    for (std::size_t i = 0; i < rows; ++i) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        std::memcpy(to + 4 * axis, &coordinates_[axis][i], 4);
-      }
-      std::memcpy(to + 12, &returns_[i], 4);
-      std::memcpy(to + 16, constant, sizeof constant);
-      to += 16 + sizeof constant;
-      if (source != nullptr) put<std::uint16_t>(to - 2, source[i]);
-      to = put<double>(to, times_[i]);
-      const float* value = values_.data() + i;
-      for (std::size_t k = 0; k < floats; ++k, value += kBlock) to = put<float>(to, *value);
-      *to++ = tag[i];
-      *to++ = beam[i];
+  const std::size_t floats = floats_.size();
+  std::uint8_t* to = out;
+  for (std::size_t i = 0; i < rows; ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::memcpy(to + 4 * axis, &coordinates_[axis][i], 4);
     }
-  };
-  if (version_ == Version::las_1_4) {
-    assemble(kModern);
-  } else {
-    assemble(kOld);
+    std::memcpy(to + 12, &returns_[i], 4);
+    std::memcpy(to + 16, kConstant, sizeof kConstant);
+    to += 16 + sizeof kConstant;
+    if (source != nullptr) put<std::uint16_t>(to - 2, source[i]);
+    to = put<double>(to, times_[i]);
+    const float* value = values_.data() + i;
+    for (std::size_t k = 0; k < floats; ++k, value += kBlock) to = put<float>(to, *value);
+    *to++ = tag[i];
+    *to++ = beam[i];
   }
   if (summary.points == 0) summary.first_time_ns = points.time_ns[first];
   summary.points += rows;

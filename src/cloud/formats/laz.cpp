@@ -202,7 +202,7 @@ const CloudWriterFormat kLazFormat{
     "laz", ".laz", "LAS 1.4 compressed by LASzip",
     [](const std::string& path, const CloudHeader& header,
        const CloudWriterOptions& options) -> std::unique_ptr<CloudWriter> {
-      return std::make_unique<LazWriter>(path, las::Layout(las::Version::las_1_4, header, options));
+      return std::make_unique<LazWriter>(path, las::Layout(header, options));
     }};
 
 }  // namespace risley::cloud

@@ -6,12 +6,12 @@ namespace risley::cloud {
 
 const std::vector<const CloudWriterFormat*>& all_cloud_formats() {
   static const std::vector<const CloudWriterFormat*> formats{
-      &kLas14Format, &kLas12Format,
+      &kLasFormat,
 #ifdef RISLEY_HAS_LASZIP
       &kLazFormat,
 #endif
-      &kPlyFormat,   &kPcdFormat,    &kNpyFormat,    &kCsvFormat,
-      &kXyzFormat,   &kNetcdfFormat, &kRosbagFormat,
+      &kPlyFormat, &kPcdFormat,    &kNpyFormat,    &kCsvFormat,
+      &kXyzFormat, &kNetcdfFormat, &kRosbagFormat,
   };
   return formats;
 }

@@ -41,7 +41,6 @@ class OpenpylivoxRowFilter {
   /// Whether the row holds a return and so is to be written.
   /// @throws InvalidArgument when the range or angles are no numbers, or a second device appears
   bool accepts(const Observations& rows, std::size_t row);
-  std::uint64_t rows_seen() const { return rows_seen_; }
 
  private:
   std::uint64_t rows_seen_ = 0;

@@ -1,13 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Binary captures of openpylivox: the records of the sensor's packets, each followed by its time
-// as a double in seconds. Times are read to the nearest nanosecond and written as the double
-// nearest to that, so that a file of ours comes back byte by byte, and one of the program itself
-// up to the rounding noise far below a nanosecond that its summing leaves. Records without any
-// return are left out when writing, as the program does.
-#include <algorithm>
-#include <array>
-#include <cmath>
+// as a double in seconds. Times are read to the nearest nanosecond, far above the rounding noise
+// that the program's summing leaves.
 #include <span>
 
 #include <fmt/format.h>
@@ -17,7 +12,6 @@
 #include "risley/io/little_endian.hpp"
 #include "risley/io/seconds.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
-#include "risley/recordings/livox/packet_encoder.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/openpylivox.hpp"
@@ -29,7 +23,6 @@ using namespace livox;
 namespace {
 
 using io::load;
-using io::store;
 
 constexpr std::string_view kBinSignature = "OPENPYLIVOX";
 constexpr std::string_view kImuSignature = "OPENPYLIVOX_IMU";
@@ -166,110 +159,6 @@ class OpenpylivoxBinReader final : public Reader {
   bool tail_reported_ = false;
 };
 
-class OpenpylivoxBinWriter final : public Writer {
- public:
-  OpenpylivoxBinWriter(const std::string& path, const RecordingHeader& header)
-      : layout_(openpylivox_layout(header)), parts_(parts_of(layout_)), output_(path) {
-    std::uint8_t* const bytes = output_.append(kHeaderBytes);
-    const auto signature = layout_.imu ? kImuSignature : kBinSignature;
-    std::copy(signature.begin(), signature.end(), bytes);
-    if (layout_.imu) return;
-    store<std::int16_t>(bytes + 11, static_cast<std::int16_t>(layout_.firmware_type));
-    store<std::int16_t>(bytes + 13, static_cast<std::int16_t>(layout_.data_type));
-  }
-
-  void append(const Chunk& chunk) override {
-    if (layout_.imu) {
-      for (const auto& sample : chunk.imu) {
-        std::uint8_t* const bytes = append_record(sample.time_ns);
-        encode_imu(sample, bytes);
-      }
-      return;
-    }
-    const auto& rows = chunk.observations;
-    for (std::size_t row = 0; row < rows.size(); ++row) {
-      const std::uint64_t number = filter_.rows_seen();
-      const bool has_return = filter_.accepts(rows, row);
-      require_return_number(rows.return_number[row], number);
-      if (layout_.paired()) {
-        add_to_pair(rows, row, has_return);
-      } else if (has_return) {
-        encode(rows, row, number, rows.time_ns[row], rows.return_number[row]);
-      } else {
-        ++left_out_;
-      }
-    }
-  }
-
-  void close() override {
-    finish_pair();
-    output_.commit();
-  }
-
- private:
-  void require_return_number(int return_number, std::uint64_t row_number) const {
-    if (return_number >= 1 && return_number <= layout_.returns_per_shot()) return;
-    throw InvalidArgument(fmt::format("row {}: return number {}, allowed 1 to {} in this file",
-                                      row_number, return_number, layout_.returns_per_shot()));
-  }
-
-  /// Room for one record, with its time filled in.
-  std::uint8_t* append_record(std::int64_t time_ns) {
-    std::uint8_t* const bytes = output_.append(parts_.bytes());
-    store<double>(bytes + parts_.time_at, io::seconds_from_nanoseconds(time_ns));
-    return bytes;
-  }
-
-  void encode(const Observations& rows, std::size_t row, std::uint64_t row_number,
-              std::int64_t time_ns, int return_number) {
-    std::array<std::uint8_t, 64> record{};
-    encode_record(parts_.points, rows, row, row_number, record.data());
-    std::uint8_t* const bytes = append_record(time_ns);
-    std::copy_n(record.data(), parts_.points.bytes_per_record, bytes);
-    if (parts_.return_digit) {
-      bytes[parts_.bytes() - 1] = static_cast<std::uint8_t>('0' + return_number);
-    }
-  }
-
-  /// Collects the returns of a shot, which one record holds together.
-  void add_to_pair(const Observations& rows, std::size_t row, bool has_return) {
-    const std::size_t slot = rows.return_number[row] - std::size_t{1};
-    if (pair_open_ && (slot == 0 || pair_.time_ns[0] != rows.time_ns[row])) finish_pair();
-    if (!pair_open_) {
-      pair_.clear();
-      pair_.resize(2);
-      pair_open_ = true;
-      pair_has_return_ = false;
-      pair_rows_ = 0;
-      pair_.time_ns[0] = rows.time_ns[row];
-      pair_row_number_ = filter_.rows_seen() - 1 - slot;
-    }
-    ++pair_rows_;
-    pair_.azimuth[slot] = rows.azimuth[row];
-    pair_.zenith[slot] = rows.zenith[row];
-    pair_.range[slot] = rows.range[row];
-    pair_.intensity[slot] = rows.intensity[row];
-    pair_.tag[slot] = rows.tag[row];
-    pair_.valid[slot] = has_return ? 1 : 0;
-    pair_has_return_ = pair_has_return_ || has_return;
-    if (slot == 1) finish_pair();
-  }
-
-  void finish_pair() {
-    if (pair_open_ && pair_has_return_) encode(pair_, 0, pair_row_number_, pair_.time_ns[0], 1);
-    if (pair_open_ && !pair_has_return_) left_out_ += pair_rows_;
-    pair_open_ = false;
-  }
-
-  OpenpylivoxLayout layout_;
-  RecordParts parts_;
-  io::BlockOutput output_;
-  OpenpylivoxRowFilter filter_;
-  Observations pair_;  ///< two rows
-  std::uint64_t pair_row_number_ = 0, pair_rows_ = 0;
-  bool pair_open_ = false, pair_has_return_ = false;
-};
-
 }  // namespace
 
 const Format kOpenpylivoxBinFormat = {
@@ -280,9 +169,7 @@ const Format kOpenpylivoxBinFormat = {
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<OpenpylivoxBinReader>(path);
     },
-    [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
-      return std::make_unique<OpenpylivoxBinWriter>(path, header);
-    },
+    nullptr,
 };
 
 }  // namespace risley::recordings
