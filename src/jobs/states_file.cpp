@@ -87,7 +87,7 @@ void write_states(const io::OutputFile& output, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes) {
   tables::NetcdfOutput file(output);
   file.put_text("Conventions", "CF-1.9");
-  file.put_text("title", "Estimated rotor states of a Risley-prism lidar");
+  file.put_text("title", "Rotor states of a Risley-prism lidar, estimated by risley");
   for (const auto& [name, value] : attributes) file.put_text(name, value);
   const auto shots = content.rows > 0 ? file.define_dimension("time", content.rows)
                                       : file.define_growing_dimension("time");

@@ -141,7 +141,7 @@ class LasTest : public ::testing::Test {
     folder_ = std::filesystem::temp_directory_path() /
               ("risley-las-" + std::to_string(::getpid()) + "-" + std::to_string(++count));
     std::filesystem::create_directories(folder_);
-    header_.sensor = "mid-40";
+    header_.sensor = "Livox Mid-40";
     header_.serial = "0TFDG3B006H2Z11";
     header_.provenance = {{"command", "risley cloud"}, {"version", "0.1.0"}};
   }

@@ -144,7 +144,6 @@ void read_twice(const Format& format, std::uint64_t rows_per_byte,
     opened = true;
     const bool sound = read_all(*reader, most_rows, &chunks);
     if (sound && format.create != nullptr) write_and_read(format, reader->header(), chunks);
-    if (sound && bytes.size() % 4 == 3) convert(reader->header(), chunks, bytes.size() / 4);
   } catch (const Error&) {  // refused
   }
   // And as the command opens it, which may find it to be of another kind, or of none.
@@ -163,7 +162,9 @@ void read_twice(const Format& format, std::uint64_t rows_per_byte,
   if (bytes.size() % 3 != 0) options.extrinsics = recordings::Extrinsics{0.3, -0.2, 0.1, {1, 2, 3}};
   try {
     const auto reader = recordings::open_recording(file.path(), options);
-    read_all(*reader, most_opened, nullptr);
+    chunks.clear();
+    const bool sound = read_all(*reader, most_opened, &chunks);
+    if (sound && bytes.size() % 4 == 3) convert(reader->header(), chunks, bytes.size() / 4);
   } catch (const Error&) {  // refused, as it may be
   }
   constexpr std::size_t kSeldom = 32;  // takes longer than all the rest

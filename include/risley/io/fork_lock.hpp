@@ -12,14 +12,17 @@ namespace risley::io {
 /// For the same reason a child never takes this one.
 class ForkLock {
  public:
+  /// The one of the process.
   static ForkLock& instance() {
     static ForkLock lock;
     return lock;
   }
+  /// For who calls OpenSSL.
   std::shared_lock<std::shared_mutex> share() {
     const std::scoped_lock in_turn(turn_);
     return std::shared_lock(held_);
   }
+  /// For who forks.
   std::unique_lock<std::shared_mutex> alone() {
     const std::scoped_lock in_turn(turn_);
     return std::unique_lock(held_);
