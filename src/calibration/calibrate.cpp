@@ -58,13 +58,13 @@ void update_range_variances(PlanarSolution& solution) {
 
 /// Columns and matrices of one recording that belong together.
 void require_recording(const RangedRecording& recording) {
-  require_at_least("number of shots", static_cast<long long>(recording.shots.size()), 1);
+  require_at_least("number of shots", recording.shots.size(), 1);
   require_shots(recording.shots, recording.believed.train);
   const auto prisms = static_cast<std::size_t>(recording.believed.prisms());
   const auto matrix = [](const char* rows, const char* columns, const Eigen::MatrixXd& m,
                          std::size_t expected_rows, std::size_t expected_columns) {
-    require_length(rows, static_cast<std::size_t>(m.rows()), expected_rows);
-    require_length(columns, static_cast<std::size_t>(m.cols()), expected_columns);
+    require_length(rows, m.rows(), expected_rows);
+    require_length(columns, m.cols(), expected_columns);
   };
   const std::size_t free = recording.free.size();
   matrix("rows of the covariance", "columns of the covariance", recording.covariance, free, free);
@@ -124,7 +124,7 @@ class Work {
 
  private:
   void require_entries() const {
-    require_at_least("number of recordings", static_cast<long long>(recordings_.size()), 1);
+    require_at_least("number of recordings", recordings_.size(), 1);
     require_length_or_none("stations", options_.stations.size(), recordings_.size());
     require_above("range noise", range_noise_, 0, "m");
     require_not_below("range resolution", options_.sensor.range_resolution, 0, "m");
@@ -165,9 +165,8 @@ class Work {
     p.prior = p.train;
     p.range_offset_sigma = options_.range_offset_sigma;
     if (!paper() && !flat()) {
-      const bool intensities =
-          std::all_of(recordings_.begin(), recordings_.end(),
-                      [](const RangedRecording& one) { return !one.shots.intensity.empty(); });
+      const bool intensities = std::ranges::all_of(
+          recordings_, [](const RangedRecording& one) { return !one.shots.intensity.empty(); });
       p.range_terms = range_terms_of(options_.sensor, intensities);
       p.divergence = {options_.sensor.beam_divergence_horizontal,
                       options_.sensor.beam_divergence_vertical};
@@ -225,8 +224,8 @@ class Work {
     problem_.stations_known = matching.stations_known;
     result_.warnings.insert(result_.warnings.end(), matching.warnings.begin(),
                             matching.warnings.end());
-    const bool planes = std::any_of(problem_.walls.begin(), problem_.walls.end(),
-                                    [](const Wall& wall) { return wall.normal_sigma >= 0; });
+    const bool planes = std::ranges::any_of(
+        problem_.walls, [](const Wall& wall) { return wall.normal_sigma >= 0; });
     const bool stations =
         problem_.stations_known && !options_.stations.empty() && recordings_.size() > 1;
     result_.datum_kind = datum_kind(planes, stations);
@@ -449,7 +448,7 @@ void Work::fill_numbers(const PlanarSolution& solution) {
 
 void Work::fill_datum(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
-  std::vector<std::vector<double>> beams(static_cast<std::size_t>(p.train.prisms()));
+  std::vector<std::vector<double>> beams(p.train.prisms());
   std::vector<std::uint8_t> emitter;
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
     for (const std::size_t row :
@@ -474,15 +473,14 @@ void Work::fill_datum(const PlanarSolution& solution) {
 }  // namespace
 
 double Calibration::total_sigma(std::size_t parameter) const {
-  const auto at = static_cast<Eigen::Index>(parameter);
-  double variance = covariance(at, at);
-  if (held_changes.cols() > 0) variance += held_changes.row(at).squaredNorm();
+  double variance = covariance(parameter, parameter);
+  if (held_changes.cols() > 0) variance += held_changes.row(parameter).squaredNorm();
   return std::sqrt(variance);
 }
 
 const CalibratedNumber* Calibration::number(std::string_view name) const {
-  const auto found = std::find_if(numbers.begin(), numbers.end(),
-                                  [name](const auto& number) { return number.name == name; });
+  const auto found =
+      std::ranges::find_if(numbers, [name](const auto& number) { return number.name == name; });
   return found == numbers.end() ? nullptr : &*found;
 }
 

@@ -59,7 +59,7 @@ DirectionGrid::DirectionGrid(const std::vector<Beam>& beams) : angles_(beams.siz
   order_.resize(beams.size());
   std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < beams.size(); ++i) {
-    order_[next[static_cast<std::size_t>(cell_[i])]++] = i;
+    order_[next[cell_[i]]++] = i;
   }
 }
 
@@ -70,8 +70,7 @@ std::vector<std::uint32_t> DirectionGrid::block_sums(
     for (int column = 1; column + 1 < size_[0]; ++column) {
       for (int r = row - 1; r <= row + 1; ++r) {
         for (int c = column - 1; c <= column + 1; ++c) {
-          sums[static_cast<std::size_t>(row * size_[0] + column)] +=
-              counts[static_cast<std::size_t>(r * size_[0] + c)];
+          sums[row * size_[0] + column] += counts[r * size_[0] + c];
         }
       }
     }

@@ -129,11 +129,9 @@ void subtract_product(const double* left_0, const double* left_1, const double* 
 
 void require_priors(const FlightPriors& priors, const FlightModel& model) {
   const auto globals = static_cast<std::size_t>(model.unknowns().size());
-  require_length("mean of the priors", static_cast<std::size_t>(priors.mean.size()), globals);
-  require_length("rows of the priors' information",
-                 static_cast<std::size_t>(priors.information.rows()), globals);
-  require_length("columns of the priors' information",
-                 static_cast<std::size_t>(priors.information.cols()), globals);
+  require_length("mean of the priors", priors.mean.size(), globals);
+  require_length("rows of the priors' information", priors.information.rows(), globals);
+  require_length("columns of the priors' information", priors.information.cols(), globals);
   if (!priors.mean.allFinite() || !priors.information.allFinite()) {
     throw InvalidArgument("priors contain numbers that are not finite");
   }
@@ -154,7 +152,7 @@ double promised_to_globals(const FlightSystem& system, const FlightSystem::Step&
   std::vector<Index> free;
   const Index globals = system.globals();
   for (Index g = 0; g < globals; ++g) {
-    if (held.empty() || !held[static_cast<std::size_t>(g)]) free.push_back(g);
+    if (held.empty() || !held[g]) free.push_back(g);
   }
   MatrixXd units = MatrixXd::Zero(system.size(), globals);
   units.bottomRows(globals).setIdentity();
@@ -175,7 +173,7 @@ std::vector<PatchSums> patch_sums(const FlightRows& rows, const PlaneOfShot& pla
                                   const MatrixXd& moved) {
   std::vector<PatchSums> all;
   for (Index i = 0; i < moved.rows(); ++i) {
-    const std::size_t shot = rows.shots[static_cast<std::size_t>(i)];
+    const std::size_t shot = rows.shots[i];
     if (ground.patch[shot] < 0 || !(weight[i] > 0)) continue;
     if (all.empty() || all.back().plane != plane[shot]) {
       all.push_back({plane[shot], {}});
@@ -194,7 +192,7 @@ VectorXd unknown_values(const FlightModel& model) {
   values.segment<3>(FlightUnknowns::lever_arm(0)) = model.lever_arm;
   values[FlightUnknowns::range_offset()] = model.range_offset;
   values[FlightUnknowns::clock_offset()] = model.clock_offset;
-  values.segment(FlightUnknowns::parameter(0), static_cast<Index>(model.free.size())) =
+  values.segment(FlightUnknowns::parameter(0), model.free.size()) =
       estimation::free_values(model.train, model.free);
   return values;
 }
@@ -290,15 +288,14 @@ void FlightSystem::Parts::reduce(MatrixXd& hessian) {
       places.emplace_back(static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(k));
     }
   }
-  const Listing by_knot(static_cast<std::size_t>(knots), places.size(), [&](std::size_t i) {
+  const Listing by_knot(knots, places.size(), [&](std::size_t i) {
     return eliminated[places[i].first].knots[places[i].second];
   });
   const Index g0 = first_global();
   // Each task has the columns of one knot for itself.
-  parallel::for_each(static_cast<std::size_t>(knots), [&](Index knot) {
+  parallel::for_each(knots, [&](Index knot) {
     const Index column = kCorrections * knot;
-    const auto key = static_cast<std::size_t>(knot);
-    for (std::size_t i = by_knot.begin[key]; i < by_knot.begin[key + 1]; ++i) {
+    for (std::size_t i = by_knot.begin[knot]; i < by_knot.begin[knot + 1]; ++i) {
       const auto [p, slot] = places[by_knot.entry[i]];
       const EliminatedPlane& plane = eliminated[p];
       const Eigen::Matrix<double, kCorrections, 3> own =
@@ -342,13 +339,12 @@ void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPrior
     const KnotInformation& own = chain.back();
     for (Index k = 0; k < knots; ++k) {
       const Index at = kCorrections * k + c;
-      const auto i = static_cast<std::size_t>(k);
-      hessian(at, at) += own.diagonal[i];
-      right[at] -= own.diagonal[i] * model.corrections(c, k);
+      hessian(at, at) += own.diagonal[k];
+      right[at] -= own.diagonal[k] * model.corrections(c, k);
       if (k + 1 == knots) continue;
-      hessian(at + kCorrections, at) += own.next[i];
-      right[at] -= own.next[i] * model.corrections(c, k + 1);
-      right[at + kCorrections] -= own.next[i] * model.corrections(c, k);
+      hessian(at + kCorrections, at) += own.next[k];
+      right[at] -= own.next[k] * model.corrections(c, k + 1);
+      right[at + kCorrections] -= own.next[k] * model.corrections(c, k);
     }
   }
 }
@@ -357,10 +353,10 @@ void FlightSystem::Parts::hold(const FlightPriors& priors, MatrixXd& hessian) {
   for (std::size_t g = 0; g < priors.held.size(); ++g) {
     if (priors.held[g]) held.push_back(static_cast<Index>(g));
   }
-  held_columns.resize(size(), static_cast<Index>(held.size()));
+  held_columns.resize(size(), held.size());
   for (std::size_t h = 0; h < held.size(); ++h) {
     const Index at = first_global() + held[h];
-    auto column = held_columns.col(static_cast<Index>(h));
+    auto column = held_columns.col(h);
     column.head(at) = hessian.row(at).head(at).transpose();
     column.tail(size() - at) = hessian.col(at).tail(size() - at);
   }
@@ -377,8 +373,7 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
                            const FlightPriors& priors)
     : parts_(std::make_unique<Parts>()) {
   require_priors(priors, model);
-  require_length("globals of the equations", static_cast<std::size_t>(equations.globals),
-                 static_cast<std::size_t>(model.unknowns().size()));
+  require_length("globals of the equations", equations.globals, model.unknowns().size());
   require_length("intervals of the equations", equations.knot_hessian.size(),
                  model.knots.intervals.size());
   Parts& p = *parts_;
@@ -420,8 +415,7 @@ Index FlightSystem::size() const { return parts_->size(); }
 Index FlightSystem::globals() const { return parts_->globals; }
 
 MatrixXd FlightSystem::solve(const MatrixXd& right) const {
-  require_length("rows of the right side", static_cast<std::size_t>(right.rows()),
-                 static_cast<std::size_t>(size()));
+  require_length("rows of the right side", right.rows(), size());
   MatrixXd solution = parts_->scale.asDiagonal() * right;
   for (const Index g : parts_->held) solution.row(parts_->first_global() + g).setZero();
   parts_->root.solve_in_place(solution);
@@ -450,11 +444,10 @@ FlightSystem::Step FlightSystem::step() const {
   step.unknowns = solve(p.right);
   step.promised = step.unknowns.dot(p.right);
   const MatrixXd followed = planes_of(step.unknowns);
-  step.planes.resize(3, static_cast<Index>(p.planes));
+  step.planes.resize(3, p.planes);
   for (std::size_t i = 0; i < p.planes; ++i) {
-    const auto at = static_cast<Index>(i);
-    step.planes.col(at) = followed.col(0).segment<3>(3 * at) +
-                          p.eliminated[i].root_inverse.transpose() * p.eliminated[i].gradient;
+    step.planes.col(i) = followed.col(0).segment<3>(3 * i) +
+                         p.eliminated[i].root_inverse.transpose() * p.eliminated[i].gradient;
   }
   return step;
 }
@@ -465,7 +458,7 @@ FlightSystem::Band FlightSystem::inverse_band() const {
   const Index steps = kCorrections * std::max<Index>(p.knots - 1, 0);
   Band band{VectorXd::Zero(n), VectorXd::Zero(steps)};
   // Column j of L^-1 begins in row j; the inverse holds the products of its columns.
-  parallel::for_each(static_cast<std::size_t>(blocks), [&](Index block) {
+  parallel::for_each(blocks, [&](Index block) {
     const Index at = block * kInverseColumns, columns = std::min(kInverseColumns, n - at);
     const Index all = std::min(columns + kCorrections, n - at);
     MatrixXd part = MatrixXd::Zero(n - at, all);
@@ -495,14 +488,13 @@ MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
   MatrixXd result = MatrixXd::Zero(size(), columns.cols());
   result.bottomRows(p.globals) = p.prior * columns.bottomRows(p.globals);
   for (int c = 0; c < kCorrections; ++c) {
-    const KnotInformation& own = p.chain[static_cast<std::size_t>(c)];
+    const KnotInformation& own = p.chain[c];
     for (Index k = 0; k < p.knots; ++k) {
       const Index at = kCorrections * k + c;
-      const auto i = static_cast<std::size_t>(k);
-      result.row(at) += own.diagonal[i] * columns.row(at);
+      result.row(at) += own.diagonal[k] * columns.row(at);
       if (k + 1 == p.knots) continue;
-      result.row(at) += own.next[i] * columns.row(at + kCorrections);
-      result.row(at + kCorrections) += own.next[i] * columns.row(at);
+      result.row(at) += own.next[k] * columns.row(at + kCorrections);
+      result.row(at + kCorrections) += own.next[k] * columns.row(at);
     }
   }
   return result;
@@ -510,10 +502,9 @@ MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
 
 void apply(const FlightSystem::Step& step, FlightModel& model) {
   const Index knots = static_cast<Index>(model.knots.size());
-  require_length("unknowns of the step", static_cast<std::size_t>(step.unknowns.size()),
-                 static_cast<std::size_t>(kCorrections * knots + model.unknowns().size()));
-  require_length("planes of the step", static_cast<std::size_t>(step.planes.cols()),
-                 model.planes.size());
+  require_length("unknowns of the step", step.unknowns.size(),
+                 kCorrections * knots + model.unknowns().size());
+  require_length("planes of the step", step.planes.cols(), model.planes.size());
   model.corrections += Eigen::Map<const MatrixXd>(step.unknowns.data(), kCorrections, knots);
   const VectorXd own = step.unknowns.tail(model.unknowns().size());
   const Eigen::Quaterniond turned(model.boresight * algebra::rotation_by(own.head<3>()));
@@ -529,7 +520,7 @@ void apply(const FlightSystem::Step& step, FlightModel& model) {
   }
   for (std::size_t i = 0; i < model.planes.size(); ++i) {
     GroundPlane& plane = model.planes[i];
-    const auto change = step.planes.col(static_cast<Index>(i));
+    const auto change = step.planes.col(i);
     const auto [first, second] = tangents_of(plain(plane.normal));
     plane.centre += change[2] * plane.normal;
     plane.normal =
@@ -609,7 +600,7 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
         own.parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);
         if (rows.shots.empty()) return;
         const TrajectoryKnots::Interval& interval = model.knots.intervals[rows.interval];
-        const auto n = static_cast<Index>(rows.shots.size());
+        const Index n = rows.shots.size();
         const Eigen::Map<
             const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
             values(rows.values.data(), n, rows.columns);
@@ -619,14 +610,14 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
         VectorXd weight_behind(n);
         const auto length = static_cast<double>(interval.end_ns - interval.begin_ns);
         for (Index i = 0; i < n; ++i) {
-          const std::int64_t time = shots.time_ns[rows.shots[static_cast<std::size_t>(i)]];
+          const std::int64_t time = shots.time_ns[rows.shots[i]];
           weight_behind[i] = static_cast<double>(time - interval.begin_ns) / length;
         }
         const MatrixXd before = pose * solved.middleRows<kCorrections>(knot);
         const MatrixXd behind = pose * solved.middleRows<kCorrections>(knot + kCorrections);
         moved += before + weight_behind.asDiagonal() * (behind - before);
         for (Index i = 0; i < n; ++i) {
-          const std::int32_t p = plane[rows.shots[static_cast<std::size_t>(i)]];
+          const std::int32_t p = plane[rows.shots[i]];
           for (Index k = 0; k < 3; ++k) {
             moved.row(i) +=
                 values(i, globals + kCorrections + k) * planes.row(3 * static_cast<Index>(p) + k);
@@ -658,7 +649,7 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
             std::floor(static_cast<double>(first_ns - interval.begin_ns) / sample_ns));
         for (Index i = 0; i < n; ++i) {
           if (weight[i] == 0) continue;
-          const std::int64_t time = shots.time_ns[rows.shots[static_cast<std::size_t>(i)]];
+          const std::int64_t time = shots.time_ns[rows.shots[i]];
           const auto sample = static_cast<Index>(std::floor(
                                   static_cast<double>(time - interval.begin_ns) / sample_ns)) -
                               first_sample;
@@ -667,7 +658,7 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
           const VectorXd weighted = weight[i] * moved.row(i).transpose();
           for (Index k = 0; k < kCorrections; ++k) {
             own.parts.col(kCorrections * part + k) += pose(i, k) * weighted;
-            const double white = weights.white[static_cast<std::size_t>(k)];
+            const double white = weights.white[k];
             if (white == 0) continue;
             shared.col(kCorrections * std::min(sample, samples - 1) + k) +=
                 white * pose(i, k) * weighted;

@@ -122,8 +122,7 @@ class FlightWork {
         model_(start_.model),
         priors_(start_.priors) {
     require_flight_shots(shots);
-    require_length("rotation_angle", shots.rotation_angle.size(),
-                   static_cast<std::size_t>(options_.sensor.prisms()));
+    require_length("rotation_angle", shots.rotation_angle.size(), options_.sensor.prisms());
     check_beams(options_.sensor.train, shots.beam, shots.size());
     const Eigen::Matrix3d to_tangent = tangent_.axes.transpose();
     for (const scenes::KnownGround& ground : options_.control) {
@@ -192,7 +191,7 @@ class FlightWork {
   void set_knots(const FlightShots& shots, double spacing) {
     const TrajectoryKnots knots = make_knots(shots, spacing);
     model_.corrections = model_.knots.size() == 0
-                             ? MatrixXd::Zero(kCorrections, static_cast<Index>(knots.size()))
+                             ? MatrixXd::Zero(kCorrections, knots.size())
                              : resampled(model_.knots, model_.corrections, knots);
     model_.knots = knots;
   }
@@ -230,9 +229,8 @@ class FlightWork {
     for (const ProcessBreak& one : priors_.breaks) {
       for (const TrajectoryKnots::Interval& interval : model_.knots.intervals) {
         if (interval.knot != one.knot) continue;
-        std::fill(flight.cells.plane.begin() + static_cast<std::ptrdiff_t>(interval.first_shot),
-                  flight.cells.plane.begin() + static_cast<std::ptrdiff_t>(interval.end_shot),
-                  kNoPlane);
+        std::fill(flight.cells.plane.begin() + interval.first_shot,
+                  flight.cells.plane.begin() + interval.end_shot, kNoPlane);
       }
     }
   }
@@ -589,8 +587,7 @@ void FlightWork::break_process(const ProcessCheck& check, const std::vector<std:
     for (int c = 0; c < kCorrections; ++c) {
       const double usual =
           priors_.process.sigmas(model_.knots.time_ns[knot])[static_cast<Index>(error_of(c))];
-      one.sigma[static_cast<std::size_t>(c)] =
-          kBreakSigmas * std::max(usual, std::abs(check.jump(c, step)));
+      one.sigma[c] = kBreakSigmas * std::max(usual, std::abs(check.jump(c, step)));
     }
     priors_.breaks.push_back(one);
     break_score_.push_back(check.score.col(step).cwiseAbs().maxCoeff());
@@ -604,12 +601,12 @@ void FlightWork::fill_mount_and_sensor() {
   const VectorXd values = unknown_values(model_);
   result_.mount = options_.mount;
   const auto found = [&](trajectories::StatedValue& stated, Index i) {
-    if (priors_.held[static_cast<std::size_t>(i)]) return;
+    if (priors_.held[i]) return;
     stated = {values[i], std::sqrt(result_.covariance(i, i)), "calibrated in flight by risley"};
   };
   for (Index i = 0; i < 3; ++i) {
-    found(result_.mount.boresight[static_cast<std::size_t>(i)], i);
-    found(result_.mount.lever_arm[static_cast<std::size_t>(i)], 3 + i);
+    found(result_.mount.boresight[i], i);
+    found(result_.mount.lever_arm[i], 3 + i);
   }
   found(result_.mount.clock_offset, FlightUnknowns::clock_offset());
   sensors::Sensor& sensor = result_.sensor;
@@ -620,8 +617,8 @@ void FlightWork::fill_mount_and_sensor() {
   sensor.provenance.clear();
   std::vector<Index> of_mount_rows, of_sensor_rows;
   for (Index i = 0; i < globals; ++i) {
-    const bool adjusted = !priors_.held[static_cast<std::size_t>(i)];
-    const std::string& name = names[static_cast<std::size_t>(i)];
+    const bool adjusted = !priors_.held[i];
+    const std::string& name = names[i];
     if (i < FlightUnknowns::range_offset() || i == FlightUnknowns::clock_offset()) {
       if (adjusted) of_mount_rows.push_back(i);
       continue;
@@ -635,7 +632,7 @@ void FlightWork::fill_mount_and_sensor() {
   }
   const auto named = [&](const std::vector<Index>& rows) {
     algebra::NamedCovariance some;
-    for (const Index i : rows) some.names.push_back(names[static_cast<std::size_t>(i)]);
+    for (const Index i : rows) some.names.push_back(names[i]);
     some.matrix = result_.covariance(rows, rows);
     return some;
   };
@@ -661,10 +658,10 @@ FlightWork::TestedSystem FlightWork::tested_system() const {
   priors.information.conservativeResizeLike(MatrixXd::Zero(size, size));
   priors.information(drift, drift) = 1 / (kDriftPrior * kDriftPrior);
   priors.information(delay, delay) = 1 / (kDelayPrior * kDelayPrior);
-  priors.held.resize(static_cast<std::size_t>(size), false);
+  priors.held.resize(size, false);
   for (Index i = drift - static_cast<Index>(start_.considered); i < drift; ++i) {
     priors.information(i, i) = 1 / (kHeldPrior * kHeldPrior);
-    priors.held[static_cast<std::size_t>(i)] = false;
+    priors.held[i] = false;
   }
   FlightSystem system(
       flight_equations(full_.shots, full_.poses, full_.cells.plane, model, final_weights_), model,
@@ -678,8 +675,8 @@ bool FlightWork::assumptions_explain() const {
   const TestedSystem tested = tested_system();
   const VectorXd step = tested.system.step().unknowns;
   const MatrixXd corrections =
-      model_.corrections + Eigen::Map<const MatrixXd>(step.data(), kCorrections,
-                                                      static_cast<Index>(model_.knots.size()));
+      model_.corrections +
+      Eigen::Map<const MatrixXd>(step.data(), kCorrections, model_.knots.size());
   const ProcessCheck check =
       check_process(model_.knots, corrections, priors_, tested.system.inverse_band());
   return jumps_of(model_.knots, check).empty() &&
@@ -705,8 +702,7 @@ void FlightWork::test_assumptions() {
   const auto clock = static_cast<Index>(FlightUnknowns::clock_offset());
   const double clock_off = std::abs(model_.clock_offset - options_.mount.clock_offset.value);
   if (std::abs(late.value) > kDelayConsidered * late.sigma ||
-      (!priors_.held[static_cast<std::size_t>(clock)] &&
-       clock_off > kDelayConsidered * start_.prior_sigma[clock])) {
+      (!priors_.held[clock] && clock_off > kDelayConsidered * start_.prior_sigma[clock])) {
     // By how much everything else moves where the delay is free.
     const VectorXd moves = system.solve(VectorXd::Unit(system.size(), system.size() - 1));
     may_be_off_ = std::hypot(late.value, late.sigma) / moves[moves.size() - 1] *
@@ -716,7 +712,7 @@ void FlightWork::test_assumptions() {
   const VectorXd values = unknown_values(model_);
   for (Index i = 0; i < considered; ++i) {
     const Index row = first + i;
-    judge_held({.name = names[static_cast<std::size_t>(row)],
+    judge_held({.name = names[row],
                 .held = values[row],
                 .stated_sigma = start_.prior_sigma[row],
                 .told = values[row] + steps[i],
@@ -755,8 +751,7 @@ void FlightWork::judge_attitude_delay(double value, double sigma) {
 
 /// A clock offset that takes what it cannot be is an error of something else.
 void FlightWork::judge_clock_offset() {
-  const FlightUnknown& clock =
-      result_.unknowns[static_cast<std::size_t>(FlightUnknowns::clock_offset())];
+  const FlightUnknown& clock = result_.unknowns[FlightUnknowns::clock_offset()];
   if (clock.held) return;
   result_.clock_contradicts = std::abs(clock.value - clock.start) >
                               kClockSigmas * std::hypot(clock.prior_sigma, clock.sigma);
@@ -770,7 +765,7 @@ void FlightWork::judge_clock_offset() {
 void FlightWork::fill_trajectory_fit() {
   TrajectoryFit& fit = result_.trajectory_fit;
   for (int c = 0; c < kCorrections; ++c) {
-    fit.factor[static_cast<std::size_t>(c)] = process_factor_[static_cast<Index>(error_of(c))];
+    fit.factor[c] = process_factor_[static_cast<Index>(error_of(c))];
   }
   const TrajectoryKnots& knots = model_.knots;
   for (std::size_t i = 0; i < priors_.breaks.size(); ++i) {
@@ -783,30 +778,28 @@ void FlightWork::fill_trajectory_fit() {
     jump.score = break_score_[i];
     for (int c = 0; c < kCorrections; ++c) {
       const Index at = kCorrections * static_cast<Index>(knot) + c, next = at + kCorrections;
-      const auto own = static_cast<std::size_t>(c);
-      const double change = model_.corrections(c, static_cast<Index>(knot) + 1) -
-                            model_.corrections(c, static_cast<Index>(knot));
+      const double change =
+          model_.corrections(c, static_cast<Index>(knot) + 1) - model_.corrections(c, knot);
       // Corrections turn about up, and headings about down.
-      jump.size[own] = error_of(c) == trajectories::PoseError::heading ? change : -change;
-      jump.sigma[own] =
+      jump.size[c] = error_of(c) == trajectories::PoseError::heading ? change : -change;
+      jump.sigma[c] =
           std::sqrt(std::max(0.0, band_.diagonal[at] + band_.diagonal[next] - 2 * band_.next[at]));
     }
   }
-  std::sort(
-      fit.jumps.begin(), fit.jumps.end(),
-      [](const TrajectoryJump& a, const TrajectoryJump& b) { return a.begin_ns < b.begin_ns; });
+  std::ranges::sort(fit.jumps, [](const TrajectoryJump& a, const TrajectoryJump& b) {
+    return a.begin_ns < b.begin_ns;
+  });
   for (const TrajectoryJump& jump : fit.jumps) {
     result_.warnings.push_back(in_words(jump, full_.shots.time_ns.front()) +
                                "; it has a step of its own in the adjustment. Is there a loss of "
                                "the GNSS fix, or an alignment, in the trajectory's log?");
   }
   for (int c = 0; c < kCorrections; ++c) {
-    const auto own = static_cast<std::size_t>(c);
-    if (fit.factor[own] == 1) continue;
+    if (fit.factor[c] == 1) continue;
     result_.warnings.push_back(fmt::format(
         "the trajectory's error {} is {:.2g} times as large as stated (chi2 of its corrections "
         "{:.3g}, {:.3g} expected); the adjustment counts it as that large, and the sigmas with it",
-        correction_name(c), fit.factor[own], fit.chi2[own], fit.expected[own]));
+        correction_name(c), fit.factor[c], fit.chi2[c], fit.expected[c]));
   }
   if (!fit.fits) result_.warnings.push_back(misfit_in_words(result_));
 }
@@ -830,9 +823,8 @@ void FlightWork::fill_control() {
     seen.name = ground.name;
     seen.sigma = ground.sigma;
     const GroundCircle circle{control_[i].place, ground.radius};
-    seen.shots = static_cast<std::size_t>(
-        std::count_if(full_.points.begin(), full_.points.end(),
-                      [&](const std::array<float, 3>& point) { return circle.holds(point); }));
+    seen.shots = static_cast<std::size_t>(std::ranges::count_if(
+        full_.points, [&](const std::array<float, 3>& point) { return circle.holds(point); }));
     seen.used = control_plane_[i] != kNoPlane;
     if (!seen.used) {
       result_.warnings.push_back(fmt::format(
@@ -844,7 +836,7 @@ void FlightWork::fill_control() {
               : " are not on a plane"));
       continue;
     }
-    const GroundPlane& plane = model_.planes[static_cast<std::size_t>(control_plane_[i])];
+    const GroundPlane& plane = model_.planes[control_plane_[i]];
     seen.off = plane.normal.dot(plane.centre - control_[i].place);
     seen.significant = std::abs(seen.off) > kTestedSigmas * seen.sigma;
     if (!seen.significant) continue;

@@ -83,10 +83,10 @@ struct FittedGround {
 
 std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::uint32_t> rows) {
   const std::size_t count = std::min(rows.size(), kFittedPoints);
-  Eigen::Matrix3Xd some(3, static_cast<Index>(count));
+  Eigen::Matrix3Xd some(3, count);
   for (std::size_t i = 0; i < count; ++i) {
     const auto& point = points[rows[i * rows.size() / count]];
-    some.col(static_cast<Index>(i)) = Vector3d(point[0], point[1], point[2]);
+    some.col(i) = Vector3d(point[0], point[1], point[2]);
   }
   const Vector3d centre = some.rowwise().mean();
   some.colwise() -= centre;
@@ -109,8 +109,7 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
     const double steep = 1 / normal.norm();
     std::vector<double> distance(count);
     for (Index i = 0; i < some.cols(); ++i) {
-      distance[static_cast<std::size_t>(i)] =
-          std::abs(normal.dot(some.col(i)) - solution[2]) * steep;
+      distance[i] = std::abs(normal.dot(some.col(i)) - solution[2]) * steep;
     }
     result.distance = distance;
     const double scale = kCauchyMads * median(distance);
@@ -118,7 +117,7 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
     result.plane.centre = centre + Vector3d(0, 0, solution[2]);
     if (!(scale > 1e-9)) break;
     for (Index i = 0; i < some.cols(); ++i) {
-      const double part = result.distance[static_cast<std::size_t>(i)] / scale;
+      const double part = result.distance[i] / scale;
       weight[i] = 1 / (1 + part * part);
     }
   }
@@ -154,7 +153,7 @@ void require_cells(const GroundCellOptions& options) {
   require_between("size of a cell", options.size, 0.01, 1e4, "m");
   require_between("shift of the grid", options.shift_east, -1, 1);
   require_between("shift of the grid", options.shift_north, -1, 1);
-  require_at_least("least shots of a cell", static_cast<long long>(options.least_shots), 3);
+  require_at_least("least shots of a cell", options.least_shots, 3);
   require_between("steepest", options.steepest, 0, 1.57, "rad");
   require_threshold("most roughness", options.most_roughness);
   require_not_below("noise of the cells", options.noise, 0, "m");
@@ -175,7 +174,7 @@ struct SortedRows {
     std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
     for (std::size_t i = 0; i < number.size(); ++i) {
       if (number[i] != none) {
-        rows[next[static_cast<std::size_t>(number[i])]++] = static_cast<std::uint32_t>(i);
+        rows[next[number[i]]++] = static_cast<std::uint32_t>(i);
       }
     }
   }
@@ -189,10 +188,8 @@ struct SortedRows {
 ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
                          const FlightModel& model) {
   require_length("poses", poses.pose.size(), shots.size());
-  require_length("rotation_angle", shots.rotation_angle.size(),
-                 static_cast<std::size_t>(model.train.prisms()));
-  require_length("corrections", static_cast<std::size_t>(model.corrections.cols()),
-                 model.knots.size());
+  require_length("rotation_angle", shots.rotation_angle.size(), model.train.prisms());
+  require_length("corrections", model.corrections.cols(), model.knots.size());
   ShotPoints points(shots.size());
   const double clock_step = model.clock_offset - poses.clock_offset;
   const Eigen::Matrix3d mount = model.nominal * model.boresight;
@@ -241,8 +238,8 @@ ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
                              0.5 * turn.cross(across);
       const bool sound = point.allFinite() && point.cwiseAbs().maxCoeff() < kFarthest;
       for (std::size_t k = 0; k < 3; ++k) {
-        points[shot][k] = sound ? static_cast<float>(point[static_cast<Index>(k)])
-                                : std::numeric_limits<float>::quiet_NaN();
+        points[shot][k] =
+            sound ? static_cast<float>(point[k]) : std::numeric_limits<float>::quiet_NaN();
       }
     }
   };
@@ -269,12 +266,12 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
     for (std::size_t i = begin; i < end; ++i) {
       if (std::isfinite(points[i][0])) own.push_back(key_of(points[i], options));
     }
-    std::sort(own.begin(), own.end());
+    std::ranges::sort(own);
     own.erase(std::unique(own.begin(), own.end()), own.end());
   });
   std::vector<std::uint64_t> keys;
   for (const auto& own : found) keys.insert(keys.end(), own.begin(), own.end());
-  std::sort(keys.begin(), keys.end());
+  std::ranges::sort(keys);
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   const CellNumbers numbers(std::move(keys));
   GroundCells cells;
@@ -308,7 +305,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
   for_each_block(points.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       if (cells.plane[i] != kNoPlane) {
-        cells.plane[i] = number[static_cast<std::size_t>(cells.plane[i])];
+        cells.plane[i] = number[cells.plane[i]];
       }
     }
   });
@@ -395,7 +392,7 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
   for (std::size_t i = 0; i < seen.size(); ++i) {
     for (std::size_t j = i + 1; j < seen.size() && seen[j].plane == seen[i].plane; ++j) {
       const auto first = seen[i].strip, second = seen[j].strip;
-      auto at = std::find_if(sums.begin(), sums.end(), [&](const Sums& own) {
+      auto at = std::ranges::find_if(sums, [&](const Sums& own) {
         return own.pair.first == first && own.pair.second == second;
       });
       if (at == sums.end()) {
@@ -439,14 +436,14 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
     }
     pairs.push_back(own.pair);
   }
-  std::sort(pairs.begin(), pairs.end(), [](const StripPair& a, const StripPair& b) {
+  std::ranges::sort(pairs, [](const StripPair& a, const StripPair& b) {
     return std::pair(a.first, a.second) < std::pair(b.first, b.second);
   });
   return pairs;
 }
 
 const StripPair* find_pair(const std::vector<StripPair>& pairs, const StripPair& like) {
-  const auto at = std::find_if(pairs.begin(), pairs.end(), [&](const StripPair& pair) {
+  const auto at = std::ranges::find_if(pairs, [&](const StripPair& pair) {
     return pair.first == like.first && pair.second == like.second;
   });
   return at == pairs.end() ? nullptr : &*at;

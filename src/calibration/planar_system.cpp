@@ -39,7 +39,7 @@ class WallLayout {
     }
     rotation_.assign(p.stations.size(), -1);
     for (std::size_t i = 0; i < recordings.size(); ++i) rotation_[recordings[i]] = turns[i];
-    const auto believed = static_cast<Index>(p.considered.size());
+    const Index believed = p.considered.size();
     believed_ = add(at.shared(), believed);
     if (!p.mean_angle_covariance.empty()) {
       for (const std::size_t recording : recordings) {
@@ -88,7 +88,7 @@ class ChainBuilder {
   }
   void set(Index row, Index column, double value) { entries_.push_back({row, column, value}); }
   Chain take() {
-    chain_.to = Eigen::MatrixXd::Zero(rows_, static_cast<Index>(chain_.at.size()));
+    chain_.to = Eigen::MatrixXd::Zero(rows_, chain_.at.size());
     for (const Entry& entry : entries_) chain_.to(entry.row, entry.column) = entry.value;
     return std::move(chain_);
   }
@@ -110,7 +110,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
   ChainBuilder chain(columns.size());
   for (Index j = 0; j < at.free(); ++j) {
     const Index own = chain.add(layout.shared(j));
-    for (const int place : p.free[static_cast<std::size_t>(j)].places) {
+    for (const int place : p.free[j].places) {
       chain.set(places.column(place), own, 1.0);
     }
   }
@@ -143,7 +143,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
   chain.set(columns.distance(), chain.add(at.distance(view)), 1.0);
   for (Index j = 0; j < static_cast<Index>(p.considered.size()); ++j) {
     const Index own = chain.add(layout.believed() + j);
-    for (const int place : p.considered[static_cast<std::size_t>(j)].places) {
+    for (const int place : p.considered[j].places) {
       // The other error parameters that the sensor believes in only act through the angles.
       if (is_held_material(place, p)) chain.set(places.column(place), own, 1.0);
     }
@@ -178,14 +178,14 @@ double add_cells(const PlanarProblem& p, std::size_t view, const PlaneColumns& c
   const auto [u1, u2] = tangents_of(p.walls[seen.wall].normal);
   const Eigen::Vector3d& position = p.stations[seen.recording].position;
   const double stand_u = eigen(u1).dot(position), stand_v = eigen(u2).dot(position);
-  const auto cells = static_cast<Index>(grid.cells.size());
+  const Index cells = grid.cells.size();
   // A shot's row by the wall's height, and that times its place against the middle of its cell:
   // u - middle = -side n1 / d + (stand - middle).
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows = equations.cells;
   double within = equations.cost;
   for (Index cell = 0; cell < cells; ++cell) {
-    const double off_u = stand_u - grid.middle_u(static_cast<std::size_t>(cell));
-    const double off_v = stand_v - grid.middle_v(static_cast<std::size_t>(cell));
+    const double off_u = stand_u - grid.middle_u(cell);
+    const double off_v = stand_v - grid.middle_v(cell);
     auto d = rows.row(3 * cell), du = rows.row(3 * cell + 1), dv = rows.row(3 * cell + 2);
     const double all = d[columns.distance()];
     if (!(all > 0)) continue;
@@ -201,11 +201,11 @@ double add_cells(const PlanarProblem& p, std::size_t view, const PlaneColumns& c
           -row[columns.normal(0)] + seen.side * off_u * by_height,
           -row[columns.normal(1)] + seen.side * off_v * by_height;
     }
-    sums.weight[static_cast<std::size_t>(cell)] += weight;
+    sums.weight[cell] += weight;
   }
   const Eigen::MatrixXd own = algebra::product(rows.leftCols(columns.size()), chain.to);
   for (std::size_t j = 0; j < chain.at.size(); ++j) {
-    sums.columns.col(chain.at[j]) += own.col(static_cast<Index>(j));
+    sums.columns.col(chain.at[j]) += own.col(j);
   }
   sums.columns.rightCols(1) += rows.rightCols(1);
   return within;
@@ -222,12 +222,11 @@ ViewSystem add_view(const PlanarProblem& p, std::size_t view, const PlaneColumns
   const Eigen::VectorXd gradient = algebra::transposed_times(chain.to, equations.gradient);
   const Index residual = sums.system.cols() - 1;
   for (std::size_t j = 0; j < chain.at.size(); ++j) {
-    const auto column = static_cast<Index>(j);
     for (std::size_t i = 0; i < chain.at.size(); ++i) {
-      sums.system(chain.at[i], chain.at[j]) += own.normal(static_cast<Index>(i), column);
+      sums.system(chain.at[i], chain.at[j]) += own.normal(i, j);
     }
-    sums.system(chain.at[j], residual) += gradient[column];
-    sums.system(residual, chain.at[j]) += gradient[column];
+    sums.system(chain.at[j], residual) += gradient[j];
+    sums.system(residual, chain.at[j]) += gradient[j];
   }
   sums.system(residual, residual) += equations.cost;
   own.cost = equations.cost;
@@ -251,7 +250,7 @@ void add_priors(const PlanarProblem& p, const Unknowns& at, Eigen::MatrixXd& sys
   for (std::size_t j = 0; j < p.prior_sigma.size(); ++j) {
     if (!std::isfinite(p.prior_sigma[j])) continue;
     const int place = p.free[j].places.front();
-    tie(static_cast<Index>(j), p.prior_sigma[j], p.train[place] - p.prior[place], system);
+    tie(j, p.prior_sigma[j], p.train[place] - p.prior[place], system);
   }
   if (at.range_offset() >= 0) tie(at.range_offset(), p.range_offset_sigma, p.range_offset, system);
   for (std::size_t i = 0; i < p.sizes.size(); ++i) {
@@ -281,7 +280,7 @@ std::vector<std::vector<std::size_t>> views_of_walls(const PlanarProblem& p) {
 }  // namespace
 
 Unknowns::Unknowns(const PlanarProblem& p)
-    : free_(static_cast<Index>(p.free.size())),
+    : free_(p.free.size()),
       rotation_(p.stations.size(), -1),
       own_(p.walls.size(), 0),
       normal_(p.walls.size(), -1),
@@ -319,12 +318,10 @@ Places::Places(const PlanarProblem& p, const HeldQuantities& held) {
   }
 }
 
-Index Places::column(int place) const {
-  return std::find(all_.begin(), all_.end(), place) - all_.begin();
-}
+Index Places::column(int place) const { return std::ranges::find(all_, place) - all_.begin(); }
 
 void Places::add(int place) {
-  if (std::find(all_.begin(), all_.end(), place) == all_.end()) all_.push_back(place);
+  if (std::ranges::find(all_, place) == all_.end()) all_.push_back(place);
 }
 
 Index considered_size(const PlanarProblem& p) {
@@ -368,7 +365,7 @@ PlanarSystem build_system(const PlanarProblem& p, const HeldQuantities& held, co
   for (std::size_t w = 0; w < p.walls.size(); ++w) {
     std::vector<std::size_t> recordings;
     for (const std::size_t view : views[w]) recordings.push_back(p.views[view].recording);
-    std::sort(recordings.begin(), recordings.end());
+    std::ranges::sort(recordings);
     recordings.erase(std::unique(recordings.begin(), recordings.end()), recordings.end());
     const WallLayout layout(p, held, at, w, recordings);
     WallSums& sums = problem.walls.emplace_back();

@@ -21,7 +21,7 @@ constexpr std::size_t kChunkShots = 8192;
 void check(const RangedShots& shots, const PlaneView& view, const ResidualColumns& columns) {
   const std::span<const std::uint32_t> cell_begin = view.cell_begin;
   if (!cell_begin.empty() && (cell_begin.front() != 0 || cell_begin.back() != shots.size() ||
-                              !std::is_sorted(cell_begin.begin(), cell_begin.end()))) {
+                              !std::ranges::is_sorted(cell_begin))) {
     throw InvalidArgument("cell_begin does not divide the shots");
   }
   require_shots(shots, view.train);

@@ -38,10 +38,9 @@ void fire(const PlannedFlight& planned, std::uint64_t first, std::uint64_t last,
   const sensors::Sensor& sensor = planned.sensor;
   const RandomStream choice(seed, kChoice);
   fired = {};
-  const std::vector<double> start =
-      sensor.sequence && !sensor.sequence->rotation_angle.empty()
-          ? sensor.sequence->rotation_angle
-          : std::vector<double>(static_cast<std::size_t>(sensor.prisms()), 0.0);
+  const std::vector<double> start = sensor.sequence && !sensor.sequence->rotation_angle.empty()
+                                        ? sensor.sequence->rotation_angle
+                                        : std::vector<double>(sensor.prisms(), 0.0);
   fired.shots.rotation_angle.resize(start.size());
   const auto emitters = static_cast<std::uint64_t>(sensor.train.emitters());
   const auto clock_ns =
@@ -129,8 +128,7 @@ void for_each_planned_piece(const PlannedFlight& planned, const trajectories::Fl
   const sensors::Sensor& sensor = planned.sensor;
   trajectories::require_mount(planned.mount);
   require_at_least("prisms of the sensor", sensor.prisms(), 1);
-  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(),
-                 static_cast<std::size_t>(sensor.prisms()));
+  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), sensor.prisms());
   require_above("shot rate of the sensor", sensor.shot_rate, 0, "Hz");
   if (options.rate) {
     require_above("rate", *options.rate, 0, "Hz");

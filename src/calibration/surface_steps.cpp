@@ -102,10 +102,9 @@ class SmoothSurface {
   }
 
   void fit(std::vector<Cell>& cells, std::size_t terms) {
-    const auto size = static_cast<Eigen::Index>(terms);
     for (int round = 0; round < kMostWeightRounds; ++round) {
-      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
-      Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
+      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(terms, terms);
+      Eigen::VectorXd right = Eigen::VectorXd::Zero(terms);
       for (const Cell& cell : cells) {
         const double part = cell.z / (kTukey * spread_);
         // The square root of Tukey's weight over the variance.
@@ -113,9 +112,9 @@ class SmoothSurface {
         const auto row = terms_of(cell.x, cell.y);
         for (std::size_t i = 0; i < terms; ++i) {
           const double weighted = root * root * row[i];
-          right[static_cast<Eigen::Index>(i)] += weighted * cell.centre;
+          right[i] += weighted * cell.centre;
           for (std::size_t j = 0; j < terms; ++j) {
-            normal(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += weighted * row[j];
+            normal(i, j) += weighted * row[j];
           }
         }
       }
@@ -123,7 +122,7 @@ class SmoothSurface {
       const Eigen::VectorXd solution = algebra::times(algebra::pseudo_inverse(normal), right);
       double change = 0;
       for (std::size_t j = 0; j < terms; ++j) {
-        const double next = solution[static_cast<Eigen::Index>(j)];
+        const double next = solution[j];
         change = std::max(change, std::abs(next - coefficients_[j]));
         coefficients_[j] = next;
       }
@@ -208,7 +207,7 @@ class Grid {
     for (int row = std::max(0, cell.row - 1); row <= std::min(rows_ - 1, cell.row + 1); ++row) {
       for (int column = std::max(0, cell.column - 1);
            column <= std::min(columns_ - 1, cell.column + 1); ++column) {
-        const int at = place_[static_cast<std::size_t>(row * columns_ + column)];
+        const int at = place_[row * columns_ + column];
         if (at >= 0 && (row != cell.row || column != cell.column)) {
           found.push_back(static_cast<std::size_t>(at));
         }
@@ -288,7 +287,7 @@ class StepSearch {
         steps.push_back(std::move(step));
       }
     }
-    std::stable_sort(steps.begin(), steps.end(), [](const StepRegion& a, const StepRegion& b) {
+    std::ranges::stable_sort(steps, [](const StepRegion& a, const StepRegion& b) {
       return a.solid_angle > b.solid_angle;
     });
     return steps;
@@ -369,7 +368,7 @@ class StepSearch {
         step.rows.push_back(i);
       }
     }
-    std::sort(step.rows.begin(), step.rows.end());
+    std::ranges::sort(step.rows);
     step.points = step.rows.size();
   }
 
@@ -401,7 +400,7 @@ SurfaceReport inspect_surface(const SurfaceResiduals& residuals) {
   for (const Cell& cell : grid.cells) {
     const auto around = grid.around(cell);
     // Cells beside a step hold some of its rows, too few to move their median.
-    const bool step = cell.region >= 0 || std::any_of(around.begin(), around.end(), [&](auto c) {
+    const bool step = cell.region >= 0 || std::ranges::any_of(around, [&](auto c) {
                         return grid.cells[c].region >= 0;
                       });
     if (!cell.full || step) continue;

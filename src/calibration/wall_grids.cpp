@@ -138,8 +138,8 @@ void lay_grid(PlanarProblem& problem, std::size_t wall, const std::vector<std::s
 void find_positions(PlanarProblem& problem) {
   constexpr double kDistanceSigma = 0.002, kPositionSigma = 0.3;  // m
   if (!problem.stations_known || problem.stations.size() < 2) return;
-  const auto stations = static_cast<Eigen::Index>(problem.stations.size());
-  const auto walls = static_cast<Eigen::Index>(problem.walls.size());
+  const Eigen::Index stations = problem.stations.size();
+  const Eigen::Index walls = problem.walls.size();
   const Eigen::Index size = 3 * stations + walls;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
@@ -148,7 +148,7 @@ void find_positions(PlanarProblem& problem) {
     right += row * value / (sigma * sigma);
   };
   for (Eigen::Index s = 0; s < stations; ++s) {
-    const StationPose& station = problem.stations[static_cast<std::size_t>(s)];
+    const StationPose& station = problem.stations[s];
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       // The first one is the scene's origin but for what was stated.
       add(Eigen::VectorXd::Unit(size, 3 * s + axis), station.position[axis],
@@ -164,7 +164,7 @@ void find_positions(PlanarProblem& problem) {
   }
   const Eigen::VectorXd found = algebra::SymmetricSolver(normal).solve(right);
   for (Eigen::Index s = 0; s < stations; ++s) {
-    problem.stations[static_cast<std::size_t>(s)].position = found.segment<3>(3 * s);
+    problem.stations[s].position = found.segment<3>(3 * s);
   }
 }
 

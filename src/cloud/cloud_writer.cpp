@@ -71,8 +71,8 @@ std::unique_ptr<CloudWriter> create_cloud(const std::string& path, const CloudHe
   require_between("number of prisms", header.prisms, 1, kMaxPrisms);
   const CloudFormat& found = find_cloud_format(path, options.format);
   const auto& formats = all_cloud_formats();
-  const auto it = std::find_if(formats.begin(), formats.end(),
-                               [&found](const auto* format) { return format->name == found.name; });
+  const auto it = std::ranges::find_if(
+      formats, [&found](const auto* format) { return format->name == found.name; });
   return std::make_unique<CheckedWriter>((*it)->create(path, header, options), header);
 }
 

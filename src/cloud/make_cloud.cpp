@@ -531,11 +531,11 @@ class Work {
     const bool whole = n > 0 && block.rows.back() - block.rows.front() + 1 == n;
     const auto take = [&](const auto& from, auto& to, const auto& change) {
       if (whole) {
-        const auto first = from.begin() + static_cast<std::ptrdiff_t>(block.rows.front());
-        std::transform(first, first + static_cast<std::ptrdiff_t>(n), to.begin(), change);
+        const auto first = from.begin() + block.rows.front();
+        std::transform(first, first + n, to.begin(), change);
       } else {
-        std::transform(block.rows.begin(), block.rows.end(), to.begin(),
-                       [&](std::size_t row) { return change(from[row]); });
+        std::ranges::transform(block.rows, to.begin(),
+                               [&](std::size_t row) { return change(from[row]); });
       }
     };
     const auto same = [](auto value) { return value; };

@@ -112,7 +112,7 @@ Vector3d MapTangent::map(const Vector3d& point) const {
   const Vector3d d = point - center_;
   Vector3d bent;
   for (Eigen::Index k = 0; k < 3; ++k) {
-    bent[k] = d.dot(half_hessian_[static_cast<std::size_t>(k)] * d);
+    bent[k] = d.dot(half_hessian_[k] * d);
   }
   return value_ + (jacobian_ * d + bent);
 }
@@ -265,22 +265,20 @@ MapTangent MapProjection::tangent(const Vector3d& geocentric_m) const {
   std::array<Matrix3d, 3> hessian;
   const auto axis = [](Eigen::Index k) { return Vector3d(kStep * Vector3d::Unit(k)); };
   for (Eigen::Index i = 0; i < 3; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    ahead[k] = project(geocentric_m + axis(i));
-    behind[k] = project(geocentric_m - axis(i));
-    jacobian.col(i) = (ahead[k] - behind[k]) / (2 * kStep);
-    const Vector3d second = (ahead[k] - 2 * at + behind[k]) / (kStep * kStep);
-    for (Eigen::Index m = 0; m < 3; ++m) hessian[static_cast<std::size_t>(m)](i, i) = second[m];
+    ahead[i] = project(geocentric_m + axis(i));
+    behind[i] = project(geocentric_m - axis(i));
+    jacobian.col(i) = (ahead[i] - behind[i]) / (2 * kStep);
+    const Vector3d second = (ahead[i] - 2 * at + behind[i]) / (kStep * kStep);
+    for (Eigen::Index m = 0; m < 3; ++m) hessian[m](i, i) = second[m];
   }
   for (Eigen::Index i = 0; i < 3; ++i) {
     for (Eigen::Index j = i + 1; j < 3; ++j) {
-      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
       const Vector3d mixed =
-          (project(geocentric_m + axis(i) + axis(j)) - ahead[a] - ahead[b] + 2 * at - behind[a] -
-           behind[b] + project(geocentric_m - axis(i) - axis(j))) /
+          (project(geocentric_m + axis(i) + axis(j)) - ahead[i] - ahead[j] + 2 * at - behind[i] -
+           behind[j] + project(geocentric_m - axis(i) - axis(j))) /
           (2 * kStep * kStep);
       for (Eigen::Index m = 0; m < 3; ++m) {
-        Matrix3d& h = hessian[static_cast<std::size_t>(m)];
+        Matrix3d& h = hessian[m];
         h(i, j) = h(j, i) = mixed[m];
       }
     }

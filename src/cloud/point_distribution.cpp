@@ -109,8 +109,7 @@ Cell* cell_at(const TileMap<CellTile<Cell>>& tiles, std::int32_t column, std::in
   const std::int32_t i = divided(column, kTileCells), j = divided(row, kTileCells);
   CellTile<Cell>* tile = tiles.find(i, j);
   if (tile == nullptr) return nullptr;
-  return &(*tile)[static_cast<std::size_t>((row - j * kTileCells) * kTileCells + column -
-                                           i * kTileCells)];
+  return &(*tile)[(row - j * kTileCells) * kTileCells + column - i * kTileCells];
 }
 
 template <class Cell>
@@ -124,15 +123,14 @@ Cell& opened_cell(TileMap<CellTile<Cell>>& tiles, std::int32_t column, std::int3
         "count in larger ones",
         1e-6 * static_cast<double>(kMostTiles) * std::pow(kTileCells * cell, 2), cell));
   }
-  return (*tile)[static_cast<std::size_t>((row - j * kTileCells) * kTileCells + column -
-                                          i * kTileCells)];
+  return (*tile)[(row - j * kTileCells) * kTileCells + column - i * kTileCells];
 }
 
 /// Which pixels hold a point, row by row.
 using PixelTile = std::array<std::uint64_t, kTilePixels>;
 
 void mark(PixelTile& tile, std::int32_t column, std::int32_t row) {
-  tile[static_cast<std::size_t>(row - divided(row, kTilePixels) * kTilePixels)] |=
+  tile[row - divided(row, kTilePixels) * kTilePixels] |=
       std::uint64_t{1} << static_cast<unsigned>(column -
                                                 divided(column, kTilePixels) * kTilePixels);
 }
@@ -140,7 +138,7 @@ void mark(PixelTile& tile, std::int32_t column, std::int32_t row) {
 bool is_marked(const TileMap<PixelTile>& tiles, std::int32_t column, std::int32_t row) {
   const PixelTile* tile = tiles.find(divided(column, kTilePixels), divided(row, kTilePixels));
   if (tile == nullptr) return false;
-  return ((*tile)[static_cast<std::size_t>(row - divided(row, kTilePixels) * kTilePixels)] >>
+  return ((*tile)[row - divided(row, kTilePixels) * kTilePixels] >>
               static_cast<unsigned>(column - divided(column, kTilePixels) * kTilePixels) &
           1U) != 0;
 }
@@ -256,8 +254,7 @@ EmptyCircles circles_of_block(const TileMap<PixelTile>& pixels, std::int32_t blo
       for (std::int32_t y = 0; y < kTilePixels; ++y) {
         const std::int32_t row = j * kTilePixels + y - first_row;
         if (row < 0 || row >= kWide) continue;
-        for (std::uint64_t bits = (*tile)[static_cast<std::size_t>(y)]; bits != 0;
-             bits &= bits - 1) {
+        for (std::uint64_t bits = (*tile)[y]; bits != 0; bits &= bits - 1) {
           const std::int32_t column = i * kTilePixels + std::countr_zero(bits) - first_column;
           if (column < 0 || column >= kWide) continue;
           up[static_cast<std::size_t>(row) * kStride + static_cast<std::size_t>(column)] = 0;
@@ -310,7 +307,7 @@ SwathReach swath_reach(const sensors::Sensor& sensor, const trajectories::Mount&
   const Eigen::Matrix3d turn = trajectories::body_from_sensor(mount);
   sensors::ScanPatternOptions options;
   if (!sensor.sequence) {
-    options.rotation_angle.assign(static_cast<std::size_t>(sensor.prisms()), 0.0);
+    options.rotation_angle.assign(sensor.prisms(), 0.0);
   }
   options.every = static_cast<std::uint64_t>(
       std::max(1.0, std::floor(kFieldAfter * sensor.shot_rate / kFieldShots)));
@@ -561,7 +558,7 @@ class PointDistribution::Work {
     own.dense_width = 0;
     for (const int side : {-1, 1}) {
       for (int i = side < 0 ? -1 : 0; i >= -stripes && i < stripes; i += side) {
-        if (!(profile.density[static_cast<std::size_t>(i + stripes)] >= 0.5 * own.density)) break;
+        if (!(profile.density[i + stripes] >= 0.5 * own.density)) break;
         own.dense_width += profile.stripe;
       }
     }
@@ -595,7 +592,7 @@ class PointDistribution::Work {
     pixels_.for_each([&](std::int32_t i, std::int32_t j, const PixelTile& tile) {
       for (std::int32_t y = 0; y < kTilePixels; ++y) {
         const std::int32_t row = cell_number((j * kTilePixels + y + 0.5) * pixel_, edge);
-        for (std::uint64_t bits = tile[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
+        for (std::uint64_t bits = tile[y]; bits != 0; bits &= bits - 1) {
           const std::int32_t column =
               cell_number((i * kTilePixels + std::countr_zero(bits) + 0.5) * pixel_, edge);
           mark(*seen.open(divided(column, kTilePixels), divided(row, kTilePixels), all), column,
@@ -678,7 +675,7 @@ class PointDistribution::Work {
     std::size_t known = 0;
     const auto counts = [](const GroundCell& cell) { return cell.points > 0 || cell.in_swath > 0; };
     ground_.for_each([&](std::int32_t, std::int32_t, const CellTile<GroundCell>& tile) {
-      known += static_cast<std::size_t>(std::count_if(tile.begin(), tile.end(), counts));
+      known += static_cast<std::size_t>(std::ranges::count_if(tile, counts));
     });
     // Squares at the rim are not full, so that there may be a few more than were asked for.
     for (std::int32_t merged = std::max(
@@ -711,10 +708,9 @@ class PointDistribution::Work {
       }
       break;
     }
-    std::sort(result.map.begin(), result.map.end(),
-              [](const DensitySquare& a, const DensitySquare& b) {
-                return std::pair(a.y, a.x) < std::pair(b.y, b.x);
-              });
+    std::ranges::sort(result.map, [](const DensitySquare& a, const DensitySquare& b) {
+      return std::pair(a.y, a.x) < std::pair(b.y, b.x);
+    });
   }
 
   std::vector<StripLine> lines_;

@@ -104,7 +104,7 @@ RollPitchHeading roll_pitch_heading(const Eigen::Quaterniond& ned_from_body) {
 }
 
 void require_trajectory(const Trajectory& trajectory) {
-  require_at_least("records", static_cast<long long>(trajectory.size()), 1);
+  require_at_least("records", trajectory.size(), 1);
   require_lengths(trajectory);
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     const std::int64_t time_ns = trajectory.time_ns[i];
@@ -182,8 +182,7 @@ RowOrder row_order(const std::vector<std::int64_t>& times) {
   if (in_order) return order;
   std::vector<std::size_t> rows(times.size());
   std::iota(rows.begin(), rows.end(), std::size_t{0});
-  std::stable_sort(rows.begin(), rows.end(),
-                   [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
+  std::ranges::stable_sort(rows, [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
   for (const std::size_t row : rows) {
     if (order.rows.empty() || times[row] != times[order.rows.back()]) {
       order.rows.push_back(row);

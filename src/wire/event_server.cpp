@@ -213,7 +213,7 @@ class EventServer::Work {
   bool is_for_us(MHD_Connection* connection) const {
     const std::scoped_lock lock(mutex_);
     const auto hosts = header_values(connection, MHD_HTTP_HEADER_HOST);
-    if (hosts.size() != 1 || std::find(hosts_.begin(), hosts_.end(), hosts[0]) == hosts_.end()) {
+    if (hosts.size() != 1 || std::ranges::find(hosts_, hosts[0]) == hosts_.end()) {
       return false;
     }
     const auto origins = header_values(connection, MHD_HTTP_HEADER_ORIGIN);

@@ -173,7 +173,7 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   shared.set("refractive_index", 1.51);
   names.push_back("refractive_index");  // of two places
   const auto free = estimation::free_parameters(names, {2});
-  const auto n = static_cast<Index>(free.size());
+  const Index n = free.size();
   // Some correlation, of the size of a calibration.
   Eigen::MatrixXd root(n, n);
   const RandomStream entries(7, 1);
@@ -222,11 +222,11 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
 TEST(BeamBundle, WhatWasHeldCountsUnlessItIsLeftOut) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
-  const auto n = static_cast<Index>(free.size());
+  const Index n = free.size();
   const Eigen::MatrixXd covariance = 4e-10 * Eigen::MatrixXd::Identity(n, n);
   const auto angles = some_angles(60, 4);
   HeldMovement held;
-  held.train = Eigen::MatrixXd::Zero(static_cast<Index>(train.parameters().size()), 1);
+  held.train = Eigen::MatrixXd::Zero(train.parameters().size(), 1);
   held.rotation_angles = Eigen::MatrixXd::Zero(2, 1);
   held.turn = Eigen::MatrixXd::Zero(3, 1);
   held.turn(2, 0) = 1e-3;
@@ -281,7 +281,7 @@ TEST(PointingError, ScatterOverDrawsAsTheirSigmasSay) {
   constexpr int kDraws = 2000;
   const PrismTrain truth = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
-  const auto n = static_cast<Index>(free.size());
+  const Index n = free.size();
   Eigen::MatrixXd root = Eigen::MatrixXd::Zero(n, n);
   const RandomStream entries(7, 1);
   for (Index i = 0; i < n; ++i) {
@@ -326,7 +326,7 @@ TEST(PointingError, TellHowProbablyACalibrationIsBetter) {
   constexpr int kDraws = 4000;
   const PrismTrain found = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
-  const auto n = static_cast<Index>(free.size());
+  const Index n = free.size();
   const auto angles = some_angles(40, 4);
   const Bundle calibrated = beams_of(found, angles);
   const RandomStream draws(8, 2);

@@ -60,7 +60,7 @@ struct KnownPlanes {
     model.range_offset = 0;
     model.clock_offset = 0;
     model.knots = make_knots(flight.shots, knots);
-    model.corrections = MatrixXd::Zero(6, static_cast<Index>(model.knots.size()));
+    model.corrections = MatrixXd::Zero(6, model.knots.size());
     model.planes = flight.true_planes();
     for (GroundPlane& ground : model.planes) {
       ground.centre += Eigen::Vector3d(0.02, 0, 0.03);
@@ -108,8 +108,7 @@ TEST(FlightAdjustment, RecoversEverythingFromANoiseFreeFlight) {
   EXPECT_LT(model.corrections.bottomRows(3).cwiseAbs().maxCoeff(), 1e-8);
   const auto truth = known.flight.true_planes();
   for (std::size_t p = 0; p < truth.size(); ++p) {
-    if (std::count(known.plane.begin(), known.plane.end(), static_cast<std::int32_t>(p)) < 20)
-      continue;
+    if (std::ranges::count(known.plane, static_cast<std::int32_t>(p)) < 20) continue;
     EXPECT_LT((model.planes[p].normal - truth[p].normal).norm(), 1e-6);
     EXPECT_LT(std::abs(truth[p].normal.dot(model.planes[p].centre - truth[p].centre)), 1e-5);
   }
@@ -175,11 +174,11 @@ TEST(FlightAdjustment, RecoversTheTrajectorysCorrections) {
   const auto& knots = model.knots;
   for (std::size_t k = 0; k < knots.size(); ++k) {
     const auto& times = known.flight.trajectory.time_ns;
-    const auto at = static_cast<std::size_t>(
-        std::lower_bound(times.begin(), times.end(), knots.time_ns[k]) - times.begin());
+    const auto at =
+        static_cast<std::size_t>(std::ranges::lower_bound(times, knots.time_ns[k]) - times.begin());
     const Eigen::Matrix<double, 6, 1> truth = known.flight.error[std::min(at, times.size() - 1)];
     before += truth.cwiseAbs2();
-    after += (model.corrections.col(static_cast<Index>(k)) - truth).cwiseAbs2();
+    after += (model.corrections.col(k) - truth).cwiseAbs2();
   }
   for (int c = 3; c < 6; ++c) EXPECT_LT(after[c], 0.25 * before[c]) << c;
   EXPECT_LT(after.head<3>().sum(), before.head<3>().sum());
@@ -245,7 +244,7 @@ TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
   known.priors.information.diagonal().setConstant(10);
   known.priors.mean.array() += 0.001;
   known.model.corrections.setConstant(1e-4);
-  known.priors.held.assign(static_cast<std::size_t>(known.model.unknowns().size()), false);
+  known.priors.held.assign(known.model.unknowns().size(), false);
   known.priors.held[FlightUnknowns::lever_arm(2)] = true;
   known.priors.planes.push_back({.plane = 0,
                                  .place = {3, 4, 0.01},
@@ -266,14 +265,13 @@ TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
   for (int c = 0; c < 6; ++c) {
     const KnotInformation chain = knot_information(known.model.knots, known.priors.process, c);
     for (Index k = 0; 6 * k < knots; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      all(6 * k + c, 6 * k + c) += chain.diagonal[at];
-      right[6 * k + c] -= 1e-4 * chain.diagonal[at];
+      all(6 * k + c, 6 * k + c) += chain.diagonal[k];
+      right[6 * k + c] -= 1e-4 * chain.diagonal[k];
       if (6 * (k + 1) == knots) continue;
-      all(6 * k + c, 6 * (k + 1) + c) += chain.next[at];
-      all(6 * (k + 1) + c, 6 * k + c) += chain.next[at];
-      right[6 * k + c] -= 1e-4 * chain.next[at];
-      right[6 * (k + 1) + c] -= 1e-4 * chain.next[at];
+      all(6 * k + c, 6 * (k + 1) + c) += chain.next[k];
+      all(6 * (k + 1) + c, 6 * k + c) += chain.next[k];
+      right[6 * k + c] -= 1e-4 * chain.next[k];
+      right[6 * (k + 1) + c] -= 1e-4 * chain.next[k];
     }
   }
   const Index held = knots + FlightUnknowns::lever_arm(2);

@@ -127,7 +127,7 @@ TEST(FlightForecast, SaysWhatACalibrationStates) {
 
 /// Whether nothing that is not told has the word.
 bool told(const FlightForecast& found, const std::string& word) {
-  return std::none_of(found.not_told.begin(), found.not_told.end(), [&](const NotTold& own) {
+  return std::ranges::none_of(found.not_told, [&](const NotTold& own) {
     return own.words.find(word) != std::string::npos;
   });
 }

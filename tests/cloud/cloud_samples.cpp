@@ -93,7 +93,7 @@ Points slice(const CloudHeader& header, const Points& points, std::size_t first,
   header.resize(part, count);
   const auto copy = [first](const auto& from, auto& to) {
     if (to.empty()) return;
-    std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first), to.size(), to.begin());
+    std::copy_n(from.begin() + first, to.size(), to.begin());
   };
   copy(points.time_ns, part.time_ns);
   copy(points.x, part.x);

@@ -64,8 +64,8 @@ TEST(CloudFormats, UnknownFormatsAreRefusedWithTheKnownOnes) {
 
 TEST(CloudFormats, LazNeedsLaszip) {
   const auto& formats = cloud_formats();
-  const bool has_laz = std::any_of(formats.begin(), formats.end(),
-                                   [](const auto& format) { return format.name == "laz"; });
+  const bool has_laz =
+      std::ranges::any_of(formats, [](const auto& format) { return format.name == "laz"; });
   if (has_laz) {
     EXPECT_EQ(find_cloud_format("cloud.laz", "").name, "laz");
     return;

@@ -117,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, LasRecordingTest, ::testing::ValuesIn(formats_
 
 TEST(LazRecordingTest, IsTested) {
   const std::vector<std::string> formats = formats_of_this_build();
-  if (std::find(formats.begin(), formats.end(), "laz") == formats.end()) {
+  if (std::ranges::find(formats, "laz") == formats.end()) {
     GTEST_SKIP() << "SKIPPED: this build has no LASzip (Debian 13 has it)";
   }
 }
@@ -144,8 +144,8 @@ TEST(LazRecordingTest, ChunkTablesThatCannotBeAreRefused) {
   const std::string path = folder / "cloud.laz";
   const CloudCase one{"cloud", 2000, {}};
   Points points = make_points(one);
-  std::fill(points.return_number.begin(), points.return_number.end(), std::uint8_t{1});
-  std::fill(points.number_of_returns.begin(), points.number_of_returns.end(), std::uint8_t{1});
+  std::ranges::fill(points.return_number, std::uint8_t{1});
+  std::ranges::fill(points.number_of_returns, std::uint8_t{1});
   const auto writer = create_cloud(path, one.header);
   writer->write(points);
   writer->close();

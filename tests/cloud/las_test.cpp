@@ -110,8 +110,8 @@ Points random_points(const CloudHeader& header, std::size_t rows, unsigned seed 
 template <class Column>
 Column part(const Column& column, std::size_t first, std::size_t rows) {
   if (column.empty()) return {};
-  const auto begin = column.begin() + static_cast<std::ptrdiff_t>(first);
-  return Column(begin, begin + static_cast<std::ptrdiff_t>(rows));
+  const auto begin = column.begin() + first;
+  return Column(begin, begin + rows);
 }
 
 Points slice(const Points& points, std::size_t first, std::size_t rows) {

@@ -36,7 +36,7 @@ class Reader {
     std::vector<std::string> names;
     for (int k = 0; k < count; ++k) {
       std::array<char, NC_MAX_NAME + 1> text{};
-      EXPECT_EQ(nc_inq_dimname(id_, ids[static_cast<std::size_t>(k)], text.data()), NC_NOERR);
+      EXPECT_EQ(nc_inq_dimname(id_, ids[k], text.data()), NC_NOERR);
       names.emplace_back(text.data());
     }
     return names;

@@ -180,9 +180,9 @@ Expected expected_point(const PointingModel& model, const PointedShots& shots, s
   e.full_covariance += range_variance * along;
 
   // The direction.
-  MatrixXd rates(3, static_cast<Index>(prisms));
+  MatrixXd rates(3, prisms);
   for (std::size_t k = 0; k < prisms; ++k) {
-    rates.col(static_cast<Index>(k)) = rate_by_angle(beam, e.range, k);
+    rates.col(k) = rate_by_angle(beam, e.range, k);
   }
   if (reported) {
     MatrixXd turned(3, 2);
@@ -214,7 +214,7 @@ Expected expected_point(const PointingModel& model, const PointedShots& shots, s
   }
 
   // What all shots share.
-  MatrixXd common(3, static_cast<Index>(model.places.size() + prisms + 2));
+  MatrixXd common(3, model.places.size() + prisms + 2);
   Index column = 0;
   for (const int place : model.places) common.col(column++) = rate_by_place(beam, e.range, place);
   for (Index k = 0; k < rates.cols(); ++k) common.col(column++) = rates.col(k);
@@ -321,7 +321,7 @@ PointedShots random_shots(const PointingModel& model, std::size_t count, unsigne
     MatrixXd root(prisms, prisms);
     for (int k = 0; k < prisms; ++k) {
       angles.push_back(dice.between(-20.0, 20.0));
-      shots.rotation_angle[static_cast<std::size_t>(k)][i] = angles.back();
+      shots.rotation_angle[k][i] = angles.back();
       for (int l = 0; l < prisms; ++l) root(k, l) = 3e-5 * dice.normal();
     }
     const MatrixXd covariance = root * root.transpose();
@@ -341,7 +341,7 @@ PointedShots random_shots(const PointingModel& model, std::size_t count, unsigne
     normal.normalize();
     if (i % 3 == 1) normal.setConstant(kNaN);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      shots.surface_normal[axis][i] = normal[static_cast<Index>(axis)];
+      shots.surface_normal[axis][i] = normal[axis];
     }
   }
   return shots;
@@ -460,7 +460,7 @@ TEST_P(PointsOfEveryTrain, HaveRangesWithoutTheirErrors) {
         const Expected e = expected_point(model, shots, i);
         const Vector3d across = e.direction.unitOrthogonal() + 0.01 * e.direction;
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          shots.surface_normal[axis][i] = across.normalized()[static_cast<Index>(axis)];
+          shots.surface_normal[axis][i] = across.normalized()[axis];
         }
       }
       expect_points(model, shots, points_of(model, header_of(model), shots, set), 1e-12);
@@ -582,7 +582,7 @@ TEST(ComputePoints, EveryEmitterIsItself) {
             factor.weights = VectorXd(factor.weights(rows));
           }
           PointedShots alone = shots;
-          std::fill(alone.beam.begin(), alone.beam.end(), std::uint8_t{0});
+          std::ranges::fill(alone.beam, std::uint8_t{0});
           const Points expected = points_of(own, header, alone, set);
           for (std::size_t i = 0; i < shots.size(); ++i) {
             if (shots.beam[i] != beam) continue;
@@ -863,9 +863,9 @@ MatrixXd correlated(const VectorXd& sigma, std::uint64_t seed) {
 
 /// Sigmas as a calibration finds them, SI units.
 VectorXd typical_sigmas(const std::vector<std::string>& names, double scale = 1.0) {
-  VectorXd sigma(static_cast<Index>(names.size()));
+  VectorXd sigma(names.size());
   for (Index i = 0; i < sigma.size(); ++i) {
-    const std::string& name = names[static_cast<std::size_t>(i)];
+    const std::string& name = names[i];
     sigma[i] = scale * (name == "range_offset_m"         ? 0.002
                         : name.starts_with("refractive") ? 1e-4
                                                          : radians_from_degrees(0.003));
@@ -899,7 +899,7 @@ struct Case {
     const int prisms = belief.sensor.prisms();
     belief.free = estimation::free_parameters(names, belief.sensor.shape());
     belief.covariance = correlated(typical_sigmas(names, 0.5), seed + 2);
-    belief.angle_sensitivity.resize(prisms, static_cast<Index>(names.size()));
+    belief.angle_sensitivity.resize(prisms, names.size());
     Dice dice(seed + 3);
     for (double& entry : belief.angle_sensitivity.reshaped()) entry = dice.normal();
   }
@@ -908,9 +908,9 @@ struct Case {
   MatrixXd effect(const std::vector<std::string>& names, bool beam, bool angles) const {
     const int prisms = calibration.prisms();
     const Index count = parameter_count(prisms);
-    MatrixXd m = MatrixXd::Zero(count + prisms + 3, static_cast<Index>(names.size()));
+    MatrixXd m = MatrixXd::Zero(count + prisms + 3, names.size());
     for (Index j = 0; j < m.cols(); ++j) {
-      const std::string& name = names[static_cast<std::size_t>(j)];
+      const std::string& name = names[j];
       if (name == "range_offset_m") {
         m(m.rows() - 1, j) = 1.0;
         continue;
@@ -920,7 +920,7 @@ struct Case {
       }
       for (std::size_t f = 0; angles && f < belief.free.size(); ++f) {
         if (belief.free[f].name != name) continue;
-        m.block(count, j, prisms, 1) = belief.angle_sensitivity.col(static_cast<Index>(f));
+        m.block(count, j, prisms, 1) = belief.angle_sensitivity.col(f);
       }
     }
     return m;
@@ -1009,7 +1009,7 @@ TEST(PointingModel, CalibratedAgainstDirectionsMovesTheRotationAnglesToo) {
   for (const int place :
        {place::refractive_index_air(), place::wedge_angle(0), place::wedge_angle(1),
         place::prism_tilt_horizontal(0), place::bearing_tilt_horizontal(1)}) {
-    EXPECT_EQ(std::count(model.places.begin(), model.places.end(), place), 0) << place;
+    EXPECT_EQ(std::ranges::count(model.places, place), 0) << place;
   }
   EXPECT_EQ(model.places.size(), 9u);
 }
@@ -1070,7 +1070,7 @@ TEST(PointingModel, TakesSizesOfPrismsJointlyWithTheOthers) {
   auto& names = one.calibration.covariance_names;
   const std::vector<std::string> sizes = {"prism_thickness_a_m", "prism_thickness_b_m",
                                           "prism_spacing_a_m"};
-  const auto n = static_cast<Index>(names.size());
+  const Index n = names.size();
   names.insert(names.end(), sizes.begin(), sizes.end());
   VectorXd sigma = typical_sigmas(names);
   sigma.tail(3) << 0.4e-3, 0.3e-3, 2e-3;
@@ -1083,13 +1083,12 @@ TEST(PointingModel, TakesSizesOfPrismsJointlyWithTheOthers) {
   for (const char* own : {"rotation_angle_a_deg", "rotation_angle_b_deg"}) expected.push_back(own);
   EXPECT_EQ(names_of(model), expected);
   for (Index i = 0; i < 3; ++i) {
-    EXPECT_NEAR(sigma_of_size(model, sizes[static_cast<std::size_t>(i)]), sigma[n + i], 1e-12);
+    EXPECT_NEAR(sigma_of_size(model, sizes[i]), sigma[n + i], 1e-12);
   }
   // The same covariance between a tilt and a size.
   const auto place = find_parameter("prism_tilt_b_vertical_deg", {2}).places.front();
-  const auto tilt = std::find(names.begin(), names.end(), "prism_tilt_b_vertical_deg");
-  const auto row =
-      std::find(model.places.begin(), model.places.end(), place) - model.places.begin();
+  const auto tilt = std::ranges::find(names, "prism_tilt_b_vertical_deg");
+  const auto row = std::ranges::find(model.places, place) - model.places.begin();
   double covariance = 0;
   for (const CommonFactor& factor : model.factors) {
     covariance += factor.weights[row] *
@@ -1137,16 +1136,15 @@ TEST(PointingModel, TakesRangeErrorsJointlyWithTheOthers) {
   }
   EXPECT_EQ(names_of(model), expected);
   const int place = find_parameter("prism_tilt_b_vertical_deg", {2}).places.front();
-  const auto tilt = std::find(names.begin(), names.end(), "prism_tilt_b_vertical_deg");
-  const auto row =
-      std::find(model.places.begin(), model.places.end(), place) - model.places.begin();
+  const auto tilt = std::ranges::find(names, "prism_tilt_b_vertical_deg");
+  const auto row = std::ranges::find(model.places, place) - model.places.begin();
   MatrixXd found = MatrixXd::Zero(6, 6);
   for (const CommonFactor& factor : model.factors) {
     VectorXd numbers(6);
     numbers << range_numbers(factor), factor.weights[row];
     found += numbers * numbers.transpose();
   }
-  const auto n = static_cast<Index>(names.size());
+  const Index n = names.size();
   const std::vector<Index> rows{2, n - 4, n - 3, n - 2, n - 1, tilt - names.begin()};
   expect_same_covariance(found, c(rows, rows));
 }
@@ -1191,7 +1189,7 @@ TEST(PointingModel, HasRoomForAllThatWallsTellOfAnAvia) {
   const auto names = estimation::default_free_names(avia.shape());
   belief.free = estimation::free_parameters(names, avia.shape());
   belief.covariance = correlated(typical_sigmas(names), 25);
-  belief.angle_sensitivity.resize(avia.prisms(), static_cast<Index>(belief.free.size()));
+  belief.angle_sensitivity.resize(avia.prisms(), belief.free.size());
   Dice dice(27);
   for (double& entry : belief.angle_sensitivity.reshaped()) entry = dice.normal();
   belief.angle_noise = 6e-5;
@@ -1238,12 +1236,11 @@ TEST(PointingModel, LeavesOutSpeedsOfACalibration) {
   const MatrixXd inner = one.calibration.covariance;
   auto& names = one.calibration.covariance_names;
   names.insert(names.begin() + 1, "angular_velocity_a_deg_per_s");
-  one.calibration.covariance =
-      correlated(VectorXd::Constant(static_cast<Index>(names.size()), 1e-3), 9);
+  one.calibration.covariance = correlated(VectorXd::Constant(names.size(), 1e-3), 9);
   const PointingModel model = pointing_model(one.calibration, one.belief, {});
-  EXPECT_EQ(std::count(names.begin(), names.end(), "angular_velocity_a_deg_per_s"), 1);
+  EXPECT_EQ(std::ranges::count(names, "angular_velocity_a_deg_per_s"), 1);
   const auto factors = names_of(model);
-  EXPECT_EQ(std::count(factors.begin(), factors.end(), "angular_velocity_a_deg_per_s"), 0);
+  EXPECT_EQ(std::ranges::count(factors, "angular_velocity_a_deg_per_s"), 0);
   EXPECT_EQ(factors.size(), names.size() - 1 + 2);
 }
 
@@ -1284,8 +1281,8 @@ TEST(PointingModel, TakesACovarianceThatHasNoInverse) {
     stated += geometry_variance(one.calibration, stated.rows());
     expect_same_covariance(covariance_of_factors(model), stated);
     const auto names = names_of(model);
-    const std::string& name = one.calibration.covariance_names[static_cast<std::size_t>(dependent)];
-    EXPECT_EQ(std::count(names.begin(), names.end(), name), 0);
+    const std::string& name = one.calibration.covariance_names[dependent];
+    EXPECT_EQ(std::ranges::count(names, name), 0);
     EXPECT_EQ(names.size(), static_cast<std::size_t>(c.rows()) - 1 + 2 + 2);
   }
 }
@@ -1294,8 +1291,7 @@ TEST(PointingModel, RefusesMoreFactorsThanItCanHold) {
   Case one(CalibrationReference::planes);
   const std::size_t many = 100;
   one.calibration.covariance_names.assign(many, "wedge_angle_a_deg");
-  one.calibration.covariance =
-      1e-8 * MatrixXd::Identity(static_cast<Index>(many), static_cast<Index>(many));
+  one.calibration.covariance = 1e-8 * MatrixXd::Identity(many, many);
   EXPECT_THROW(pointing_model(one.calibration, one.belief, {}), InvalidArgument);
 }
 
@@ -1327,14 +1323,13 @@ TEST(PointingModel, AngleSensitivityTakesParameterErrorsOutOfThePoint) {
   const Beam beam{one.belief.sensor.train, {}, {0.4, 1.7}};
   MatrixXd by_angles(3, 2);
   for (Index k = 0; k < 2; ++k) {
-    by_angles.col(k) = rate_by_angle(beam, 1.0, static_cast<std::size_t>(k));
+    by_angles.col(k) = rate_by_angle(beam, 1.0, k);
   }
   const MatrixXd normal_matrix = by_angles.transpose() * by_angles;
   for (std::size_t j = 0; j < one.belief.free.size(); ++j) {
     Vector3d rate = Vector3d::Zero();
     for (const int place : one.belief.free[j].places) rate += rate_by_place(beam, 1.0, place);
-    one.belief.angle_sensitivity.col(static_cast<Index>(j)) =
-        -normal_matrix.ldlt().solve(by_angles.transpose() * rate);
+    one.belief.angle_sensitivity.col(j) = -normal_matrix.ldlt().solve(by_angles.transpose() * rate);
   }
   PointedShots shots;
   shots.resize(2, 1);
@@ -1411,7 +1406,7 @@ struct Draws {
       ranges.range_offset = model.range_offset;
       ranges.range_errors = model.range_errors;
       for (Index j = 0; j < p.size(); ++j) {
-        const std::string& name = one.calibration.covariance_names[static_cast<std::size_t>(j)];
+        const std::string& name = one.calibration.covariance_names[j];
         if (sensors::is_range_value(name)) {
           sensors::set_range_value(ranges, name, sensors::get_range_value(ranges, name) + p[j]);
           continue;

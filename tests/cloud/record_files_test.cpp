@@ -194,7 +194,7 @@ TEST(PlyComments, TellTheProvenanceInLinesThatEveryReaderTakes) {
   std::vector<std::string> comments;
   read_ply(io::read_text_file(folder / "cloud.ply"), comments);
   const auto has = [&comments](const std::string& text) {
-    return std::find(comments.begin(), comments.end(), text) != comments.end();
+    return std::ranges::find(comments, text) != comments.end();
   };
   EXPECT_TRUE(has("command: risley cloud over two lines"));
   EXPECT_TRUE(has("version: 0.1"));

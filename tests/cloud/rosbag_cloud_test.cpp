@@ -234,8 +234,8 @@ std::vector<std::uint64_t> stamps_of(const std::vector<std::int64_t>& times) {
   points.time_ns = times;
   write_uneven(folder / "cloud.bag", "ros1-bag", one.header, points);
   std::vector<Message> messages = read_bag(folder / "cloud.bag");
-  std::sort(messages.begin(), messages.end(),
-            [](const Message& a, const Message& b) { return a.sequence < b.sequence; });
+  std::ranges::sort(messages,
+                    [](const Message& a, const Message& b) { return a.sequence < b.sequence; });
   std::vector<std::uint64_t> stamps;
   for (const Message& message : messages) {
     EXPECT_EQ(message.time, message.stamp);
@@ -291,7 +291,7 @@ TEST(RosbagClouds, DivideLongMessages) {
   CloudCase one = cloud_cases().at(1);
   one.points = 400'000;
   Points points = make_points(one);
-  std::fill(points.time_ns.begin(), points.time_ns.end(), 1);
+  std::ranges::fill(points.time_ns, 1);
   write_uneven(folder / "cloud.bag", "ros1-bag", one.header, points);
   const std::vector<Message> messages = read_bag(folder / "cloud.bag");
   EXPECT_GT(messages.size(), 1U);

@@ -38,7 +38,7 @@ sensors::Sensor calibration() {
   sensor.reference = CalibrationReference::directions;
   sensor.angle_noise = radians_from_degrees(0.01);
   sensor.covariance_names = estimation::default_free_names({2});
-  const auto n = static_cast<Eigen::Index>(sensor.covariance_names.size());
+  const Eigen::Index n = sensor.covariance_names.size();
   const double sigma = radians_from_degrees(0.002);
   sensor.covariance = sigma * sigma * Eigen::MatrixXd::Identity(n, n);
   return sensor;
@@ -74,8 +74,7 @@ void erase_rows(Simulated& data, std::size_t begin, std::size_t end) {
 std::size_t row_at(const Simulated& data, double seconds) {
   const auto& times = data.observations.time_ns;
   return static_cast<std::size_t>(
-      std::lower_bound(times.begin(), times.end(), static_cast<std::int64_t>(seconds * 1e9)) -
-      times.begin());
+      std::ranges::lower_bound(times, static_cast<std::int64_t>(seconds * 1e9)) - times.begin());
 }
 
 struct Angles {
@@ -171,9 +170,8 @@ TEST(SensorBelief, FindsTheParametersOfAType) {
   const sensors::Sensor truth = sensors::load_sensor("mid-40-table3");
   for (std::size_t j = 0; j < belief.free.size(); ++j) {
     const int place = belief.free[j].places.front();
-    const auto at = static_cast<Eigen::Index>(j);
     EXPECT_LT(std::abs(belief.sensor.train[place] - truth.train[place]),
-              4.0 * std::sqrt(belief.covariance(at, at)))
+              4.0 * std::sqrt(belief.covariance(j, j)))
         << belief.free[j].name;
   }
 }
@@ -186,12 +184,12 @@ TEST(SensorBelief, FreesWhatTheCalibrationHasFreed) {
   std::erase(names, "prism_tilt_b_vertical_deg");
   names.back() = "angular_velocity_a_deg_per_s";
   names.push_back("range_offset_m");
-  const auto n = static_cast<Eigen::Index>(names.size());
+  const Eigen::Index n = names.size();
   sensor.covariance = Eigen::MatrixXd(1e-6 * Eigen::MatrixXd::Identity(n, n));
   std::vector<std::string> free;
   for (const auto& one : belief_of(data.observations, sensor).free) free.push_back(one.name);
-  EXPECT_EQ(std::count(free.begin(), free.end(), "prism_tilt_b_vertical_deg"), 0);
-  EXPECT_EQ(std::count(free.begin(), free.end(), "range_offset_m"), 0);
+  EXPECT_EQ(std::ranges::count(free, "prism_tilt_b_vertical_deg"), 0);
+  EXPECT_EQ(std::ranges::count(free, "range_offset_m"), 0);
   EXPECT_EQ(free.size(), names.size() - 2);
 }
 

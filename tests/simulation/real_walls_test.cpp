@@ -25,8 +25,7 @@ struct Shots {
 
   std::size_t size() const { return range.size(); }
   std::size_t returns() const {
-    return static_cast<std::size_t>(
-        std::count_if(range.begin(), range.end(), [](double r) { return r > 0.0; }));
+    return static_cast<std::size_t>(std::ranges::count_if(range, [](double r) { return r > 0.0; }));
   }
 };
 
@@ -92,7 +91,7 @@ TEST(RealWalls, RangeErrorsAreThoseOfTheSensor) {
                                           up * sensor.beam_divergence_vertical);
     const double expected = -0.004 + 0.015 * std::exp(-(r - 1.0) / 2.0) + 0.3 * depth +
                             0.01 * std::log10(100.0 / shots.intensity[i]) +
-                            sensor.range_errors.emitter[static_cast<std::size_t>(shots.emitter[i])];
+                            sensor.range_errors.emitter[shots.emitter[i]];
     ASSERT_NEAR(shots.range[i] - r, expected, 1e-8) << i;
   }
 }
@@ -164,7 +163,7 @@ TEST(RealWalls, DarkSurfacesEndBeforeBrightOnes) {
     settings.duration = 0.02;
     const Shots shots = scan(settings);
     return std::pair{static_cast<double>(shots.returns()) / static_cast<double>(shots.size()),
-                     *std::max_element(shots.intensity.begin(), shots.intensity.end())};
+                     *std::ranges::max_element(shots.intensity)};
   };
   const std::string limit = "limit_by_reflectivity: yes\n";
   // 260 m sqrt(0.1 / 0.8) = 91.9 m; at an angle a the range is d / cos a and cos a is left.
@@ -228,7 +227,7 @@ limit_by_reflectivity: yes
   const Shots one = scan(settings);
   for (const auto& [threads, piece] : {std::pair{2, 65536}, {1, 1000}, {2, 4097}}) {
     settings.threads = threads;
-    const Shots other = scan(settings, static_cast<std::size_t>(piece));
+    const Shots other = scan(settings, piece);
     EXPECT_EQ(one.range, other.range);
     EXPECT_EQ(one.intensity, other.intensity);
   }

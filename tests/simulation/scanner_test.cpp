@@ -105,7 +105,7 @@ TEST(Scanner, SameNumbersForAnyThreadCountAndAnyPieces) {
   for (const auto& [threads, piece] : {std::pair{2, 65536}, {1, 1000}, {2, 4097}, {0, 8191}}) {
     SCOPED_TRACE(std::to_string(threads) + " threads, pieces of " + std::to_string(piece));
     settings.threads = threads;
-    const Whole other = scan(settings, static_cast<std::size_t>(piece));
+    const Whole other = scan(settings, piece);
     EXPECT_EQ(one.rows.time_ns, other.rows.time_ns);
     EXPECT_EQ(one.rows.valid, other.rows.valid);
     EXPECT_EQ(one.rows.intensity, other.rows.intensity);
@@ -328,7 +328,7 @@ TEST(Scanner, BlockedBeamsAreNotReported) {
     ASSERT_EQ(std::isnan(whole.truth.azimuth[i]), whole.rows.valid[i] == 0);
     ASSERT_EQ(std::isnan(whole.rows.azimuth[i]), whole.rows.valid[i] == 0);
   }
-  EXPECT_GT(std::count(whole.rows.valid.begin(), whole.rows.valid.end(), 0), 0);
+  EXPECT_GT(std::ranges::count(whole.rows.valid, 0), 0);
 }
 
 TEST(Scanner, HeaderDescribesTheSensor) {

@@ -163,8 +163,7 @@ TEST(Interpolation, NothingBeyondTheEnds) {
 /// Without records [begin, end).
 Trajectory without(Trajectory t, std::size_t begin, std::size_t end) {
   const auto cut = [&](auto& column) {
-    column.erase(column.begin() + static_cast<std::ptrdiff_t>(begin),
-                 column.begin() + static_cast<std::ptrdiff_t>(end));
+    column.erase(column.begin() + begin, column.begin() + end);
   };
   cut(t.time_ns);
   cut(t.position);
@@ -268,7 +267,7 @@ TEST(Interpolation, CursorsTakeTimesInAnyOrder) {
     else if (which < 0.9)
       time = t.time_ns.front() + std::llround(span * random.uniform(3 * i + 1));
     else
-      time = t.time_ns[static_cast<std::size_t>(random.uniform(3 * i + 1) * 191)];
+      time = t.time_ns[random.uniform(3 * i + 1) * 191];
     const auto a = cursor.at(time), b = interpolation.at(time);
     ASSERT_EQ(a.has_value(), b.has_value()) << i;
     if (!a) continue;

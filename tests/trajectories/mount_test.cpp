@@ -61,7 +61,7 @@ TEST(Mount, BoresightTurnsAboutTheAxesOfTheSensorBeforeTheNominalMount) {
   Mount mount = parse_mount(kHexacopter, "mount.yaml");
   const auto turned = [&](int axis) -> Matrix3d {
     for (int i = 0; i < 3; ++i) {
-      mount.boresight[static_cast<std::size_t>(i)].value = i == axis ? 0.01 : 0;
+      mount.boresight[i].value = i == axis ? 0.01 : 0;
     }
     return body_from_sensor(mount);
   };
@@ -155,7 +155,7 @@ TEST(Mount, KnowsWhichCalibrationItWasFoundWith) {
     for (std::size_t j = 0; j < joint.names.size(); ++j) {
       const auto own = mount.covariance.find(joint.names[i]),
                  other = mount.covariance.find(joint.names[j]);
-      const double got = joint.matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      const double got = joint.matrix(i, j);
       if (own >= 0 && other >= 0) {
         EXPECT_EQ(got, mount.covariance.matrix(own, other)) << joint.names[i] << joint.names[j];
       } else if (i == j) {

@@ -182,8 +182,8 @@ std::vector<Sample> samples(int count) {
     const Eigen::Quaterniond q(left_up);
     const Vector3d twist = left_up.transpose() * turn * flight.velocity(t);
     for (int k = 0; k < 3; ++k) {
-      s.position[static_cast<std::size_t>(k)] = position[k];
-      s.twist[static_cast<std::size_t>(k)] = twist[k];
+      s.position[k] = position[k];
+      s.twist[k] = twist[k];
     }
     s.xyzw = {q.x(), q.y(), q.z(), q.w()};
     all.push_back(s);

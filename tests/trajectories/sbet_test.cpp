@@ -225,7 +225,7 @@ TEST(Sbet, TimesThatRunBackAreSortedOrRefused) {
   EXPECT_THAT(t.warnings[0].message, HasSubstr("records that come after later ones: 1 of 301"));
   EXPECT_EQ(t.warnings[0].place.byte_offset, 101U * 136);
   EXPECT_THAT(t.warnings[1].message, HasSubstr("repeat the time of an earlier one: 1"));
-  EXPECT_TRUE(std::is_sorted(t.time_ns.begin(), t.time_ns.end()));
+  EXPECT_TRUE(std::ranges::is_sorted(t.time_ns));
   EXPECT_EQ(t.velocity_frame->name, "north-east-down");
   EXPECT_LT((t.position[100] - KnownFlight().position(0.5)).norm(), 1e-8);
   // Another flight behind this one.
@@ -321,11 +321,11 @@ TEST(Smrmsg, AccuraciesAreInterpolatedToTheRecords) {
 
 TEST(Smrmsg, UnorderedRecordsAndTheEndOfTheWeek) {
   std::vector<SmrmsgRecord> records = accuracies(20);
-  std::reverse(records.begin(), records.end());
+  std::ranges::reverse(records);
   records.push_back(records.back());
   const AccuracyRecords found = read_accuracies(records);
   EXPECT_EQ(found.time_ns.size(), 20U);
-  EXPECT_TRUE(std::is_sorted(found.time_ns.begin(), found.time_ns.end()));
+  EXPECT_TRUE(std::ranges::is_sorted(found.time_ns));
   EXPECT_EQ(found.warnings.size(), 2U);
   // The week ends within both.
   records = accuracies(20);

@@ -530,7 +530,7 @@ TEST(Tum, TheHeaderDecidesTheOrderOfTheQuaternion) {
 TEST(Tum, DecimalCommasAndUtf16) {
   const std::string text = tum_drive("# timestamp tx ty tz qw qx qy qz\n", true);
   std::string commas = text, wide = "\xFF\xFE";
-  std::replace(commas.begin(), commas.end(), '.', ',');
+  std::ranges::replace(commas, '.', ',');
   for (const char c : commas) wide += {c, '\0'};
   const Trajectory wanted = read(text);
   for (const std::string& other : {commas, wide}) {

@@ -151,7 +151,7 @@ TEST(Commands, EveryCommandGoesThereAndBack) {
   }
   std::vector<bool> met(std::variant_size_v<Command>);
   for (const Command& command : all_commands()) met[command.index()] = true;
-  EXPECT_EQ(std::count(met.begin(), met.end(), false), 0);
+  EXPECT_EQ(std::ranges::count(met, false), 0);
 }
 
 TEST(Commands, EveryReplyGoesThereAndBack) {

@@ -62,7 +62,7 @@ class Connection {
         ended_ = true;
         break;
       }
-      text.append(bytes, static_cast<std::size_t>(count));
+      text.append(bytes, count);
     }
     return text;
   }

@@ -19,7 +19,7 @@ class LasWriter final : public CloudWriter {
   LasWriter(const std::string& path, las::Layout layout)
       : layout_(std::move(layout)), output_(path) {
     const std::vector<std::uint8_t> head = layout_.head({});
-    std::copy(head.begin(), head.end(), output_.append(head.size()));
+    std::ranges::copy(head, output_.append(head.size()));
   }
 
   void write(const Points& points) override {

@@ -251,12 +251,11 @@ class NetcdfWriter final : public CloudWriter {
     file_.set_fill(incidence, std::numeric_limits<float>::quiet_NaN());  // unknown
     if (!header.has_rotation_angles) return;
     for (int k = 0; k < header.prisms; ++k) {
-      define_data<float>(
-          {fmt::format("rotation_angle_{}_deg", prism_letter(k)), "degree",
-           fmt::format("rotation angle of prism {}", prism_capital(k))},
-          [k](const Points& p, std::size_t i, std::size_t) {
-            return degrees_from_radians(p.rotation_angle[static_cast<std::size_t>(k)][i]);
-          });
+      define_data<float>({fmt::format("rotation_angle_{}_deg", prism_letter(k)), "degree",
+                          fmt::format("rotation angle of prism {}", prism_capital(k))},
+                         [k](const Points& p, std::size_t i, std::size_t) {
+                           return degrees_from_radians(p.rotation_angle[k][i]);
+                         });
     }
     define_data<float>({"azimuth_residual_deg", "degree", "reported minus smoothed azimuth"},
                        [](const Points& p, std::size_t i, std::size_t) {

@@ -171,9 +171,8 @@ class RosbagWriter final : public CloudWriter {
     const std::size_t most = std::max<std::size_t>(kMessageBytes / step, 1) * step;
     std::size_t first = 0;  // of those not in message_ yet
     const auto take = [&](std::size_t end) {
-      message_.points.insert(message_.points.end(),
-                             records_.begin() + static_cast<std::ptrdiff_t>(first * step),
-                             records_.begin() + static_cast<std::ptrdiff_t>(end * step));
+      message_.points.insert(message_.points.end(), records_.begin() + (first * step),
+                             records_.begin() + (end * step));
       first = end;
     };
     for (std::size_t i = 0; i < points.size(); ++i) {

@@ -111,7 +111,7 @@ std::vector<std::string> units_of(std::string_view names_line, std::string_view 
 }
 
 bool has_word(const std::vector<std::string>& words, std::string_view word) {
-  return std::find(words.begin(), words.end(), word) != words.end();
+  return std::ranges::find(words, word) != words.end();
 }
 
 /// Whether these are the lines of names and of units.

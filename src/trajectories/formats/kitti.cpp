@@ -25,8 +25,7 @@ bool is_kitti_row(std::string_view line) {
   Eigen::Matrix<double, 3, 4> pose;
   try {
     for (std::size_t i = 0; i < fields.size(); ++i) {
-      pose(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) =
-          io::decimal_field(fields[i], "").value;
+      pose(i / 4, i % 4) = io::decimal_field(fields[i], "").value;
     }
   } catch (const io::BadRow&) {
     return false;
@@ -40,9 +39,7 @@ bool is_kitti(const FileHead& head) {
   const std::vector<std::string_view> lines = lines_of(head.bytes);
   constexpr std::size_t kRows = 3;
   return !lines.empty() &&
-         std::all_of(lines.begin(),
-                     lines.begin() + static_cast<std::ptrdiff_t>(std::min(lines.size(), kRows)),
-                     is_kitti_row);
+         std::all_of(lines.begin(), lines.begin() + (std::min(lines.size(), kRows)), is_kitti_row);
 }
 
 Trajectory refuse_kitti(const std::string& path, const Progress& /*progress*/) {

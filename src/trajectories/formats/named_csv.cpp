@@ -187,8 +187,8 @@ std::string csv_name(std::string_view written) {
   if (open != name.npos && open > 0 && (name.ends_with(']') || name.ends_with(')'))) {
     const std::string_view unit =
         io::trimmed(std::string_view(name).substr(open + 1, name.size() - open - 2));
-    const auto known = std::find_if(kCsvUnitAliases.begin(), kCsvUnitAliases.end(),
-                                    [&](const CsvUnitAlias& one) { return one.written == unit; });
+    const auto known = std::ranges::find_if(
+        kCsvUnitAliases, [&](const CsvUnitAlias& one) { return one.written == unit; });
     if (known == kCsvUnitAliases.end()) return name;
     suffix = known->suffix;
     base = io::trimmed(name.substr(0, open));
@@ -199,7 +199,7 @@ std::string csv_name(std::string_view written) {
     }
     base.resize(name.size() - suffix.size());
   }
-  std::replace(base.begin(), base.end(), ' ', '_');
+  std::ranges::replace(base, ' ', '_');
   for (const CsvAlias& alias : kCsvAliases) {
     if (alias.written == base) base = alias.base;
   }
@@ -215,7 +215,7 @@ std::vector<std::string> header_names(std::string_view line) {
   }
   // EuRoC counts nanoseconds, whether its header says so or not.
   if (lower_case(std::string(line)).find(kEurocPosition) != std::string::npos) {
-    std::replace(names.begin(), names.end(), std::string("time"), std::string("time_ns"));
+    std::ranges::replace(names, std::string("time"), std::string("time_ns"));
   }
   return names;
 }
@@ -235,13 +235,12 @@ bool is_trajectory_csv(const FileHead& head) {
   int found = 0;
   const std::vector<std::string> names = header_names(lines[0]);
   // A cloud may have the place of each point, too.
-  const bool has_points = std::any_of(names.begin(), names.end(), [](const std::string& name) {
+  const bool has_points = std::ranges::any_of(names, [](const std::string& name) {
     return name == "x" || name.starts_with("x_") || name.starts_with("range") ||
            name.starts_with("azimuth");
   });
   for (const std::string& name : names) {
-    const bool is_quaternion =
-        std::find(kQuaternion.begin(), kQuaternion.end(), name) != kQuaternion.end();
+    const bool is_quaternion = std::ranges::find(kQuaternion, name) != kQuaternion.end();
     const bool without_unit = name == "roll" || name == "pitch" || name == "heading";
     const bool is_place =
         !has_points && (name.starts_with("latitude") || name.starts_with("longitude"));
@@ -259,8 +258,8 @@ void refuse_ambiguous(const std::string& path, const std::vector<PoseColumn>& co
     if (has_field(columns, field)) return;
     for (const std::string& name : unknown) {
       const std::string_view base = std::string_view(name).substr(0, name.rfind('_'));
-      const bool meant = std::find(bases.begin(), bases.end(), base) != bases.end() ||
-                         std::find(bases.begin(), bases.end(), name) != bases.end();
+      const bool meant = std::ranges::find(bases, base) != bases.end() ||
+                         std::ranges::find(bases, name) != bases.end();
       if (!meant) continue;
       names.push_back(io::printable(name));
       remedies.emplace_back(remedy);
@@ -295,11 +294,10 @@ PoseTable csv_table(const std::string& path, std::string_view header,
     if (const auto found = csv_column(name)) {
       column.field = found->name->field;
       if (has_field(table.columns, column.field)) {
-        refuse(fmt::format(
-            "column {} repeats {}", io::printable(name),
-            std::find_if(table.columns.begin(), table.columns.end(), [&](const PoseColumn& other) {
-              return other.field == column.field;
-            })->name));
+        refuse(fmt::format("column {} repeats {}", io::printable(name),
+                           std::ranges::find_if(table.columns, [&](const PoseColumn& other) {
+                             return other.field == column.field;
+                           })->name));
       }
       column.scale = found->unit->scale * found->name->sign;
       column.time_decimals = found->unit->time_decimals;

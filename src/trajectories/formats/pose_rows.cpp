@@ -190,7 +190,7 @@ Trajectory PoseRows::finish() {
   put_in_order();
   if (!wander_.empty()) {
     std::vector<double> sorted = wander_;
-    std::sort(sorted.begin(), sorted.end());
+    std::ranges::sort(sorted);
     trajectory_.wander = AngleSpread{sorted.front(), sorted[sorted.size() / 2], sorted.back()};
   }
   settle_velocities(trajectory_, wander_, contents_.velocity_axes);

@@ -57,7 +57,7 @@ std::vector<std::string> pospac_names(std::string_view line) {
 bool are_pospac_names(std::string_view line) {
   const std::vector<std::string> names = pospac_names(line);
   const auto has = [&](std::string_view name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
+    return std::ranges::find(names, name) != names.end();
   };
   return has("time") && has("distance") && (has("latitude") || has("lat")) && has("roll") &&
          has("pitch") && has("heading");
@@ -65,7 +65,7 @@ bool are_pospac_names(std::string_view line) {
 
 bool is_pospac(const FileHead& head) {
   const std::vector<std::string_view> lines = lines_of(head.bytes);
-  return std::any_of(lines.begin(), lines.end(), are_pospac_names);
+  return std::ranges::any_of(lines, are_pospac_names);
 }
 
 Trajectory read_pospac(const std::string& path, const Progress& progress) {

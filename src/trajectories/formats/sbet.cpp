@@ -144,7 +144,7 @@ std::vector<std::string> write_sbet(const std::string& path, const Trajectory& t
     if (!trajectory.velocity.empty()) {
       const Eigen::Vector3d ned = geocentric_from_ned(place).transpose() * trajectory.velocity[i];
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        n[kSbetVelocity + axis] = ned[static_cast<Eigen::Index>(axis)];
+        n[kSbetVelocity + axis] = ned[axis];
       }
     }
     std::uint8_t* bytes = file.append(kSbetRecord);

@@ -65,7 +65,7 @@ bool is_smrmsg(const FileHead& head) {
   for (std::size_t i = 0; i < records; ++i) {
     const SmrmsgNumbers n = smrmsg_numbers(bytes + i * kSmrmsgRecord);
     const auto is_normal = [](double value) { return value > 1e-9; };
-    if (!smrmsg_fault(n).empty() || !std::all_of(n.begin(), n.end(), is_normal)) return false;
+    if (!smrmsg_fault(n).empty() || !std::ranges::all_of(n, is_normal)) return false;
     if (i > 0 && std::abs(n[0] - before) > 604800) return false;
     before = n[0];
   }
@@ -138,9 +138,9 @@ void add_accuracies(Trajectory& trajectory, const AccuracyRecords& accuracies,
                     const std::string& path) {
   require_trajectory(trajectory);
   const std::vector<std::int64_t>& times = accuracies.time_ns;
-  require_at_least("accuracies", static_cast<long long>(times.size()), 1);
+  require_at_least("accuracies", times.size(), 1);
   require_length("accuracy", accuracies.accuracy.size(), times.size());
-  if (!std::is_sorted(times.begin(), times.end())) {
+  if (!std::ranges::is_sorted(times)) {
     throw InvalidArgument("time_ns of the accuracies does not ascend");
   }
   if (accuracies.time_scale != trajectory.time_scale) {

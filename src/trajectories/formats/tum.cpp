@@ -48,8 +48,8 @@ std::optional<Order> named_order(std::string_view line) {
                                      std::pair{"qw", PoseField::qw}};
   std::string text = lower_case(std::string(line));
   std::erase(text, '_');
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '#' || c == ','; }, ' ');
+  std::ranges::replace_if(
+      text, [](char c) { return c == '#' || c == ','; }, ' ');
   std::vector<PoseField> fields;
   for (const std::string_view word : io::fields_of(text, io::kBlanks)) {
     for (const auto& [name, field] : kNames) {
@@ -58,7 +58,7 @@ std::optional<Order> named_order(std::string_view line) {
   }
   Order order{};
   if (fields.size() != order.size()) return std::nullopt;
-  std::copy(fields.begin(), fields.end(), order.begin());
+  std::ranges::copy(fields, order.begin());
   const bool all = std::is_permutation(order.begin(), order.end(), kUsualOrder.begin());
   return all ? std::optional(order) : std::nullopt;
 }
