@@ -541,31 +541,6 @@ TEST(Tum, DecimalCommasAndUtf16) {
   }
 }
 
-TEST(TrajectoryCsv, EurocIsRead) {
-  const Trajectory wanted = read(tum_drive("", false));
-  for (const char* names :
-       {"#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],"
-        "q_RS_z []",
-        "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
-        "q_RS_z []"}) {
-    std::string text = std::string(names) + "\n";
-    for (int i = 0; i < 40; ++i) {
-      const double half = 0.01 * i;
-      text += fmt::format("{},{:.2f},0,0,{:.9f},0,0,{:.9f}\n",
-                          1'700'000'000'000'000'000 + 50'000'000LL * i, 0.05 * i, std::cos(half),
-                          std::sin(half));
-    }
-    const Trajectory t = read(text, "data.csv");
-    EXPECT_EQ(t.format, "trajectory-csv");
-    ASSERT_EQ(t.size(), wanted.size());
-    EXPECT_EQ(t.time_ns, wanted.time_ns);
-    EXPECT_EQ(t.position, wanted.position);
-    for (std::size_t i = 0; i < t.size(); ++i) {
-      EXPECT_LT(t.attitude[i].angularDistance(wanted.attitude[i]), 1e-8);
-    }
-  }
-}
-
 TEST(TrajectoryCsv, NamesWithUnitsInBrackets) {
   const std::string rows =
       "400825.000;47.0;8.5;480.0;1.9;-0.2;359.5\n400825.050;47.00000225;8.5;480.0;1.8;-0.3;359.5\n";
@@ -584,12 +559,6 @@ TEST(TrajectoryCsv, NamesWithUnitsInBrackets) {
   EXPECT_THAT(fault(altitude + rows, "ins.csv"), HasSubstr("ellipsoidal_height_m"));
   EXPECT_THAT(fault(replaced(yaw, "Ellipsoidal height", "Alt") + rows, "ins.csv"),
               AllOf(HasSubstr("heading_deg"), HasSubstr("ellipsoidal_height_m")));
-}
-
-TEST(Kitti, IsRefusedBecauseItHasNoTimes) {
-  const std::string text = "1 0 0 0.0 0 1 0 0 0 0 1 0\n0 -1 0 0.05 1 0 0 0 0 0 1 0\n";
-  EXPECT_THAT(fault(text), AllOf(HasSubstr("KITTI"), HasSubstr("time x y z qx qy qz qw")));
-  EXPECT_THAT(fault(replaced(text, "0 -1 0 0.05", "0 -2 0 0.05")), HasSubstr("known kind"));
 }
 
 TEST(InertialExplorer, TheDateDecidesBetweenSecondsOfDayAndOfWeek) {

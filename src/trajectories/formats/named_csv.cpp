@@ -126,33 +126,15 @@ struct CsvAlias {
   std::string_view written, base;
 };
 constexpr std::array kCsvAliases{
-    CsvAlias{"timestamp", "time"},
-    CsvAlias{"time_stamp", "time"},
-    CsvAlias{"t", "time"},
-    CsvAlias{"lat", "latitude"},
-    CsvAlias{"lon", "longitude"},
-    CsvAlias{"long", "longitude"},
-    CsvAlias{"lng", "longitude"},
-    CsvAlias{"ellipsoid_height", "ellipsoidal_height"},
-    CsvAlias{"tx", "x"},
-    CsvAlias{"ty", "y"},
-    CsvAlias{"tz", "z"},
-    CsvAlias{"q_x", "qx"},
-    CsvAlias{"q_y", "qy"},
-    CsvAlias{"q_z", "qz"},
+    CsvAlias{"timestamp", "time"}, CsvAlias{"time_stamp", "time"},
+    CsvAlias{"t", "time"},         CsvAlias{"lat", "latitude"},
+    CsvAlias{"lon", "longitude"},  CsvAlias{"long", "longitude"},
+    CsvAlias{"lng", "longitude"},  CsvAlias{"ellipsoid_height", "ellipsoidal_height"},
+    CsvAlias{"tx", "x"},           CsvAlias{"ty", "y"},
+    CsvAlias{"tz", "z"},           CsvAlias{"q_x", "qx"},
+    CsvAlias{"q_y", "qy"},         CsvAlias{"q_z", "qz"},
     CsvAlias{"q_w", "qw"},
-    CsvAlias{"p_rs_r_x", "x"},
-    CsvAlias{"p_rs_r_y", "y"},
-    CsvAlias{"p_rs_r_z", "z"},
-    CsvAlias{"q_rs_x", "qx"},
-    CsvAlias{"q_rs_y", "qy"},
-    CsvAlias{"q_rs_z", "qz"},
-    CsvAlias{"q_rs_w", "qw"},
-    CsvAlias{"v_rs_r_x", "velocity_x"},
-    CsvAlias{"v_rs_r_y", "velocity_y"},
-    CsvAlias{"v_rs_r_z", "velocity_z"},
 };
-constexpr std::string_view kEurocPosition = "p_rs_r_x";
 
 /// Units as they stand in brackets.
 struct CsvUnitAlias {
@@ -212,10 +194,6 @@ std::vector<std::string> header_names(std::string_view line) {
   std::vector<std::string> names;
   for (const std::string_view field : io::fields_of(line, csv_delimiter(line))) {
     names.push_back(csv_name(field));
-  }
-  // EuRoC counts nanoseconds, whether its header says so or not.
-  if (lower_case(std::string(line)).find(kEurocPosition) != std::string::npos) {
-    std::ranges::replace(names, std::string("time"), std::string("time_ns"));
   }
   return names;
 }
@@ -311,26 +289,14 @@ PoseTable csv_table(const std::string& path, std::string_view header,
   }
   refuse_ambiguous(path, table.columns, unknown);
   for (const std::string& name : unknown) {
-    const bool lacks_unit = csv_column(name + "_deg") || csv_column(name + "_m") ||
-                            csv_column(name + "_s") || csv_column(name + "_m_per_s");
-    if (lacks_unit) {
-      const std::string with_unit = csv_column(name + "_deg") ? name + "_deg"
-                                    : csv_column(name + "_s") ? name + "_s"
-                                    : csv_column(name + "_m") ? name + "_m"
-                                                              : name + "_m_per_s";
-      refuse(
-          fmt::format("column {} names no unit, did you mean {}?", io::printable(name), with_unit));
+    for (const char* unit : {"_deg", "_s", "_m", "_m_per_s"}) {
+      if (!csv_column(name + unit)) continue;
+      refuse(fmt::format("column {} names no unit, did you mean {}{}?", io::printable(name), name,
+                         unit));
     }
     const std::string meant = did_you_mean(name, all_csv_names());
     if (!meant.empty()) refuse(fmt::format("unknown column {}{}", io::printable(name), meant));
   }
-  const auto missing = [&](std::initializer_list<std::pair<PoseField, const char*>> wanted) {
-    std::vector<std::string> names;
-    for (const auto& [field, name] : wanted) {
-      if (!has_field(table.columns, field)) names.emplace_back(name);
-    }
-    return names;
-  };
   if (time == nullptr) {
     refuse(fmt::format(
         "has no column of times: expected time_s, gps_second_of_week_s, utc_second_of_day_s, "
@@ -338,19 +304,19 @@ PoseTable csv_table(const std::string& path, std::string_view header,
         io::printable(header)));
   }
   table.contents.time_scale = time->scale;
-  const auto geodetic = missing({{PoseField::latitude, "latitude_deg"},
-                                 {PoseField::longitude, "longitude_deg"},
-                                 {PoseField::height, "ellipsoidal_height_m"},
-                                 {PoseField::roll, "roll_deg"},
-                                 {PoseField::pitch, "pitch_deg"},
-                                 {PoseField::heading, "heading_deg"}});
-  const auto local = missing({{PoseField::x, "x_m"},
-                              {PoseField::y, "y_m"},
-                              {PoseField::z, "z_m"},
-                              {PoseField::qx, "qx"},
-                              {PoseField::qy, "qy"},
-                              {PoseField::qz, "qz"},
-                              {PoseField::qw, "qw"}});
+  const auto geodetic = missing_fields(table.columns, {{PoseField::latitude, "latitude_deg"},
+                                                       {PoseField::longitude, "longitude_deg"},
+                                                       {PoseField::height, "ellipsoidal_height_m"},
+                                                       {PoseField::roll, "roll_deg"},
+                                                       {PoseField::pitch, "pitch_deg"},
+                                                       {PoseField::heading, "heading_deg"}});
+  const auto local = missing_fields(table.columns, {{PoseField::x, "x_m"},
+                                                    {PoseField::y, "y_m"},
+                                                    {PoseField::z, "z_m"},
+                                                    {PoseField::qx, "qx"},
+                                                    {PoseField::qy, "qy"},
+                                                    {PoseField::qz, "qz"},
+                                                    {PoseField::qw, "qw"}});
   if (!geodetic.empty() && !local.empty()) {
     const bool meant_local =
         has_field(table.columns, PoseField::x) ||

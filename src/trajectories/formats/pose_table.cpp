@@ -196,6 +196,23 @@ bool has_field(const std::vector<PoseColumn>& columns, PoseField field) {
                              [field](const PoseColumn& column) { return column.field == field; });
 }
 
+std::vector<std::string_view> missing_fields(
+    const std::vector<PoseColumn>& columns,
+    std::initializer_list<std::pair<PoseField, std::string_view>> wanted) {
+  std::vector<std::string_view> names;
+  for (const auto& [field, name] : wanted) {
+    if (!has_field(columns, field)) names.push_back(name);
+  }
+  return names;
+}
+
+bool is_angle(PoseField field) {
+  return field == PoseField::latitude || field == PoseField::longitude ||
+         (field >= PoseField::roll && field <= PoseField::heading);
+}
+
+bool is_angle_sigma(PoseField field) { return field >= PoseField::sigma_roll; }
+
 void take_contents(PoseTable& table, std::vector<TrajectoryWarning>& warnings) {
   // A quantity counts when all its columns are there.
   const auto whole = [&](std::initializer_list<PoseField> fields, const char* what) {

@@ -120,32 +120,19 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
                            has_field(table.columns, PoseField::longitude) &&
                            !has_field(table.columns, PoseField::height);
     if (is_height) column.field = PoseField::height;
-    switch (column.field) {
-      case PoseField::latitude:
-      case PoseField::longitude:
-      case PoseField::roll:
-      case PoseField::pitch:
-      case PoseField::heading:
-        column.scale = kRadiansPerDegree;
-        break;
-      case PoseField::sigma_roll:
-      case PoseField::sigma_pitch:
-      case PoseField::sigma_heading:
-        column.scale = kRadiansPerDegree / (arc_minutes ? 60 : 1);
-        break;
-      default:
-        break;
+    if (is_angle(column.field)) column.scale = kRadiansPerDegree;
+    if (is_angle_sigma(column.field)) {
+      column.scale = kRadiansPerDegree / (arc_minutes ? 60 : 1);
     }
     table.columns.push_back(std::move(column));
   }
-  std::vector<std::string_view> missing;
-  for (const auto& [field, name] :
-       {std::pair{PoseField::time, "TIME"}, std::pair{PoseField::latitude, "LATITUDE"},
-        std::pair{PoseField::longitude, "LONGITUDE"},
-        std::pair{PoseField::height, "ELLIPSOID HEIGHT"}, std::pair{PoseField::roll, "ROLL"},
-        std::pair{PoseField::pitch, "PITCH"}, std::pair{PoseField::heading, "HEADING"}}) {
-    if (!has_field(table.columns, field)) missing.push_back(name);
-  }
+  const auto missing = missing_fields(table.columns, {{PoseField::time, "TIME"},
+                                                      {PoseField::latitude, "LATITUDE"},
+                                                      {PoseField::longitude, "LONGITUDE"},
+                                                      {PoseField::height, "ELLIPSOID HEIGHT"},
+                                                      {PoseField::roll, "ROLL"},
+                                                      {PoseField::pitch, "PITCH"},
+                                                      {PoseField::heading, "HEADING"}});
   if (!missing.empty()) {
     throw FileError(path, {{}, names_line},
                     fmt::format("column {} is missing", fmt::join(missing, ", ")));

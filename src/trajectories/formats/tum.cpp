@@ -22,19 +22,12 @@
 namespace risley::trajectories {
 namespace {
 
-/// The numbers of a line, where it has eight and the last four make a rotation.
+/// Whether a line has eight numbers of which the last four make a rotation.
 bool is_tum_row(std::string_view line) {
-  std::array<std::string_view, 8> fields;
-  if (io::split_fields(line, io::kBlanks, fields) != fields.size()) return false;
+  const auto n = numbers_in<8>(line, io::kBlanks);
+  if (!n) return false;
   double squares = 0;
-  try {
-    for (std::size_t i = 0; i < fields.size(); ++i) {
-      const double value = io::decimal_field(fields[i], "").value;
-      if (i >= 4) squares += value * value;
-    }
-  } catch (const io::BadRow&) {
-    return false;
-  }
+  for (std::size_t i = 4; i < 8; ++i) squares += (*n)[i] * (*n)[i];
   return std::abs(squares - 1) < 0.03;
 }
 
