@@ -70,18 +70,6 @@ uint8 datatype
 uint32 count
 )";
 
-std::uint8_t datatype_of(FieldType type) {
-  switch (type) {
-    case FieldType::uint8:
-      return 2;
-    case FieldType::float32:
-      return 7;
-    case FieldType::float64:
-      return 8;
-  }
-  return 0;
-}
-
 /// A message as it stands in the bag, in two parts.
 struct PointCloudMessage {
   std::vector<std::uint8_t> head;    ///< all before the points
@@ -248,7 +236,7 @@ class RosbagWriter final : public CloudWriter {
     for (std::size_t k = 0; k < packer_.fields().size(); ++k) {
       message_.add(packer_.fields()[k].name);
       message_.add(static_cast<std::uint32_t>(packer_.offset(k)));
-      message_.add(datatype_of(packer_.fields()[k].type));
+      message_.add(names_of(packer_.fields()[k].type).ros);
       message_.add(std::uint32_t{1});
     }
     message_.add(kOffsetField);
