@@ -22,6 +22,7 @@
 #include "calibration/cholesky.hpp"
 #include "calibration/eigen_vectors.hpp"
 #include "calibration/smooth_ground.hpp"
+#include "calibration/sorted_rows.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -43,12 +44,6 @@ constexpr double kSettledCorrection = 0.02;
 constexpr double kLeastOwnShare = 0.25;
 /// Columns of an inverse that are computed together.
 constexpr Index kInverseColumns = 96;
-
-Matrix3d cross_matrix(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
-  return m;
-}
 
 using PlaneRows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -88,20 +83,6 @@ struct EliminatedPlane {
   MatrixXd globals;                  // [3, globals]
   std::vector<std::uint32_t> knots;  // ascending
   MatrixXd by_knot;                  // [6 knots, 3]
-};
-
-/// Places in a list, by what they are of.
-struct Listing {
-  std::vector<std::size_t> begin, entry;
-
-  template <class KeyOf>
-  Listing(std::size_t keys, std::size_t count, const KeyOf& key_of) : begin(keys + 1) {
-    for (std::size_t i = 0; i < count; ++i) ++begin[key_of(i) + 1];
-    for (std::size_t k = 0; k < keys; ++k) begin[k + 1] += begin[k];
-    entry.resize(count);
-    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < count; ++i) entry[next[key_of(i)]++] = i;
-  }
 };
 
 /// Takes left own' off a block of rows x 6 entries: by far the most of the work of elimination.
@@ -202,7 +183,7 @@ MatrixXd value_rates(const FlightModel& model) {
   MatrixXd rates = MatrixXd::Identity(globals, globals);
   const Vector3d turn = algebra::rotation_vector(model.boresight);
   const double angle = turn.norm();
-  const Matrix3d across = cross_matrix(turn);
+  const Matrix3d across = algebra::cross_matrix(turn);
   const double factor =
       angle < 1e-4 ? 1.0 / 12
                    : 1 / (angle * angle) - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
@@ -235,8 +216,8 @@ struct FlightSystem::Parts {
 void FlightSystem::Parts::eliminate(const FlightEquations& equations, const FlightModel& model,
                                     const std::vector<PlaneKnowledge>& known) {
   const Index stride = globals + kTwo + 1 + 3;
-  const Listing blocks(planes, equations.plane_blocks.size(),
-                       [&](std::size_t i) { return equations.plane_blocks[i].plane; });
+  const SortedRows blocks(planes, equations.plane_blocks.size(),
+                          [&](std::size_t i) { return equations.plane_blocks[i].plane; });
   eliminated.resize(planes);
   parallel::for_each(planes, [&](std::size_t p) {
     Matrix3d own = known[p].information.asDiagonal();
@@ -245,8 +226,8 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
     EliminatedPlane& result = eliminated[p];
     // Blocks come in the order of time: knots ascend.
     std::vector<Eigen::Matrix<double, 3, kCorrections>> by_knot;
-    for (std::size_t b = blocks.begin[p]; b < blocks.begin[p + 1]; ++b) {
-      const PlaneBlock& block = equations.plane_blocks[blocks.entry[b]];
+    for (const std::size_t b : blocks.of(p)) {
+      const PlaneBlock& block = equations.plane_blocks[b];
       const Eigen::Map<const PlaneRows> rows(equations.plane_products.data() + block.at, 3, stride);
       by_global += rows.leftCols(globals);
       gradient += rows.col(globals + kTwo);
@@ -288,15 +269,15 @@ void FlightSystem::Parts::reduce(MatrixXd& hessian) {
       places.emplace_back(static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(k));
     }
   }
-  const Listing by_knot(knots, places.size(), [&](std::size_t i) {
+  const SortedRows by_knot(knots, places.size(), [&](std::size_t i) {
     return eliminated[places[i].first].knots[places[i].second];
   });
   const Index g0 = first_global();
   // Each task has the columns of one knot for itself.
   parallel::for_each(knots, [&](Index knot) {
     const Index column = kCorrections * knot;
-    for (std::size_t i = by_knot.begin[knot]; i < by_knot.begin[knot + 1]; ++i) {
-      const auto [p, slot] = places[by_knot.entry[i]];
+    for (const std::size_t i : by_knot.of(knot)) {
+      const auto [p, slot] = places[i];
       const EliminatedPlane& plane = eliminated[p];
       const Eigen::Matrix<double, kCorrections, 3> own =
           plane.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(slot));

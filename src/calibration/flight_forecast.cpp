@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
@@ -93,12 +94,6 @@ struct PointRates {
   std::int64_t time_ns = 0;
 };
 
-Matrix3d crossing(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
-  return m;
-}
-
 PointRates rates_of(const ForecastWork& work, std::size_t row) {
   const FlightModel& model = work.start.model;
   const FlightShots& shots = work.shots;
@@ -123,7 +118,7 @@ PointRates rates_of(const ForecastWork& work, std::size_t row) {
   const Index first = kCorrections * knots;
   PointRates rates;
   rates.time_ns = shots.time_ns[row];
-  rates.of_pose << Matrix3d::Identity(), -crossing(arm);
+  rates.of_pose << Matrix3d::Identity(), -algebra::cross_matrix(arm);
   rates.of_all = MatrixXd::Zero(3, first + unknowns.size());
   // Between two knots of the strip.
   const auto behind = std::ranges::upper_bound(model.knots.time_ns, rates.time_ns);
@@ -139,7 +134,7 @@ PointRates rates_of(const ForecastWork& work, std::size_t row) {
   rates.of_all.middleCols<kCorrections>(at - kCorrections) = (1 - weight) * rates.of_pose;
   rates.of_all.middleCols<kCorrections>(at) = weight * rates.of_pose;
   auto globals = rates.of_all.rightCols(unknowns.size());
-  globals.middleCols<3>(0) = -turn * crossing(range * own);
+  globals.middleCols<3>(0) = -turn * algebra::cross_matrix(range * own);
   globals.middleCols<3>(3) = attitude;
   globals.col(FlightUnknowns::range_offset()) = -turn * own;
   const Vector3d velocity(static_cast<double>(pose.velocity[0]),

@@ -11,13 +11,15 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "risley/calibration/rays.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
-#include "risley/optics/batch.hpp"
 #include "risley/parallel/parallel.hpp"
 
+#include "calibration/eigen_vectors.hpp"
 #include "calibration/shot_blocks.hpp"
+#include "calibration/sorted_rows.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -159,29 +161,11 @@ void require_cells(const GroundCellOptions& options) {
   require_not_below("noise of the cells", options.noise, 0, "m");
 }
 
-/// Rows of points sorted by a number below `count`; rows without one are left out.
-struct SortedRows {
-  std::vector<std::size_t> begin;
-  std::vector<std::uint32_t> rows;
+using RowsOfPlanes = SortedRows<std::uint32_t>;
 
-  template <class Number>
-  SortedRows(std::size_t count, const std::vector<Number>& number, Number none) : begin(count + 1) {
-    for (const Number n : number) {
-      if (n != none) ++begin[static_cast<std::size_t>(n) + 1];
-    }
-    for (std::size_t k = 0; k < count; ++k) begin[k + 1] += begin[k];
-    rows.resize(begin.back());
-    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < number.size(); ++i) {
-      if (number[i] != none) {
-        rows[next[number[i]]++] = static_cast<std::uint32_t>(i);
-      }
-    }
-  }
-  std::span<const std::uint32_t> of(std::size_t number) const {
-    return {rows.data() + begin[number], begin[number + 1] - begin[number]};
-  }
-};
+RowsOfPlanes rows_of_planes(std::size_t planes, const std::vector<std::int32_t>& plane) {
+  return {planes, plane.size(), [&](std::size_t i) { return plane[i]; }};
+}
 
 }  // namespace
 
@@ -195,28 +179,12 @@ ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
   const Eigen::Matrix3d mount = model.nominal * model.boresight;
   const auto work = [&](const TrajectoryKnots::Interval& interval, std::size_t begin,
                         std::size_t end) {
-    const std::size_t n = end - begin;
-    std::array<std::vector<double>, 6> columns;
-    for (auto& column : columns) column.resize(n);
-    std::vector<std::span<const double>> angles;
-    for (const auto& column : shots.rotation_angle) angles.emplace_back(column.data() + begin, n);
-    DirectionColumns out;
-    out.x = columns[0];
-    out.y = columns[1];
-    out.z = columns[2];
-    out.origin_x = columns[3];
-    out.origin_y = columns[4];
-    out.origin_z = columns[5];
-    out.geometry = model.geometry;
-    const auto beam = shots.beam.empty()
-                          ? std::span<const std::uint8_t>()
-                          : std::span<const std::uint8_t>(shots.beam.data() + begin, n);
-    observe_batch(model.train, angles, out, beam);
+    const Rays rays(model.train, model.geometry, shots.rotation_angle, shots.beam, {begin, end});
     const auto knot = static_cast<Index>(interval.knot);
     const Eigen::Matrix<double, 6, 1> before = model.corrections.col(knot),
                                       change = model.corrections.col(knot + 1) - before;
     const double per_ns = 1 / static_cast<double>(interval.end_ns - interval.begin_ns);
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = 0; i < rays.size(); ++i) {
       const std::size_t shot = begin + i;
       const ShotPose& pose = poses.pose[shot];
       const Eigen::Matrix<double, 6, 1> correction =
@@ -227,11 +195,8 @@ ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
                                                                          pose.angular_velocity[2]);
       const Eigen::Quaterniond attitude(pose.attitude[0], pose.attitude[1], pose.attitude[2],
                                         pose.attitude[3]);
-      const Vector3d origin(columns[3][i], columns[4][i], columns[5][i]);
-      const Vector3d beam_direction(columns[0][i], columns[1][i], columns[2][i]);
-      const Vector3d arm =
-          attitude * (model.lever_arm +
-                      mount * (origin + (shots.range[shot] - model.range_offset) * beam_direction));
+      const Vector3d seen = eigen(rays.point(i, shots.range[shot] - model.range_offset));
+      const Vector3d arm = attitude * (model.lever_arm + mount * seen);
       const Vector3d across = turn.cross(arm);
       const Vector3d point = Vector3d(pose.position[0], pose.position[1], pose.position[2]) +
                              correction.head<3>() + clock_step * velocity + arm + across +
@@ -283,7 +248,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
       }
     }
   });
-  const SortedRows rows(numbers.size(), cells.plane, kNoPlane);
+  const RowsOfPlanes rows = rows_of_planes(numbers.size(), cells.plane);
   std::vector<Outcome> outcome(numbers.size());
   parallel::for_each(numbers.size(), [&](std::size_t cell) {
     const auto own = rows.of(cell);
@@ -330,7 +295,7 @@ std::vector<std::int32_t> add_circles(const ShotPoints& points,
       }
     }
   });
-  const SortedRows rows(circles.size(), circle_of, kNoPlane);
+  const RowsOfPlanes rows = rows_of_planes(circles.size(), circle_of);
   std::vector<std::int32_t> planes(circles.size(), kNoPlane);
   for (std::size_t c = 0; c < circles.size(); ++c) {
     const auto own = rows.of(c);
@@ -352,7 +317,7 @@ std::vector<StripInCell> strips_in_cells(const ShotPoints& points,
   require_length("strip", strip.size(), points.size());
   require_length("planes of the shots", plane.size(), points.size());
   require_threshold("gate", gate);
-  const SortedRows rows(planes.size(), plane, kNoPlane);
+  const RowsOfPlanes rows = rows_of_planes(planes.size(), plane);
   std::vector<std::vector<StripInCell>> seen(planes.size());
   parallel::for_each(planes.size(), [&](std::size_t p) {
     const auto own = rows.of(p);

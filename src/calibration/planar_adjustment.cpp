@@ -350,10 +350,7 @@ Uncertainty uncertainty_of(const PlanarProblem& problem, const PlanarSystem& sys
                            PlanarSolution& solution) {
   const FlatSolution flat = solve_flat(system.problem, kLeastDamping);
   if (!flat.positive) return no_information(problem, system);
-  std::vector<std::vector<std::size_t>> views(problem.walls.size());
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    views[problem.views[v].wall].push_back(v);
-  }
+  const std::vector<std::vector<std::size_t>> views = views_of_walls(problem);
   Uncertainty result{flat.shared.normal, flat.shared.covariance, flat.shared.response, {}, true};
   for (std::size_t w = 0; w < flat.walls.size(); ++w) {
     const WallSums& wall = system.problem.walls[w];

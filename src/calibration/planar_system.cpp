@@ -270,13 +270,6 @@ void add_priors(const PlanarProblem& p, const Unknowns& at, Eigen::MatrixXd& sys
   }
 }
 
-/// Rows of the views of every wall [walls].
-std::vector<std::vector<std::size_t>> views_of_walls(const PlanarProblem& p) {
-  std::vector<std::vector<std::size_t>> views(p.walls.size());
-  for (std::size_t v = 0; v < p.views.size(); ++v) views[p.views[v].wall].push_back(v);
-  return views;
-}
-
 }  // namespace
 
 Unknowns::Unknowns(const PlanarProblem& p)
@@ -339,6 +332,12 @@ Eigen::MatrixXd considered_covariance(const PlanarProblem& p) {
     at += own.rows();
   }
   return covariance;
+}
+
+std::vector<std::vector<std::size_t>> views_of_walls(const PlanarProblem& p) {
+  std::vector<std::vector<std::size_t>> views(p.walls.size());
+  for (std::size_t v = 0; v < p.views.size(); ++v) views[p.views[v].wall].push_back(v);
+  return views;
 }
 
 Eigen::Vector2d misfit_of(const Wall& wall) {

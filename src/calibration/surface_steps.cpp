@@ -16,6 +16,8 @@
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 
+#include "calibration/sorted_rows.hpp"
+
 namespace risley::calibration {
 namespace {
 
@@ -168,17 +170,15 @@ class Grid {
     }
     columns_ = 1 + static_cast<int>((right - left_) / kSurfaceCell);
     rows_ = 1 + static_cast<int>((top - bottom_) / kSurfaceCell);
-    std::vector<std::size_t> begin(static_cast<std::size_t>(columns_ * rows_) + 1, 0), cell_of;
+    std::vector<int> cell_of(size, -1);
     for (std::size_t i : rows) {
       const int column = static_cast<int>((x_of(i) - left_) / kSurfaceCell);
       const int row = static_cast<int>((residuals.zenith[i] - bottom_) / kSurfaceCell);
-      cell_of.push_back(static_cast<std::size_t>(row * columns_ + column));
-      ++begin[cell_of.back() + 1];
+      cell_of[i] = row * columns_ + column;
     }
-    for (std::size_t c = 0; c + 1 < begin.size(); ++c) begin[c + 1] += begin[c];
-    order_.resize(rows.size());
-    std::vector<std::size_t> next = begin;
-    for (std::size_t k = 0; k < rows.size(); ++k) order_[next[cell_of[k]]++] = rows[k];
+    SortedRows sorted(columns_ * rows_, size, [&](std::size_t i) { return cell_of[i]; });
+    order_ = std::move(sorted.rows);
+    const std::vector<std::size_t>& begin = sorted.begin;
     place_.assign(begin.size() - 1, -1);
     for (std::size_t c = 0; c + 1 < begin.size(); ++c) {
       if (begin[c + 1] == begin[c]) continue;

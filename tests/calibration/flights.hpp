@@ -259,7 +259,7 @@ class SimulatedFlight {
   std::vector<Eigen::Matrix<double, 6, 1>> error;  ///< [records]: true less measured
 
   const trajectories::ErrorTerm& term_of(int correction) const {
-    return settings_.errors.terms[calibration::error_of(correction)];
+    return settings_.errors.terms[static_cast<std::size_t>(calibration::error_of(correction))];
   }
 
  private:

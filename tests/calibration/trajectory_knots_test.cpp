@@ -25,7 +25,7 @@ trajectories::ErrorProcess some_process(bool growing = false) {
   trajectories::Trajectory trajectory;
   trajectory.frame = trajectories::Frame::local;
   for (int c = 0; c < kCorrections; ++c) {
-    trajectories::ErrorTerm& term = model.terms[error_of(c)];
+    trajectories::ErrorTerm& term = model.terms[static_cast<std::size_t>(error_of(c))];
     if (!growing) term.sigma = kSigma[c];
     term.correlation_time = kTime[c];
   }

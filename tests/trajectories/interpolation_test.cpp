@@ -267,7 +267,7 @@ TEST(Interpolation, CursorsTakeTimesInAnyOrder) {
     else if (which < 0.9)
       time = t.time_ns.front() + std::llround(span * random.uniform(3 * i + 1));
     else
-      time = t.time_ns[random.uniform(3 * i + 1) * 191];
+      time = t.time_ns[static_cast<std::size_t>(random.uniform(3 * i + 1) * 191)];
     const auto a = cursor.at(time), b = interpolation.at(time);
     ASSERT_EQ(a.has_value(), b.has_value()) << i;
     if (!a) continue;
