@@ -465,32 +465,6 @@ TEST(PlaneEquations, TheNumberOfThreadsChangesNoBit) {
   expect_reference(shots, view);  // chunks are put together as if they were one
 }
 
-TEST(PlaneEquations, WrongLengthsAndPlacesAreRefused) {
-  const PlaneView view = wall_view("PA-AP", {1, 2}, 15);
-  const RangedShots shots = shoot(view, 9, kRangeNoise, 16);
-  EXPECT_NO_THROW(plane_equations(shots, view));
-  const auto refused = [&](const std::function<void(RangedShots&, PlaneView&)>& spoil) {
-    RangedShots bad_shots = shots;
-    PlaneView bad_view = view;
-    spoil(bad_shots, bad_view);
-    EXPECT_THROW(plane_equations(bad_shots, bad_view), InvalidArgument);
-  };
-  refused([](auto& s, auto&) { s.rotation_angle.pop_back(); });
-  refused([](auto& s, auto&) { s.rotation_angle.push_back(s.rotation_angle.front()); });
-  refused([](auto& s, auto&) { s.rotation_angle[1].pop_back(); });
-  refused([](auto& s, auto&) { s.angle_covariance.pop_back(); });
-  refused([](auto& s, auto&) { s.angle_covariance[2].push_back(0); });
-  refused([](auto& s, auto&) { s.range.pop_back(); });
-  refused([](auto&, auto& v) { v.places[1] = -1; });
-  refused([](auto&, auto& v) { v.places[1] = parameter_count(2); });
-  refused([](auto&, auto& v) { v.places.assign(parameter_count(2) + 1, 1); });
-  refused([](auto&, auto& v) { v.range_variance = 0; });
-  refused([](auto&, auto& v) { v.range_variance = kNaN; });
-  std::vector<double> column(shots.size() + 1);
-  EXPECT_THROW(plane_equations(shots, view, {column, {}}), InvalidArgument);
-  EXPECT_THROW(plane_equations(shots, view, {{}, column}), InvalidArgument);
-}
-
 /// Shots with terms of range errors and sizes of the prisms among the columns.
 struct WithNumbers {
   PlaneView view = wall_view("PA-AP", {place::incident_beam_vertical()}, 1);

@@ -423,20 +423,6 @@ TEST(PlaneSegmentation, SmallPlanesAreClutter) {
   EXPECT_TRUE(segment_planes(seen(kPyramid, 10000).point, options).planes.empty());
 }
 
-TEST(PlaneSegmentation, RefusesOptionsThatMakeNoSense) {
-  const Cloud cloud = seen(kOneWall, 200);
-  const auto refuses = [&](auto&& change) {
-    SegmentationOptions options;
-    change(options);
-    EXPECT_THROW(segment_planes(cloud.point, options), InvalidArgument);
-  };
-  refuses([](SegmentationOptions& o) { o.range_noise = 0; });
-  refuses([](SegmentationOptions& o) { o.pointing_noise = -1e-3; });
-  refuses([](SegmentationOptions& o) { o.gate = 0; });
-  refuses([](SegmentationOptions& o) { o.least_fraction = 1.5; });
-  refuses([](SegmentationOptions& o) { o.least_extent = -1; });
-}
-
 TEST(DistanceSigma, RangeNoiseCountsAlongTheNormalAndPointingNoiseAcross) {
   const Plane plane = wall(60, 0, 10);  // met at 60 degrees by a beam along X, at 20 m
   SegmentationOptions options;

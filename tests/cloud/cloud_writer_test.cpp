@@ -75,16 +75,4 @@ TEST(CloudFormats, LazNeedsLaszip) {
   EXPECT_THROW(find_cloud_format("cloud.las", "laz"), InvalidArgument);
 }
 
-TEST(CreateCloud, RefusesWhatFindCloudFormatRefuses) {
-  EXPECT_THROW(create_cloud("cloud.docx", {}), InvalidArgument);
-  EXPECT_THROW(create_cloud("cloud.las", {}, {"no-format", 1e-4, true}), InvalidArgument);
-  EXPECT_FALSE(std::filesystem::exists("cloud.docx"));
-  EXPECT_FALSE(std::filesystem::exists("cloud.las"));
-}
-
-TEST(CreateCloud, RefusesMissingFolders) {
-  const auto folder = std::filesystem::temp_directory_path() / "risley-no-such-folder";
-  EXPECT_THROW(create_cloud((folder / "cloud.las").string(), {}), FileError);
-}
-
 }  // namespace risley::cloud::cloud_writer_test

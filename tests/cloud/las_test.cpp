@@ -260,16 +260,6 @@ TEST_P(LasVariants, KeepsEveryFieldOfEveryPoint) {
   }
 }
 
-TEST_P(LasVariants, PiecesMakeNoDifference) {
-  const Points points = random_points(header_, 3000);
-  write(points);
-  const std::string whole = bytes();
-  write(points);
-  EXPECT_TRUE(bytes() == whole) << "the same points gave other bytes";
-  write(points, {7, 256, 999});
-  EXPECT_TRUE(bytes() == whole);
-}
-
 INSTANTIATE_TEST_SUITE_P(All, LasVariants,
                          ::testing::Values(Variant{true, true, 2, 0}, Variant{false, true, 3, 0},
                                            Variant{true, false, 2, 4}, Variant{false, false, 2, 0}),
@@ -339,14 +329,6 @@ TEST_F(LasTest, FinerScale) {
   }
 }
 
-TEST_F(LasTest, RefusesScalesThatAreNone) {
-  for (const double scale : {0.0, -1e-3, std::numeric_limits<double>::quiet_NaN(),
-                             std::numeric_limits<double>::infinity()}) {
-    options_.las_scale = scale;
-    EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("las_scale"));
-  }
-}
-
 TEST_F(LasTest, CoordinatesAtTheLimit) {
   options_.las_scale = 1.0;
   Points points = random_points(header_, 2);
@@ -389,11 +371,6 @@ TEST_F(LasTest, AfterARefusalTheFileCannotBeCompleted) {
   EXPECT_FALSE(std::filesystem::exists(path()));
 }
 
-TEST_F(LasTest, NothingIsLeftWithoutClose) {
-  { create_cloud(path(), header_, options_)->write(random_points(header_, 10)); }
-  EXPECT_TRUE(folder_is_empty());
-}
-
 TEST_F(LasTest, RefusesReturnsThatDoNotFit) {
   Points points = random_points(header_, 600);
   points.number_of_returns[511] = points.return_number[511] = 0;
@@ -421,16 +398,6 @@ TEST_F(LasTest, AllReturnsThatLas14Counts) {
   expect_equal(file, points);
 }
 
-TEST_F(LasTest, RefusesColumnsOfOtherLengths) {
-  Points points = random_points(header_, 10);
-  points.beam.pop_back();
-  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("beam has 9 values, expected 10"));
-  points = random_points(header_, 10);
-  points.rotation_angle.pop_back();
-  EXPECT_THAT(refusal<InvalidArgument>(points),
-              HasSubstr("rotation_angle has 1 values, expected 2"));
-}
-
 TEST_F(LasTest, RefusesMoreFactorsAndProvenanceThanThereIsRoomFor) {
   header_.factors.assign(200, "factor");
   EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("factors = 200, allowed up to 108"));
@@ -441,18 +408,6 @@ TEST_F(LasTest, RefusesMoreFactorsAndProvenanceThanThereIsRoomFor) {
   std::filesystem::remove(path());
   header_.provenance.emplace_back("command", std::string(70'000, 'x'));
   EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("provenance"));
-}
-
-TEST_F(LasTest, FoldersThatAreNotThere) {
-  EXPECT_THROW(create_cloud(path("missing/cloud.las"), header_, options_), FileError);
-  EXPECT_THROW(create_cloud(folder_.string() + "/.", header_, {"las-1.4", 1e-4, true}), FileError);
-}
-
-TEST_F(LasTest, FullDisk) {
-  for (const std::size_t rows : {10, 40'000}) {  // found out by close() and by write()
-    const FileSizeLimit limit(200);
-    EXPECT_THAT(refusal<FileError>(random_points(header_, rows)), HasSubstr("cannot be written"));
-  }
 }
 
 TEST_F(LasTest, GpsTime) {

@@ -209,28 +209,4 @@ TEST(RealWalls, PeopleAreWhereTheyWalkAtTheTimeOfTheShot) {
   EXPECT_GT(seen, 1000);
 }
 
-TEST(RealWalls, SameNumbersForAnyThreadCountAndAnyPieces) {
-  SimulationSettings settings = exact("avia", R"(
-planes:
-  - {name: end, distance_m: 10, normal_azimuth_deg: 0, normal_zenith_deg: 90, extent_m: [20, 10], waves: {peak_to_valley_m: 0.005, half_wave_m: 3.5}, bow_m: 0.01, patches: [{center_m: [1, 0], size_m: [1, 2], depth_m: 0.1, glass: yes}]}
-  - {name: yard, distance_m: 20, normal_azimuth_deg: 0, normal_zenith_deg: 90}
-boxes:
-  - {name: shelf, center_m: [6, -1, 0], size_m: [1, 1, 2], yaw_deg: 20}
-people:
-  - {name: walker, from_m: [5, -1, -1], to_m: [5, 1, -1], speed_m_per_s: 1.5}
-footprint: yes
-limit_by_reflectivity: yes
-)");
-  settings.truth.range_errors = {0.015, 0.3, 0.01, {}};
-  settings.range_noise = 0.02;
-  settings.threads = 1;
-  const Shots one = scan(settings);
-  for (const auto& [threads, piece] : {std::pair{2, 65536}, {1, 1000}, {2, 4097}}) {
-    settings.threads = threads;
-    const Shots other = scan(settings, piece);
-    EXPECT_EQ(one.range, other.range);
-    EXPECT_EQ(one.intensity, other.intensity);
-  }
-}
-
 }  // namespace risley::simulation::real_walls_test

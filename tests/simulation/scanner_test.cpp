@@ -354,31 +354,4 @@ TEST(Scanner, HeaderDescribesTheSensor) {
   EXPECT_FALSE(header.cartesian);
 }
 
-TEST(Scanner, RefusesSettingsThatMakeNoSense) {
-  const SimulationSettings good = exact("mid-40");
-  const auto refused = [&](auto&& change, const char* message) {
-    SimulationSettings settings = good;
-    change(settings);
-    try {
-      Scanner scanner(settings);
-      ADD_FAILURE() << "accepted: " << message;
-    } catch (const InvalidArgument& error) {
-      EXPECT_THAT(error.what(), HasSubstr(message));
-    }
-  };
-  refused([](auto& s) { s.duration = 0; }, "duration = 0 s");
-  refused([](auto& s) { s.duration = std::numeric_limits<double>::quiet_NaN(); }, "duration = nan");
-  refused([](auto& s) { s.rate = -5.0; }, "rate = -5 Hz");
-  refused([](auto& s) { s.angle_noise = -1.0; }, "angle noise");
-  refused([](auto& s) { s.threads = -1; }, "threads = -1");
-  refused([](auto& s) { s.start_angles = {0.0}; }, "start_angles has 1 values, expected 2");
-  refused([](auto& s) { s.station = "roof"; }, "roof");
-  refused(
-      [](auto& s) {
-        s.reported = s.truth;
-        s.reported->train = PrismTrain(parse_face_order("PA-AP-AP"));
-      },
-      "3 prisms");
-}
-
 }  // namespace risley::simulation::scanner_test

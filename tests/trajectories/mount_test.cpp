@@ -271,15 +271,4 @@ INSTANTIATE_TEST_SUITE_P(
                 "3 rows of 3 numbers"}),
     [](const auto& each) { return std::string(each.param.name); });
 
-TEST(Mount, AnyBeginningOfAFileIsReadOrRefused) {
-  for (std::size_t size = 0; size < kHexacopter.size(); ++size) {
-    try {
-      parse_mount(kHexacopter.substr(0, size), "mount.yaml");
-      EXPECT_GE(size + 1, kHexacopter.size());
-    } catch (const FileError&) {
-      continue;
-    }
-  }
-}
-
 }  // namespace risley::trajectories::mount_test

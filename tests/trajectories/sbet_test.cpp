@@ -256,21 +256,6 @@ TEST(Sbet, OneRecordIsATrajectory) {
   EXPECT_EQ(t.velocity_frame->name, "undecided");
 }
 
-TEST(Sbet, RandomBytesAreRefused) {
-  const RandomStream random(9, 2);
-  for (std::uint64_t i = 0; i < 60; ++i) {
-    std::string bytes(136 * (1 + i % 4), '\0');
-    for (std::size_t k = 0; k < bytes.size(); ++k) {
-      bytes[k] = static_cast<char>(static_cast<int>(256 * random.uniform(1000 * i + k)));
-    }
-    EXPECT_THROW(read(bytes), FileError);
-    const std::string path = folder().file("random.bin");
-    write_bytes(path, bytes);
-    EXPECT_EQ(trajectory_file_kind(path), TrajectoryFileKind::none);
-    EXPECT_THROW(load_trajectory(path), FileError);
-  }
-}
-
 TEST(Sbet, WrittenAndReadAgain) {
   const KnownFlight flight;
   const Trajectory t = read(sbet_records(flight, 300, 0.3));

@@ -671,29 +671,6 @@ TEST(TextFormats, EveryBeginningOfAFileIsReadOrRefused) {
   }
 }
 
-TEST(TextFormats, ChangedBytesAreReadOrRefused) {
-  const RandomStream random(11, 1);
-  std::uint64_t draw = 0;
-  for (const std::string& text :
-       {explorer_text(3, true), pospac_text(3), openmms_text(3), csv_text(3), kTum}) {
-    for (int i = 0; i < 100; ++i) {
-      std::string changed = text;
-      for (int k = 0; k < 3; ++k) {
-        const auto at =
-            static_cast<std::size_t>(random.uniform(draw++) * static_cast<double>(text.size()));
-        changed[at] = static_cast<char>(static_cast<int>(256 * random.uniform(draw++)));
-      }
-      const std::string path = folder().file("changed.txt");
-      write_bytes(path, changed);
-      try {
-        require_trajectory(load_trajectory(path));
-      } catch (const FileError&) {
-        continue;
-      }
-    }
-  }
-}
-
 TEST(TextFormats, OtherTextsAreNoTrajectory) {
   for (const std::string& text :
        {std::string("hello\n"), std::string("a,b,c\n1,2,3\n"), std::string("1 2 3\n"),
