@@ -165,6 +165,114 @@ std::vector<PatchSums> patch_sums(const FlightRows& rows, const PlaneOfShot& pla
   return all;
 }
 
+/// What the errors of the shots of one piece do to the functions.
+struct PieceErrors {
+  MatrixXd noise;  // [functions, functions]: of what is each shot's own, or a sample's
+  MatrixXd parts;  // [functions, 6 parts]: by the trajectory's process
+  std::vector<PatchSums> patches;
+  std::size_t interval = 0;
+};
+
+/// How errors of shots move functions of the solution.
+struct FunctionErrors {
+  const FlightShots& shots;
+  const PlaneOfShot& plane;
+  const FlightModel& model;
+  const FlightWeights& weights;
+  const RoughGround* ground;
+  MatrixXd solved, planes;  // of the functionals [size, functions], [3 planes, functions]
+  Index globals;
+  MatrixXd by_global = solved.bottomRows(globals);
+
+  PieceErrors of_piece(const FlightRows& rows) const;
+
+ private:
+  /// What the shots of a sample or of a part of the interval have in common.
+  void add_shared(const FlightRows& rows, const MatrixXd& pose, const VectorXd& weight,
+                  const VectorXd& weight_behind, const MatrixXd& moved, PieceErrors& own) const;
+};
+
+PieceErrors FunctionErrors::of_piece(const FlightRows& rows) const {
+  const Index count = solved.cols();
+  PieceErrors own;
+  own.interval = rows.interval;
+  own.noise = MatrixXd::Zero(count, count);
+  own.parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);
+  if (rows.shots.empty()) return own;
+  const TrajectoryKnots::Interval& interval = model.knots.intervals[rows.interval];
+  const Index n = rows.shots.size();
+  const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
+      values(rows.values.data(), n, rows.columns);
+  const MatrixXd pose = values.middleCols(globals, kCorrections);
+  const Index knot = kCorrections * interval.knot;
+  MatrixXd moved = values.leftCols(globals) * by_global;  // [n, count]
+  VectorXd weight_behind(n);
+  const auto length = static_cast<double>(interval.end_ns - interval.begin_ns);
+  for (Index i = 0; i < n; ++i) {
+    const std::int64_t time = shots.time_ns[rows.shots[i]];
+    weight_behind[i] = static_cast<double>(time - interval.begin_ns) / length;
+  }
+  const MatrixXd before = pose * solved.middleRows<kCorrections>(knot);
+  const MatrixXd behind = pose * solved.middleRows<kCorrections>(knot + kCorrections);
+  moved += before + weight_behind.asDiagonal() * (behind - before);
+  for (Index i = 0; i < n; ++i) {
+    const std::int32_t p = plane[rows.shots[i]];
+    for (Index k = 0; k < 3; ++k) {
+      moved.row(i) += values(i, globals + kCorrections + k) * planes.row(3 * p + k);
+    }
+  }
+  const VectorXd weight = values.col(globals + 11);
+  // Rows of shots that are lost may hold NaN.
+  for (Index i = 0; i < n; ++i) {
+    if (weight[i] == 0) moved.row(i).setZero();
+  }
+  const VectorXd variance =
+      (weight.array() > 0).select(weight.array().square() * values.col(globals + 10).array(), 0.0);
+  if (ground == nullptr) {
+    own.noise = moved.transpose() * variance.asDiagonal() * moved;
+  } else {
+    const double of_ground = ground->covariance.diagonal().mean();
+    const VectorXd left = (variance.array() - of_ground * weight.array().square())
+                              .max(kLeastOwnShare * variance.array());
+    own.noise = moved.transpose() * left.asDiagonal() * moved;
+    own.patches = patch_sums(rows, plane, *ground, weight, moved);
+  }
+  add_shared(rows, pose, weight, weight_behind, moved, own);
+  return own;
+}
+
+void FunctionErrors::add_shared(const FlightRows& rows, const MatrixXd& pose,
+                                const VectorXd& weight, const VectorXd& weight_behind,
+                                const MatrixXd& moved, PieceErrors& own) const {
+  const TrajectoryKnots::Interval& interval = model.knots.intervals[rows.interval];
+  const Index n = moved.rows(), count = moved.cols();
+  const double sample_ns = weights.sample_interval * 1e9;
+  const std::int64_t first_ns = shots.time_ns[rows.begin];
+  const auto samples =
+      static_cast<Index>(static_cast<double>(shots.time_ns[rows.end - 1] - first_ns) / sample_ns) +
+      2;
+  MatrixXd shared = MatrixXd::Zero(count, kCorrections * samples);
+  const auto first_sample =
+      static_cast<Index>(std::floor(static_cast<double>(first_ns - interval.begin_ns) / sample_ns));
+  for (Index i = 0; i < n; ++i) {
+    if (weight[i] == 0) continue;
+    const std::int64_t time = shots.time_ns[rows.shots[i]];
+    const auto sample =
+        static_cast<Index>(std::floor(static_cast<double>(time - interval.begin_ns) / sample_ns)) -
+        first_sample;
+    const auto part = std::clamp<Index>(static_cast<Index>(weight_behind[i] * kIntervalParts), 0,
+                                        kIntervalParts - 1);
+    const VectorXd weighted = weight[i] * moved.row(i).transpose();
+    for (Index k = 0; k < kCorrections; ++k) {
+      own.parts.col(kCorrections * part + k) += pose(i, k) * weighted;
+      const double white = weights.white[k];
+      if (white == 0) continue;
+      shared.col(kCorrections * std::min(sample, samples - 1) + k) += white * pose(i, k) * weighted;
+    }
+  }
+  own.noise += shared * shared.transpose();
+}
+
 }  // namespace
 
 VectorXd unknown_values(const FlightModel& model) {
@@ -240,8 +348,7 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
         }
         const std::size_t at =
             result.knots.back() == knot + k ? by_knot.size() - 1 : by_knot.size() - 2;
-        by_knot[at] +=
-            rows.middleCols<kCorrections>(globals + kCorrections * static_cast<Index>(k));
+        by_knot[at] += rows.middleCols<kCorrections>(globals + kCorrections * k);
       }
     }
     // Scaled first: a tilt of a large plane is known far better than its offset.
@@ -253,9 +360,9 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
     result.root_inverse = result.root_inverse * unit.asDiagonal();
     result.gradient = result.root_inverse * gradient;
     result.globals = result.root_inverse * by_global;
-    result.by_knot.resize(kCorrections * static_cast<Index>(by_knot.size()), 3);
+    result.by_knot.resize(kCorrections * std::ssize(by_knot), 3);
     for (std::size_t k = 0; k < by_knot.size(); ++k) {
-      result.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(k)).noalias() =
+      result.by_knot.middleRows<kCorrections>(kCorrections * k).noalias() =
           (result.root_inverse * by_knot[k]).transpose();
     }
   });
@@ -280,13 +387,13 @@ void FlightSystem::Parts::reduce(MatrixXd& hessian) {
       const auto [p, slot] = places[i];
       const EliminatedPlane& plane = eliminated[p];
       const Eigen::Matrix<double, kCorrections, 3> own =
-          plane.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(slot));
+          plane.by_knot.middleRows<kCorrections>(kCorrections * slot);
       for (std::size_t first = slot; first < plane.knots.size();) {
         std::size_t end = first + 1;  // of the knots that follow each other
         while (end < plane.knots.size() && plane.knots[end] == plane.knots[end - 1] + 1) ++end;
         const auto rows = kCorrections * static_cast<Index>(end - first);
-        const auto at = kCorrections * static_cast<Index>(first);
-        const Index row = kCorrections * static_cast<Index>(plane.knots[first]);
+        const auto at = kCorrections * first;
+        const Index row = kCorrections * plane.knots[first];
         const auto left = plane.by_knot.middleRows(at, rows);
         subtract_product(left.col(0).data(), left.col(1).data(), left.col(2).data(), rows, own,
                          &hessian(row, column), hessian.rows());
@@ -358,7 +465,7 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
   require_length("intervals of the equations", equations.knot_hessian.size(),
                  model.knots.intervals.size());
   Parts& p = *parts_;
-  p.knots = static_cast<Index>(model.knots.size());
+  p.knots = std::ssize(model.knots);
   p.globals = model.unknowns().size();
   p.planes = model.planes.size();
   const Index size = p.size(), g0 = p.first_global();
@@ -367,7 +474,7 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
   hessian.bottomRightCorner(p.globals, p.globals) = equations.hessian;
   p.right.segment(g0, p.globals) = equations.gradient;
   for (std::size_t i = 0; i < equations.knot_hessian.size(); ++i) {
-    const Index at = kCorrections * static_cast<Index>(model.knots.intervals[i].knot);
+    const Index at = kCorrections * model.knots.intervals[i].knot;
     hessian.block<kTwo, kTwo>(at, at) += equations.knot_hessian[i];
     hessian.block(g0, at, p.globals, kTwo) += equations.knot_global[i].transpose();
     p.right.segment<kTwo>(at) += equations.knot_gradient[i];
@@ -405,16 +512,15 @@ MatrixXd FlightSystem::solve(const MatrixXd& right) const {
 
 MatrixXd FlightSystem::planes_of(const MatrixXd& solution) const {
   const Parts& p = *parts_;
-  MatrixXd result(3 * static_cast<Index>(p.planes), solution.cols());
+  MatrixXd result(3 * p.planes, solution.cols());
   parallel::for_each(p.planes, [&](std::size_t i) {
     const EliminatedPlane& plane = p.eliminated[i];
     MatrixXd sum = plane.globals * solution.bottomRows(p.globals);
     for (std::size_t k = 0; k < plane.knots.size(); ++k) {
-      sum.noalias() +=
-          plane.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(k)).transpose() *
-          solution.middleRows<kCorrections>(kCorrections * static_cast<Index>(plane.knots[k]));
+      sum.noalias() += plane.by_knot.middleRows<kCorrections>(kCorrections * k).transpose() *
+                       solution.middleRows<kCorrections>(kCorrections * plane.knots[k]);
     }
-    result.middleRows<3>(3 * static_cast<Index>(i)) = -plane.root_inverse.transpose() * sum;
+    result.middleRows<3>(3 * i) = -plane.root_inverse.transpose() * sum;
   });
   return result;
 }
@@ -482,7 +588,7 @@ MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
 }
 
 void apply(const FlightSystem::Step& step, FlightModel& model) {
-  const Index knots = static_cast<Index>(model.knots.size());
+  const Index knots = std::ssize(model.knots);
   require_length("unknowns of the step", step.unknowns.size(),
                  kCorrections * knots + model.unknowns().size());
   require_length("planes of the step", step.planes.cols(), model.planes.size());
@@ -559,105 +665,27 @@ MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
                            const FlightSystem& system, const MatrixXd& functionals,
                            const RoughGround* ground, InstructionSet set) {
   if (ground != nullptr) require_length("patches", ground->patch.size(), shots.size());
-  const double of_ground = ground == nullptr ? 0 : ground->covariance.diagonal().mean();
-  const MatrixXd solved = system.solve(functionals);
-  const MatrixXd planes = system.planes_of(solved);
-  const Index count = solved.cols(), globals = system.globals();
-  const MatrixXd by_global = solved.bottomRows(globals);
+  MatrixXd solution = system.solve(functionals);
+  MatrixXd of_planes = system.planes_of(solution);
+  const FunctionErrors errors{
+      shots,           plane, model, weights, ground, std::move(solution), std::move(of_planes),
+      system.globals()};
+  const Index count = functionals.cols();
   const std::size_t pieces = flight_pieces(model);
-  struct Sums {
-    MatrixXd noise, parts;  // [count, count]; [count, 6 parts]
-    std::vector<PatchSums> patches;
-    std::size_t interval = 0;
-  };
-  std::vector<Sums> sums(pieces);
-  const double sample_ns = weights.sample_interval * 1e9;
+  std::vector<PieceErrors> sums(pieces);
   for_each_flight_piece(
       shots, poses, plane, model, weights,
-      [&](std::size_t piece, const FlightRows& rows) {
-        Sums& own = sums[piece];
-        own.interval = rows.interval;
-        own.noise = MatrixXd::Zero(count, count);
-        own.parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);
-        if (rows.shots.empty()) return;
-        const TrajectoryKnots::Interval& interval = model.knots.intervals[rows.interval];
-        const Index n = rows.shots.size();
-        const Eigen::Map<
-            const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
-            values(rows.values.data(), n, rows.columns);
-        const MatrixXd pose = values.middleCols(globals, kCorrections);
-        const Index knot = kCorrections * static_cast<Index>(interval.knot);
-        MatrixXd moved = values.leftCols(globals) * by_global;  // [n, count]
-        VectorXd weight_behind(n);
-        const auto length = static_cast<double>(interval.end_ns - interval.begin_ns);
-        for (Index i = 0; i < n; ++i) {
-          const std::int64_t time = shots.time_ns[rows.shots[i]];
-          weight_behind[i] = static_cast<double>(time - interval.begin_ns) / length;
-        }
-        const MatrixXd before = pose * solved.middleRows<kCorrections>(knot);
-        const MatrixXd behind = pose * solved.middleRows<kCorrections>(knot + kCorrections);
-        moved += before + weight_behind.asDiagonal() * (behind - before);
-        for (Index i = 0; i < n; ++i) {
-          const std::int32_t p = plane[rows.shots[i]];
-          for (Index k = 0; k < 3; ++k) {
-            moved.row(i) +=
-                values(i, globals + kCorrections + k) * planes.row(3 * static_cast<Index>(p) + k);
-          }
-        }
-        const VectorXd weight = values.col(globals + 11);
-        // Rows of shots that are lost may hold NaN.
-        for (Index i = 0; i < n; ++i) {
-          if (weight[i] == 0) moved.row(i).setZero();
-        }
-        const VectorXd variance =
-            (weight.array() > 0)
-                .select(weight.array().square() * values.col(globals + 10).array(), 0.0);
-        if (ground == nullptr) {
-          own.noise = moved.transpose() * variance.asDiagonal() * moved;
-        } else {
-          const VectorXd left = (variance.array() - of_ground * weight.array().square())
-                                    .max(kLeastOwnShare * variance.array());
-          own.noise = moved.transpose() * left.asDiagonal() * moved;
-          own.patches = patch_sums(rows, plane, *ground, weight, moved);
-        }
-        const std::int64_t first_ns = shots.time_ns[rows.begin];
-        const auto samples =
-            static_cast<Index>(static_cast<double>(shots.time_ns[rows.end - 1] - first_ns) /
-                               sample_ns) +
-            2;
-        MatrixXd shared = MatrixXd::Zero(count, kCorrections * samples);
-        const auto first_sample = static_cast<Index>(
-            std::floor(static_cast<double>(first_ns - interval.begin_ns) / sample_ns));
-        for (Index i = 0; i < n; ++i) {
-          if (weight[i] == 0) continue;
-          const std::int64_t time = shots.time_ns[rows.shots[i]];
-          const auto sample = static_cast<Index>(std::floor(
-                                  static_cast<double>(time - interval.begin_ns) / sample_ns)) -
-                              first_sample;
-          const auto part = std::clamp<Index>(static_cast<Index>(weight_behind[i] * kIntervalParts),
-                                              0, kIntervalParts - 1);
-          const VectorXd weighted = weight[i] * moved.row(i).transpose();
-          for (Index k = 0; k < kCorrections; ++k) {
-            own.parts.col(kCorrections * part + k) += pose(i, k) * weighted;
-            const double white = weights.white[k];
-            if (white == 0) continue;
-            shared.col(kCorrections * std::min(sample, samples - 1) + k) +=
-                white * pose(i, k) * weighted;
-          }
-        }
-        own.noise += shared * shared.transpose();
-      },
-      set);
+      [&](std::size_t piece, const FlightRows& rows) { sums[piece] = errors.of_piece(rows); }, set);
 
-  MatrixXd covariance = solved.transpose() * system.prior_times(solved);
+  MatrixXd covariance = errors.solved.transpose() * system.prior_times(errors.solved);
   for (const PlanePrior& prior : priors.planes) {
-    const auto own = planes.middleRows<3>(3 * static_cast<Index>(prior.plane));
+    const auto own = errors.planes.middleRows<3>(3 * prior.plane);
     const PlaneKnowledge known = knowledge_of(prior, model.planes[prior.plane]);
     covariance += own.transpose() * known.information.asDiagonal() * own;
   }
   if (ground != nullptr) {
     std::map<std::int32_t, MatrixXd> by_plane;
-    for (const Sums& own : sums) {
+    for (const PieceErrors& own : sums) {
       for (const PatchSums& one : own.patches) {
         MatrixXd& all = by_plane[one.plane];
         if (all.size() == 0) all = MatrixXd::Zero(count, RoughGround::kPatches);

@@ -777,7 +777,7 @@ void FlightWork::fill_trajectory_fit() {
     jump.between_strips = knots.strip[knot] != knots.strip[knot + 1];
     jump.score = break_score_[i];
     for (int c = 0; c < kCorrections; ++c) {
-      const Index at = kCorrections * static_cast<Index>(knot) + c, next = at + kCorrections;
+      const Index at = kCorrections * knot + c, next = at + kCorrections;
       const double change =
           model_.corrections(c, static_cast<Index>(knot) + 1) - model_.corrections(c, knot);
       // Corrections turn about up, and headings about down.

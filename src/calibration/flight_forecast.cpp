@@ -130,7 +130,7 @@ PointRates rates_of(const ForecastWork& work, std::size_t row) {
       std::clamp(static_cast<double>(rates.time_ns - model.knots.time_ns[next - 1]) /
                      static_cast<double>(model.knots.time_ns[next] - model.knots.time_ns[next - 1]),
                  0.0, 1.0);
-  const auto at = kCorrections * static_cast<Index>(next);
+  const auto at = kCorrections * next;
   rates.of_all.middleCols<kCorrections>(at - kCorrections) = (1 - weight) * rates.of_pose;
   rates.of_all.middleCols<kCorrections>(at) = weight * rates.of_pose;
   auto globals = rates.of_all.rightCols(unknowns.size());

@@ -21,7 +21,7 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
     return is_material(parameter.places.front(), sensor.prisms());
   });
   const Index believed = belief.held.size();
-  const Index count = believed + static_cast<Index>(own.size());
+  const Index count = believed + std::ssize(own);
   Held held;
   Eigen::MatrixXd& train = held.quantities.train;
   train = Eigen::MatrixXd::Zero(problem.train.parameters().size(), count);

@@ -15,7 +15,7 @@ namespace {
 /// How many of a wall's places are unknowns of the whole: they come first.
 Index unknowns_among(const std::vector<Index>& places, Index unknowns) {
   Index count = 0;
-  while (count < static_cast<Index>(places.size()) && places[count] < unknowns) {
+  while (count < std::ssize(places) && places[count] < unknowns) {
     ++count;
   }
   return count;
@@ -73,7 +73,7 @@ OwnSolution own_solution(const WithoutOwn& wall, const std::vector<Index>& place
   OwnSolution solution;
   solution.step = wall.from_rest.rightCols(1);
   solution.response = MatrixXd::Zero(own, shared.response.cols());
-  for (Index j = 0; j < static_cast<Index>(places.size()) - 1; ++j) {
+  for (Index j = 0; j < std::ssize(places) - 1; ++j) {
     const Index place = places[j];
     if (j < known) {
       solution.step -= wall.from_rest.col(j) * shared.step[place];

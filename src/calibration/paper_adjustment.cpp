@@ -84,7 +84,7 @@ class View {
   }
 
   Sums sums(const Cloud& cloud) const {
-    const auto free = static_cast<Index>(p_.free.size()), size = free + 3;
+    const auto free = std::ssize(p_.free), size = free + 3;
     const auto [t1, t2] = tangents_of(cloud.plane.normal);
     std::vector<Sums> parts(blocks());
     parallel::for_each(blocks(), [&, t1 = t1, t2 = t2](std::size_t block) {

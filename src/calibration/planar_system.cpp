@@ -27,7 +27,7 @@ class WallLayout {
              std::size_t wall, const std::vector<std::size_t>& recordings)
       : own_(at.own(wall)), first_of_recording_(p.stations.size(), -1) {
     const auto add = [this](Index first, Index count) {
-      const Index local = own_ + static_cast<Index>(places_.size());
+      const Index local = own_ + std::ssize(places_);
       for (Index i = 0; i < count; ++i) places_.push_back(first + i);
       return local;
     };
@@ -54,7 +54,7 @@ class WallLayout {
 
   const std::vector<Index>& places() const { return places_; }
   Index own() const { return own_; }
-  Index size() const { return own_ + static_cast<Index>(places_.size()); }
+  Index size() const { return own_ + std::ssize(places_); }
   /// Of an unknown that all walls share: a parameter or a number.
   Index shared(Index unknown) const { return own_ + unknown; }
   /// Negative where it is held.
@@ -84,7 +84,7 @@ class ChainBuilder {
   /// A column of the wall. @return its place in the chain
   Index add(Index at) {
     chain_.at.push_back(at);
-    return static_cast<Index>(chain_.at.size()) - 1;
+    return std::ssize(chain_.at) - 1;
   }
   void set(Index row, Index column, double value) { entries_.push_back({row, column, value}); }
   Chain take() {
@@ -141,7 +141,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
     }
   }
   chain.set(columns.distance(), chain.add(at.distance(view)), 1.0);
-  for (Index j = 0; j < static_cast<Index>(p.considered.size()); ++j) {
+  for (Index j = 0; j < std::ssize(p.considered); ++j) {
     const Index own = chain.add(layout.believed() + j);
     for (const int place : p.considered[j].places) {
       // The other error parameters that the sensor believes in only act through the angles.
@@ -318,14 +318,13 @@ void Places::add(int place) {
 }
 
 Index considered_size(const PlanarProblem& p) {
-  return static_cast<Index>(p.considered.size()) +
-         static_cast<Index>(p.mean_angle_covariance.size()) * p.train.prisms();
+  return std::ssize(p.considered) + std::ssize(p.mean_angle_covariance) * p.train.prisms();
 }
 
 Eigen::MatrixXd considered_covariance(const PlanarProblem& p) {
   const Index size = considered_size(p);
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
-  Index at = static_cast<Index>(p.considered.size());
+  Index at = std::ssize(p.considered);
   if (at > 0) covariance.topLeftCorner(at, at) = p.considered_covariance;
   for (const Eigen::MatrixXd& own : p.mean_angle_covariance) {
     covariance.block(at, at, own.rows(), own.cols()) = own;
@@ -374,7 +373,7 @@ PlanarSystem build_system(const PlanarProblem& p, const HeldQuantities& held, co
     if (cells == WallCells::summed && !p.walls[w].grid.empty()) {
       sums.grid = p.walls[w].grid;
       sums.weight.assign(sums.grid.cells.size(), Eigen::Matrix3d::Zero());
-      sums.columns.setZero(3 * static_cast<Index>(sums.grid.cells.size()), layout.size());
+      sums.columns.setZero(3 * std::ssize(sums.grid.cells), layout.size());
     }
     for (const std::size_t view : views[w]) {
       PlaneView plane = plane_view(p, view);

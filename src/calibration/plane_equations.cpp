@@ -138,7 +138,7 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
   std::vector<std::size_t> lost(chunks);
   PlaneEquations equations;
   if (!cell_begin.empty()) {
-    equations.cells.setZero(3 * (static_cast<Eigen::Index>(cell_begin.size()) - 1), size + 1);
+    equations.cells.setZero(3 * (std::ssize(cell_begin) - 1), size + 1);
     all.cell_begin = cell_begin.data();
     all.cell_products = equations.cells.data();
   }

@@ -153,8 +153,7 @@ void find_positions(PlanarProblem& problem) {
   }
   for (const WallView& view : problem.views) {
     Eigen::VectorXd row = Eigen::VectorXd::Zero(size);
-    row.segment<3>(3 * static_cast<Eigen::Index>(view.recording)) =
-        -eigen(problem.walls[view.wall].normal);
+    row.segment<3>(3 * view.recording) = -eigen(problem.walls[view.wall].normal);
     row[3 * stations + static_cast<Eigen::Index>(view.wall)] = 1;
     add(row, view.side * view.distance, kDistanceSigma);
   }

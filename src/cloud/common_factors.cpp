@@ -121,7 +121,7 @@ void Factors::finish() {
     rows.push_back(place);
     places.push_back(place);
   }
-  const Index others = prisms() + static_cast<Index>(model_.sizes.size());
+  const Index others = prisms() + std::ssize(model_.sizes);
   for (Index i = 0; i < others; ++i) rows.push_back(all_places() + i);
   for (CommonFactor& factor : model_.factors) {
     factor.weights = Eigen::VectorXd(factor.weights(rows));
@@ -131,7 +131,7 @@ void Factors::finish() {
 
 CommonFactor Factors::nothing(std::string name) const {
   return {std::move(name),
-          Eigen::VectorXd::Zero(all_places() + prisms() + static_cast<Index>(model_.sizes.size())),
+          Eigen::VectorXd::Zero(all_places() + prisms() + std::ssize(model_.sizes)),
           0.0,
           {},
           {}};

@@ -189,8 +189,7 @@ long double scale_of(const std::string& name) {
 /// A covariance and the sigmas beside it are of one adjustment.
 void require_own_covariance(const Mount& mount) {
   const algebra::NamedCovariance& own = mount.covariance;
-  if (const auto n = static_cast<Eigen::Index>(own.names.size());
-      own.matrix.rows() != n || own.matrix.cols() != n) {
+  if (const auto n = std::ssize(own.names); own.matrix.rows() != n || own.matrix.cols() != n) {
     throw InvalidArgument(fmt::format("covariance is {} x {}, expected {} x {}, one row per name",
                                       own.matrix.rows(), own.matrix.cols(), n, n));
   }

@@ -187,14 +187,14 @@ TEST(FlightAdjustment, RecoversTheTrajectorysCorrections) {
 /// Everything in one dense system, planes included.
 MatrixXd dense_equations(const FlightEquations& equations, const FlightModel& model,
                          VectorXd& right) {
-  const Index knots = 6 * static_cast<Index>(model.knots.size()), g = model.unknowns().size();
-  const Index size = knots + g + 3 * static_cast<Index>(model.planes.size());
+  const Index knots = 6 * std::ssize(model.knots), g = model.unknowns().size();
+  const Index size = knots + g + 3 * std::ssize(model.planes);
   MatrixXd all = MatrixXd::Zero(size, size);
   right = VectorXd::Zero(size);
   all.block(knots, knots, g, g) = equations.hessian;
   right.segment(knots, g) = equations.gradient;
   for (std::size_t i = 0; i < model.knots.intervals.size(); ++i) {
-    const Index at = 6 * static_cast<Index>(model.knots.intervals[i].knot);
+    const Index at = 6 * model.knots.intervals[i].knot;
     all.block(at, at, 12, 12) += equations.knot_hessian[i];
     all.block(knots, at, g, 12) += equations.knot_global[i].transpose();
     all.block(at, knots, 12, g) += equations.knot_global[i];
@@ -203,8 +203,8 @@ MatrixXd dense_equations(const FlightEquations& equations, const FlightModel& mo
   for (const PlaneBlock& block : equations.plane_blocks) {
     const Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>> rows(
         equations.plane_products.data() + block.at, 3, g + 16);
-    const Index plane = knots + g + 3 * static_cast<Index>(block.plane);
-    const Index at = 6 * static_cast<Index>(model.knots.intervals[block.interval].knot);
+    const Index plane = knots + g + 3 * block.plane;
+    const Index at = 6 * model.knots.intervals[block.interval].knot;
     all.block(plane, knots, 3, g) += rows.leftCols(g);
     all.block(knots, plane, g, 3) += rows.leftCols(g).transpose();
     all.block(plane, at, 3, 12) += rows.middleCols(g, 12);
@@ -212,7 +212,7 @@ MatrixXd dense_equations(const FlightEquations& equations, const FlightModel& mo
     all.block(plane, plane, 3, 3) += rows.rightCols(3);
     right.segment(plane, 3) += rows.col(g + 12);
   }
-  for (Index p = 0; p < static_cast<Index>(model.planes.size()); ++p) {
+  for (Index p = 0; p < std::ssize(model.planes); ++p) {
     const Index at = knots + g + 3 * p;
     all(at, at) += 1e-2;
     all(at + 1, at + 1) += 1e-2;
@@ -230,8 +230,7 @@ void add_plane_prior(const PlanePrior& prior, const FlightModel& model, MatrixXd
   const Eigen::Vector3d off(tilt.dot(Eigen::Vector3d(first.x, first.y, first.z)),
                             tilt.dot(Eigen::Vector3d(second.x, second.y, second.z)),
                             plane.normal.dot(prior.place - plane.centre));
-  const Index at = all.rows() - 3 * static_cast<Index>(model.planes.size()) +
-                   3 * static_cast<Index>(prior.plane);
+  const Index at = all.rows() - 3 * std::ssize(model.planes) + 3 * prior.plane;
   for (Index k = 0; k < 3; ++k) {
     const double sigma = k < 2 ? prior.normal_sigma : prior.sigma;
     all(at + k, at + k) += 1 / (sigma * sigma) - (k < 2 ? 1e-2 : 1e-6);
@@ -256,8 +255,7 @@ TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
   VectorXd right;
   MatrixXd all = dense_equations(equations, known.model, right);
   add_plane_prior(known.priors.planes.front(), known.model, all, right);
-  const Index knots = 6 * static_cast<Index>(known.model.knots.size()),
-              g = known.model.unknowns().size();
+  const Index knots = 6 * std::ssize(known.model.knots), g = known.model.unknowns().size();
   const MatrixXd rates = value_rates(known.model);
   all.block(knots, knots, g, g) += 10 * rates.transpose() * rates;
   right.segment(knots, g) +=

@@ -106,8 +106,7 @@ TEST(FlightCalibration, CorrectsTheTrajectory) {
     EXPECT_EQ(found.mount.lever_arm[k].sigma, found.unknowns[3 + k].sigma);
   }
   EXPECT_EQ(found.mount.clock_offset.value, found.model.clock_offset);
-  EXPECT_EQ(found.sensor.covariance.rows(),
-            static_cast<Index>(found.sensor.covariance_names.size()));
+  EXPECT_EQ(found.sensor.covariance.rows(), std::ssize(found.sensor.covariance_names));
   // Mount and sensor are known together: yaw of the boresight against yaw of the beams above all.
   const algebra::NamedCovariance of_sensor{found.sensor.covariance_names, found.sensor.covariance};
   EXPECT_TRUE(trajectories::found_together(found.mount, of_sensor));

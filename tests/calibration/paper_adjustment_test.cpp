@@ -92,8 +92,8 @@ struct BruteForce {
       if (step.norm() < 1e-13) break;
     }
     squares = distances(p, parameters).squaredNorm();
-    sigma0 = std::sqrt(squares / static_cast<double>(jacobian.rows() - free -
-                                                     3 * static_cast<Index>(p.views.size())));
+    sigma0 =
+        std::sqrt(squares / static_cast<double>(jacobian.rows() - free - 3 * std::ssize(p.views)));
     covariance = sigma0 * sigma0 * normal.inverse();
   }
 };

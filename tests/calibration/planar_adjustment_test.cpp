@@ -64,7 +64,7 @@ Eigen::Matrix3d turn_by(const Eigen::Vector3d& by) {
 /// distances.
 Eigen::VectorXd flat(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
-  Eigen::VectorXd values(solution.parameters.size() + 1 + static_cast<Index>(p.views.size()));
+  Eigen::VectorXd values(solution.parameters.size() + 1 + std::ssize(p.views));
   values.head(solution.parameters.size()) = solution.parameters;
   Index next = solution.parameters.size();
   values[next++] = p.range_offset;
@@ -853,7 +853,7 @@ TEST(PriorTests, AreDistributedAsChiSquare) {
     const Eigen::VectorXd off = normal_vector(8, 1.0, 1000 + draw);
     for (std::size_t s = 0; s < 2; ++s) {
       StationPose& pose = p.stations[s];
-      pose.stated = turn_by(pose.sigma * off.segment<3>(3 * static_cast<Index>(s))) * pose.stated;
+      pose.stated = turn_by(pose.sigma * off.segment<3>(3 * s)) * pose.stated;
     }
     const auto [u1, u2] = tangents_of(p.walls[0].stated);
     p.walls[0].stated =

@@ -84,7 +84,7 @@ Wall wall_of(const WallGrid& grid, Index columns, std::uint64_t seed) {
     for (Index j = 0; j < columns; ++j) wall.rows(i, j) = random.normal(number++);
     const Eigen::Vector3d e = d * Eigen::Vector3d(1, du, dv);
     wall.sums.weight[cell] += e * e.transpose();
-    wall.sums.columns.middleRows<3>(3 * static_cast<Index>(cell)) += e * wall.rows.row(i);
+    wall.sums.columns.middleRows<3>(3 * cell) += e * wall.rows.row(i);
     wall.white(i, cell) = d;
     const Index u = grid.cells[cell] % grid.row(), v = grid.cells[cell] / grid.row();
     const Index nu = grid.cells_u + 1;

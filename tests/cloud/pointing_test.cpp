@@ -298,7 +298,7 @@ PointingModel imperfect_model(const std::string& order, unsigned seed,
   for (int j = 0; j < 5; ++j) {
     CommonFactor factor;
     factor.name = fmt::format("factor_{}", j);
-    factor.weights.resize(static_cast<Index>(model.places.size()) + prisms + 2);
+    factor.weights.resize(std::ssize(model.places) + prisms + 2);
     for (Index i = 0; i < factor.weights.size(); ++i) {
       factor.weights[i] = (i + j) % 3 == 0 ? 0.0 : 1e-4 * dice.normal();
     }
@@ -548,9 +548,9 @@ TEST(ComputePoints, EveryEmitterIsItself) {
       model.places.clear();
       for (int at = 0; at < parameter_count(model.train.shape()); ++at) model.places.push_back(at);
       Dice dice(13);
-      const auto rest = prisms + static_cast<Index>(model.sizes.size());
+      const auto rest = prisms + std::ssize(model.sizes);
       for (CommonFactor& factor : model.factors) {
-        factor.weights.resize(static_cast<Index>(model.places.size()) + rest);
+        factor.weights.resize(std::ssize(model.places) + rest);
         for (double& weight : factor.weights) weight = 1e-4 * dice.normal();
       }
       PointingModel first = model;
@@ -576,7 +576,7 @@ TEST(ComputePoints, EveryEmitterIsItself) {
             rows.push_back(at);
           }
           for (Index i = 0; i < rest; ++i) {
-            rows.push_back(static_cast<Index>(model.places.size()) + i);
+            rows.push_back(std::ssize(model.places) + i);
           }
           for (CommonFactor& factor : own.factors) {
             factor.weights = VectorXd(factor.weights(rows));
@@ -1046,8 +1046,7 @@ TEST(PointingModel, CalibratedAgainstPlanesHasErrorsOfBothTrains) {
 
 /// Sigma of the point that all factors together give to a size of the model, m.
 double sigma_of_size(const PointingModel& model, const std::string& name) {
-  const auto first =
-      static_cast<Index>(model.places.size()) + static_cast<Index>(model.train.prisms());
+  const auto first = std::ssize(model.places) + static_cast<Index>(model.train.prisms());
   for (std::size_t i = 0; i < model.sizes.size(); ++i) {
     if (model.sizes[i].name != name) continue;
     double variance = 0;
@@ -1086,8 +1085,8 @@ TEST(PointingModel, TakesSizesOfPrismsJointlyWithTheOthers) {
   const auto row = std::ranges::find(model.places, place) - model.places.begin();
   double covariance = 0;
   for (const CommonFactor& factor : model.factors) {
-    covariance += factor.weights[row] *
-                  factor.weights[static_cast<Index>(model.places.size()) + 2];  // thickness of A
+    covariance +=
+        factor.weights[row] * factor.weights[std::ssize(model.places) + 2];  // thickness of A
   }
   EXPECT_NEAR(covariance, one.calibration.covariance(tilt - names.begin(), n),
               1e-9 * sigma[0] * sigma[n]);

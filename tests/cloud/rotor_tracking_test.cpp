@@ -156,7 +156,7 @@ TEST(SensorBelief, HoldsTheParametersOfACalibrationAgainstDirections) {
   EXPECT_FALSE(belief.mirrored);
   EXPECT_EQ(belief.free.size(), sensor.covariance_names.size());
   EXPECT_EQ(belief.angle_sensitivity.rows(), 2);
-  EXPECT_EQ(belief.angle_sensitivity.cols(), static_cast<Eigen::Index>(belief.free.size()));
+  EXPECT_EQ(belief.angle_sensitivity.cols(), std::ssize(belief.free));
   EXPECT_NEAR(belief.angle_noise / sensor.angle_noise, 1.0, 0.01);  // found
   EXPECT_GE(belief.residual_variance_factor, 1.0);
   EXPECT_LT(belief.residual_variance_factor, 1.1);
