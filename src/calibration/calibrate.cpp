@@ -91,10 +91,10 @@ RangedShots shifted(const RangedShots& shots, const std::vector<double>& shift) 
 }
 
 /// One run, from recordings to results.
-class Work {
+class WallCalibration {
  public:
-  Work(const std::vector<RangedRecording>& recordings, const CalibrationOptions& options,
-       const Progress& progress)
+  WallCalibration(const std::vector<RangedRecording>& recordings, const CalibrationOptions& options,
+                  const Progress& progress)
       : recordings_(recordings), options_(options), progress_(progress) {
     range_noise_ = options.range_noise.value_or(options.sensor.range_noise);
     require_entries();
@@ -376,7 +376,7 @@ class Work {
   Calibration result_;
 };
 
-void Work::fill_result(const PlanarSolution& solution) {
+void WallCalibration::fill_result(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
   result_.method = options_.method;
   result_.believed = belief_.sensor.train;
@@ -419,7 +419,7 @@ void Work::fill_result(const PlanarSolution& solution) {
   for (LabelledShots& own : all_) result_.plane_of_shot.push_back(std::move(own.labels.view));
 }
 
-void Work::fill_held(const PlanarSolution& solution) {
+void WallCalibration::fill_held(const PlanarSolution& solution) {
   if (paper() || !solution.converged || !result_.covariance.allFinite()) return;
   held_ = held_of(options_.sensor, belief_, solution.problem);
   if (held_.names.empty()) return;
@@ -429,7 +429,7 @@ void Work::fill_held(const PlanarSolution& solution) {
   result_.number_held_changes = std::move(response.numbers);
 }
 
-void Work::fill_numbers(const PlanarSolution& solution) {
+void WallCalibration::fill_numbers(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
   const auto add = [&](const std::string& name, double prior, double prior_sigma) {
     const Eigen::Index row = solution.number(name);
@@ -446,7 +446,7 @@ void Work::fill_numbers(const PlanarSolution& solution) {
   add("range_offset_m", 0.0, p.range_offset_sigma);
 }
 
-void Work::fill_datum(const PlanarSolution& solution) {
+void WallCalibration::fill_datum(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
   std::vector<std::vector<double>> beams(p.train.prisms());
   std::vector<std::uint8_t> emitter;
@@ -486,7 +486,7 @@ const CalibratedNumber* Calibration::number(std::string_view name) const {
 
 Calibration calibrate(const std::vector<RangedRecording>& recordings,
                       const CalibrationOptions& options, const Progress& progress) {
-  return Work(recordings, options, progress).run();
+  return WallCalibration(recordings, options, progress).run();
 }
 
 }  // namespace risley::calibration

@@ -153,7 +153,7 @@ MatrixXd value_rates(const FlightModel& model) {
   return rates;
 }
 
-struct FlightSystem::Parts {
+struct FlightSystem::ReducedEquations {
   Index knots = 0, globals = 0;
   std::size_t planes = 0;
   std::vector<EliminatedPlane> eliminated;
@@ -175,8 +175,9 @@ struct FlightSystem::Parts {
   void hold(const FlightPriors& priors, MatrixXd& hessian);
 };
 
-void FlightSystem::Parts::eliminate(const FlightEquations& equations, const FlightModel& model,
-                                    const std::vector<PlaneKnowledge>& known) {
+void FlightSystem::ReducedEquations::eliminate(const FlightEquations& equations,
+                                               const FlightModel& model,
+                                               const std::vector<PlaneKnowledge>& known) {
   const Index stride = globals + kTwo + 1 + 3;
   const SortedRows blocks(planes, equations.plane_blocks.size(),
                           [&](std::size_t i) { return equations.plane_blocks[i].plane; });
@@ -223,7 +224,7 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
 }
 
 /// Takes the planes' part off the lower triangle and the right side.
-void FlightSystem::Parts::reduce(MatrixXd& hessian) {
+void FlightSystem::ReducedEquations::reduce(MatrixXd& hessian) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> places;  // plane, its knot
   for (std::size_t p = 0; p < planes; ++p) {
     for (std::size_t k = 0; k < eliminated[p].knots.size(); ++k) {
@@ -268,8 +269,8 @@ void FlightSystem::Parts::reduce(MatrixXd& hessian) {
   }
 }
 
-void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPriors& priors,
-                                     MatrixXd& hessian) {
+void FlightSystem::ReducedEquations::add_priors(const FlightModel& model,
+                                                const FlightPriors& priors, MatrixXd& hessian) {
   const MatrixXd rates = value_rates(model);
   prior = rates.transpose() * priors.information * rates;
   const VectorXd off = priors.mean - unknown_values(model);
@@ -291,7 +292,7 @@ void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPrior
   }
 }
 
-void FlightSystem::Parts::hold(const FlightPriors& priors, MatrixXd& hessian) {
+void FlightSystem::ReducedEquations::hold(const FlightPriors& priors, MatrixXd& hessian) {
   for (std::size_t g = 0; g < priors.held.size(); ++g) {
     if (priors.held[g]) held.push_back(static_cast<Index>(g));
   }
@@ -313,12 +314,12 @@ void FlightSystem::Parts::hold(const FlightPriors& priors, MatrixXd& hessian) {
 
 FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& model,
                            const FlightPriors& priors)
-    : parts_(std::make_unique<Parts>()) {
+    : reduced_(std::make_unique<ReducedEquations>()) {
   require_priors(priors, model);
   require_length("globals of the equations", equations.globals, model.unknowns().size());
   require_length("intervals of the equations", equations.knot_hessian.size(),
                  model.knots.intervals.size());
-  Parts& p = *parts_;
+  ReducedEquations& p = *reduced_;
   p.knots = std::ssize(model.knots);
   p.globals = model.unknowns().size();
   p.planes = model.planes.size();
@@ -353,19 +354,19 @@ FlightSystem::FlightSystem(FlightSystem&&) noexcept = default;
 FlightSystem& FlightSystem::operator=(FlightSystem&&) noexcept = default;
 FlightSystem::~FlightSystem() = default;
 
-Index FlightSystem::size() const { return parts_->size(); }
-Index FlightSystem::globals() const { return parts_->globals; }
+Index FlightSystem::size() const { return reduced_->size(); }
+Index FlightSystem::globals() const { return reduced_->globals; }
 
 MatrixXd FlightSystem::solve(const MatrixXd& right) const {
   require_length("rows of the right side", right.rows(), size());
-  MatrixXd solution = parts_->scale.asDiagonal() * right;
-  for (const Index g : parts_->held) solution.row(parts_->first_global() + g).setZero();
-  parts_->root.solve_in_place(solution);
-  return parts_->scale.asDiagonal() * solution;
+  MatrixXd solution = reduced_->scale.asDiagonal() * right;
+  for (const Index g : reduced_->held) solution.row(reduced_->first_global() + g).setZero();
+  reduced_->root.solve_in_place(solution);
+  return reduced_->scale.asDiagonal() * solution;
 }
 
 MatrixXd FlightSystem::planes_of(const MatrixXd& solution) const {
-  const Parts& p = *parts_;
+  const ReducedEquations& p = *reduced_;
   MatrixXd result(3 * p.planes, solution.cols());
   parallel::for_each(p.planes, [&](std::size_t i) {
     const EliminatedPlane& plane = p.eliminated[i];
@@ -380,7 +381,7 @@ MatrixXd FlightSystem::planes_of(const MatrixXd& solution) const {
 }
 
 FlightSystem::Step FlightSystem::step() const {
-  const Parts& p = *parts_;
+  const ReducedEquations& p = *reduced_;
   Step step;
   step.unknowns = solve(p.right);
   step.promised = step.unknowns.dot(p.right);
@@ -394,7 +395,7 @@ FlightSystem::Step FlightSystem::step() const {
 }
 
 FlightSystem::Band FlightSystem::inverse_band() const {
-  const Parts& p = *parts_;
+  const ReducedEquations& p = *reduced_;
   const Index n = size(), blocks = (n + kInverseColumns - 1) / kInverseColumns;
   const Index steps = kCorrections * std::max<Index>(p.knots - 1, 0);
   Band band{VectorXd::Zero(n), VectorXd::Zero(steps)};
@@ -422,10 +423,10 @@ FlightSystem::Band FlightSystem::inverse_band() const {
 
 MatrixXd FlightSystem::inverse() const { return solve(MatrixXd::Identity(size(), size())); }
 
-MatrixXd FlightSystem::held_changes() const { return -solve(parts_->held_columns); }
+MatrixXd FlightSystem::held_changes() const { return -solve(reduced_->held_columns); }
 
 MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
-  const Parts& p = *parts_;
+  const ReducedEquations& p = *reduced_;
   MatrixXd result = MatrixXd::Zero(size(), columns.cols());
   result.bottomRows(p.globals) = p.prior * columns.bottomRows(p.globals);
   for (int c = 0; c < kCorrections; ++c) {

@@ -109,10 +109,10 @@ struct LabelledFlight {
   GroundCells cells;
 };
 
-class FlightWork {
+class FlightCalibrator {
  public:
-  FlightWork(const FlightShots& shots, const trajectories::Trajectory& trajectory,
-             const FlightCalibrationOptions& options, const Progress& progress)
+  FlightCalibrator(const FlightShots& shots, const trajectories::Trajectory& trajectory,
+                   const FlightCalibrationOptions& options, const Progress& progress)
       : options_(options),
         progress_(progress),
         tangent_(trajectories::tangent_frame(trajectory)),
@@ -454,7 +454,7 @@ class FlightWork {
   FlightCalibration result_;
 };
 
-void FlightWork::hold(Unlocked unlocked) {
+void FlightCalibrator::hold(Unlocked unlocked) {
   priors_.held = held_globals(start_);
   for (std::size_t i = 0; i < priors_.held.size(); ++i) {
     const auto at = static_cast<int>(i);
@@ -470,7 +470,7 @@ void FlightWork::hold(Unlocked unlocked) {
   }
 }
 
-void FlightWork::fill_result() {
+void FlightCalibrator::fill_result() {
   result_.pairs_after =
       strip_pairs(georeferenced(full_.shots, full_.poses, model_), full_.shots.strip,
                   full_.cells.plane, model_.planes, kGateSigmas * std::sqrt(range_variance_));
@@ -513,7 +513,7 @@ void FlightWork::fill_result() {
 }
 
 /// The last equations, and what neighbouring knots share of their inverse.
-void FlightWork::solve_last() {
+void FlightCalibrator::solve_last() {
   progress_.check();
   smooth_ = model_;
   smooth_.planes = smooth_ground(
@@ -528,7 +528,7 @@ void FlightWork::solve_last() {
 
 /// Compares the corrections with the process that is stated of them, and adjusts again until they
 /// fit: jumps get steps of their own, and a process that is larger than stated its size.
-void FlightWork::mend_trajectory() {
+void FlightCalibrator::mend_trajectory() {
   TrajectoryFit& fit = result_.trajectory_fit;
   for (int mended = 0;; ++mended) {
     solve_last();
@@ -550,7 +550,7 @@ void FlightWork::mend_trajectory() {
   }
 }
 
-bool FlightWork::known_ground_contradicts() const {
+bool FlightCalibrator::known_ground_contradicts() const {
   for (const PlanePrior& known : priors_.planes) {
     const GroundPlane& plane = model_.planes[known.plane];
     if (std::abs(plane.normal.dot(plane.centre - known.place)) > kTestedSigmas * known.sigma) {
@@ -561,7 +561,7 @@ bool FlightWork::known_ground_contradicts() const {
 }
 
 /// @return whether anything has changed, so that the adjustment has to be repeated
-bool FlightWork::mend_as_needed(const ProcessCheck& check) {
+bool FlightCalibrator::mend_as_needed(const ProcessCheck& check) {
   const std::vector<std::size_t> jumps = jumps_of(model_.knots, check);
   // A process that was larger than stated is followed to its size.
   const bool alerted = process_factor_ != trajectories::PoseErrorVector::Ones();
@@ -580,7 +580,8 @@ bool FlightWork::mend_as_needed(const ProcessCheck& check) {
   return true;
 }
 
-void FlightWork::break_process(const ProcessCheck& check, const std::vector<std::size_t>& jumps) {
+void FlightCalibrator::break_process(const ProcessCheck& check,
+                                     const std::vector<std::size_t>& jumps) {
   for (const std::size_t knot : jumps) {
     const auto step = static_cast<Index>(knot);
     ProcessBreak one{.knot = knot};
@@ -595,7 +596,7 @@ void FlightWork::break_process(const ProcessCheck& check, const std::vector<std:
 }
 
 /// Mount and sensor with what was found.
-void FlightWork::fill_mount_and_sensor() {
+void FlightCalibrator::fill_mount_and_sensor() {
   const Index globals = model_.unknowns().size();
   const std::vector<std::string> names = unknown_names(model_);
   const VectorXd values = unknown_values(model_);
@@ -646,7 +647,7 @@ void FlightWork::fill_mount_and_sensor() {
 
 /// Equations in which the clock may drift, attitudes may be late, and what is held, though it may
 /// be off, is free.
-FlightWork::TestedSystem FlightWork::tested_system() const {
+FlightCalibrator::TestedSystem FlightCalibrator::tested_system() const {
   const std::vector<std::int64_t>& times = full_.shots.time_ns;
   FlightModel model = smooth_;
   model.drift_about_ns = times.front() + (times.back() - times.front()) / 2;
@@ -671,7 +672,7 @@ FlightWork::TestedSystem FlightWork::tested_system() const {
 
 /// Whether corrections fit their process once what is tested is free: then it is to blame, and the
 /// trajectory is not.
-bool FlightWork::assumptions_explain() const {
+bool FlightCalibrator::assumptions_explain() const {
   const TestedSystem tested = tested_system();
   const VectorXd step = tested.system.step().unknowns;
   const MatrixXd corrections =
@@ -684,7 +685,7 @@ bool FlightWork::assumptions_explain() const {
 }
 
 /// What one more step would do with those equations, and how well that is known.
-void FlightWork::test_assumptions() {
+void FlightCalibrator::test_assumptions() {
   const auto [model, priors, system] = tested_system();
   const auto considered = static_cast<Index>(start_.considered);
   const Index size = model.unknowns().size(), first = model.unknowns().clock_drift() - considered;
@@ -720,7 +721,7 @@ void FlightWork::test_assumptions() {
   }
 }
 
-void FlightWork::judge_clock_drift(double value, double sigma) {
+void FlightCalibrator::judge_clock_drift(double value, double sigma) {
   ClockDrift& found = result_.clock_drift;
   found.value = value;
   found.sigma = sigma;
@@ -736,7 +737,7 @@ void FlightWork::judge_clock_drift(double value, double sigma) {
       1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds));
 }
 
-void FlightWork::judge_attitude_delay(double value, double sigma) {
+void FlightCalibrator::judge_attitude_delay(double value, double sigma) {
   AttitudeDelay& found = result_.attitude_delay;
   found.value = value;
   found.sigma = sigma;
@@ -750,7 +751,7 @@ void FlightWork::judge_attitude_delay(double value, double sigma) {
 }
 
 /// A clock offset that takes what it cannot be is an error of something else.
-void FlightWork::judge_clock_offset() {
+void FlightCalibrator::judge_clock_offset() {
   const FlightUnknown& clock = result_.unknowns[FlightUnknowns::clock_offset()];
   if (clock.held) return;
   result_.clock_contradicts = std::abs(clock.value - clock.start) >
@@ -762,7 +763,7 @@ void FlightWork::judge_clock_offset() {
 }
 
 /// What was mended of the trajectory, in numbers and words.
-void FlightWork::fill_trajectory_fit() {
+void FlightCalibrator::fill_trajectory_fit() {
   TrajectoryFit& fit = result_.trajectory_fit;
   for (int c = 0; c < kCorrections; ++c) {
     fit.factor[c] = process_factor_[static_cast<Index>(error_of(c))];
@@ -804,7 +805,7 @@ void FlightWork::fill_trajectory_fit() {
   if (!fit.fits) result_.warnings.push_back(misfit_in_words(result_));
 }
 
-void FlightWork::judge_held(HeldParameter held) {
+void FlightCalibrator::judge_held(HeldParameter held) {
   held.significant =
       std::abs(held.told - held.held) > kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
   if (held.significant) {
@@ -816,7 +817,7 @@ void FlightWork::judge_held(HeldParameter held) {
   result_.held.push_back(std::move(held));
 }
 
-void FlightWork::fill_control() {
+void FlightCalibrator::fill_control() {
   for (std::size_t i = 0; i < control_.size(); ++i) {
     SeenControl& seen = result_.control.emplace_back();
     const scenes::KnownGround& ground = options_.control[i];
@@ -848,7 +849,7 @@ void FlightWork::fill_control() {
   }
 }
 
-void FlightWork::fill_trajectory() {
+void FlightCalibrator::fill_trajectory() {
   trajectories::Trajectory corrected = local_;
   corrected.accuracy.resize(corrected.size());
   const auto clock_ns = static_cast<std::int64_t>(std::llround(model_.clock_offset * 1e9));
@@ -875,7 +876,7 @@ FlightCalibration calibrate_flight(const FlightShots& shots,
                                    const trajectories::Trajectory& trajectory,
                                    const FlightCalibrationOptions& options,
                                    const Progress& progress) {
-  return FlightWork(shots, trajectory, options, progress).run();
+  return FlightCalibrator(shots, trajectory, options, progress).run();
 }
 
 }  // namespace risley::calibration

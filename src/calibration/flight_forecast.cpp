@@ -40,7 +40,7 @@ constexpr double kSpuriousOfTrueNormals = 1;
 constexpr double kParameterStep = 1e-6;
 
 /// Everything of one flight that equations are made of.
-struct ForecastWork {
+struct ForecastFlight {
   FlightShots shots;
   ShotPoses poses;
   GroundCells cells;
@@ -94,7 +94,7 @@ struct PointRates {
   std::int64_t time_ns = 0;
 };
 
-PointRates rates_of(const ForecastWork& work, std::size_t row) {
+PointRates rates_of(const ForecastFlight& work, std::size_t row) {
   const FlightModel& model = work.start.model;
   const FlightShots& shots = work.shots;
   const ShotPose& pose = work.poses.pose[row];
@@ -164,7 +164,7 @@ struct Place {
 };
 
 /// Places all over the ground that several strips see.
-std::vector<Place> places_of(const ForecastWork& work) {
+std::vector<Place> places_of(const ForecastFlight& work) {
   std::vector<std::vector<std::size_t>> rows(work.cells.planes.size());
   for (std::size_t i = 0; i < work.shots.size(); ++i) {
     const std::int32_t plane = work.cells.plane[i];
@@ -186,7 +186,7 @@ std::vector<Place> places_of(const ForecastWork& work) {
   return places;
 }
 
-SharedPointErrors point_errors(const ForecastWork& work, const FlightSystem& system) {
+SharedPointErrors point_errors(const ForecastFlight& work, const FlightSystem& system) {
   SharedPointErrors result;
   const std::vector<Place> places = places_of(work);
   if (places.empty()) return result;
@@ -273,11 +273,11 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
     throw EstimationError(
         "the plan has one strip: at least two that overlap are needed, and crossing ones are best");
   }
-  ForecastWork work{.shots = {},
-                    .poses = {},
-                    .cells = {},
-                    .start = flight_start(calibration, flight.trajectory),
-                    .weights = {}};
+  ForecastFlight work{.shots = {},
+                      .poses = {},
+                      .cells = {},
+                      .start = flight_start(calibration, flight.trajectory),
+                      .weights = {}};
   result.strip_shots.assign(flight.strips.size(), 0);
   for_each_planned_piece(
       own, flight, {result.rate, calibration.seed},

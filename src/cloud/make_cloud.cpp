@@ -72,7 +72,7 @@ struct PolarShots {
 };
 
 /// Some rows of a piece on their way to the file.
-struct Block {
+struct RowBlock {
   std::vector<std::size_t> rows;
   std::vector<std::uint8_t> returns;  ///< of each row's shot
   PointedShots shots;
@@ -98,10 +98,10 @@ struct Piece {
   std::optional<std::string> failure;     ///< why there are none
 };
 
-class Work {
+class CloudMaker {
  public:
-  Work(recordings::Reader& reader, const sensors::Sensor& calibration, const std::string& path,
-       const CloudOptions& options, const Progress& progress)
+  CloudMaker(recordings::Reader& reader, const sensors::Sensor& calibration,
+             const std::string& path, const CloudOptions& options, const Progress& progress)
       : reader_(reader),
         calibration_(calibration),
         path_(path),
@@ -427,7 +427,7 @@ class Work {
   }
 
   /// The normals of the surfaces that the shots of a block met, sensor frame.
-  void find_normals(Block& block) const {
+  void find_normals(RowBlock& block) const {
     PointedShots& shots = block.shots;
     const std::size_t n = shots.size();
     std::vector<double> range(n);
@@ -459,7 +459,7 @@ class Work {
   }
 
   /// Looks up where the sensor is at every row of a block, and takes out rows that have no pose.
-  void find_poses(Block& block) const {
+  void find_poses(RowBlock& block) const {
     std::vector<std::size_t> known;
     georeference_->find_poses(times_of(block.rows), block.poses, known);
     block.without_pose = block.rows.size() - known.size();
@@ -487,7 +487,7 @@ class Work {
   }
 
   /// Takes up to kBlockRows rows that have a return. @return where the next block begins
-  std::size_t choose_rows(std::size_t begin, std::size_t end, Block& block) {
+  std::size_t choose_rows(std::size_t begin, std::size_t end, RowBlock& block) {
     block.rows.clear();
     block.returns.clear();
     std::size_t row = begin;
@@ -515,7 +515,7 @@ class Work {
     return row;
   }
 
-  void compute(Block& block) const {
+  void compute(RowBlock& block) const {
     block.without_pose = 0;
     if (georeference_) find_poses(block);
     const std::size_t n = block.rows.size();
@@ -566,7 +566,7 @@ class Work {
   }
 
   /// Takes out of a block what has no point.
-  void keep_sound(Block& block) const {
+  void keep_sound(RowBlock& block) const {
     Points& points = block.points;
     const double noise = square(model_.angle_noise);
     const double limit = kOutlierChi2 * belief_->residual_variance_factor;
@@ -630,7 +630,7 @@ class Work {
     }
   }
 
-  void write(const Block& block) {
+  void write(const RowBlock& block) {
     writer_->write(block.points);
     if (distribution_) count_on_ground(block.points);
     if (sampler_) sampler_->add(block.points);
@@ -722,7 +722,7 @@ class Work {
   std::optional<PointSampler> sampler_;
   CloudHeader header_;
   std::unique_ptr<CloudWriter> writer_;
-  std::vector<Block> blocks_;
+  std::vector<RowBlock> blocks_;
   std::unique_ptr<Piece> piece_;  ///< that is being written
   Observations spare_;            ///< memory of the one before, for the one after
   bool repointing_known_ = false;
@@ -739,7 +739,7 @@ CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calib
   }
   if (options.rate) require_above("rate", *options.rate, 0, "Hz");
   if (options.angle_noise) require_above("angle noise", *options.angle_noise, 0, "rad");
-  return Work(reader, calibration, path, options, progress).run();
+  return CloudMaker(reader, calibration, path, options, progress).run();
 }
 
 }  // namespace risley::cloud

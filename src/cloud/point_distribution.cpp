@@ -194,10 +194,10 @@ void require_options(const PointDistributionOptions& options) {
 
 }  // namespace
 
-class PointDistribution::Work {
+class PointDistribution::Counts {
  public:
-  Work(std::vector<StripLine> lines, const SwathReach& reach,
-       const PointDistributionOptions& options)
+  Counts(std::vector<StripLine> lines, const SwathReach& reach,
+         const PointDistributionOptions& options)
       : lines_(std::move(lines)), reach_(reach), options_(options) {
     require_options(options_);
     require_finite("left reach", reach_.left);
@@ -599,7 +599,7 @@ class PointDistribution::Work {
 
 PointDistribution::PointDistribution(std::vector<StripLine> lines, const SwathReach& reach,
                                      const PointDistributionOptions& options)
-    : work_(std::make_unique<Work>(std::move(lines), reach, options)) {}
+    : counts_(std::make_unique<Counts>(std::move(lines), reach, options)) {}
 PointDistribution::~PointDistribution() = default;
 PointDistribution::PointDistribution(PointDistribution&&) noexcept = default;
 PointDistribution& PointDistribution::operator=(PointDistribution&&) noexcept = default;
@@ -607,11 +607,11 @@ PointDistribution& PointDistribution::operator=(PointDistribution&&) noexcept = 
 void PointDistribution::add(std::span<const double> x, std::span<const double> y,
                             std::span<const double> z, std::span<const std::uint16_t> strip,
                             const Progress& progress) {
-  work_->add(x, y, z, strip, progress);
+  counts_->add(x, y, z, strip, progress);
 }
 
 PointDistributionSummary PointDistribution::summary(std::size_t most_squares) {
-  return work_->summary(most_squares);
+  return counts_->summary(most_squares);
 }
 
 }  // namespace risley::cloud

@@ -143,9 +143,9 @@ std::span<double> part(std::vector<double>& column, std::size_t first, std::size
 
 }  // namespace
 
-class Scanner::Work {
+class Scanner::State {
  public:
-  explicit Work(SimulationSettings given)
+  explicit State(SimulationSettings given)
       : settings(checked(std::move(given))),
         header(make_header(settings)),
         shots(static_cast<std::uint64_t>(std::llround(settings.duration * *settings.rate))),
@@ -323,20 +323,20 @@ class Scanner::Work {
 };
 
 Scanner::Scanner(SimulationSettings settings)
-    : work_(std::make_unique<Work>(std::move(settings))) {}
+    : state_(std::make_unique<State>(std::move(settings))) {}
 Scanner::~Scanner() = default;
 
-const SimulationSettings& Scanner::settings() const { return work_->settings; }
-const recordings::RecordingHeader& Scanner::header() const { return work_->header; }
-std::uint64_t Scanner::shots() const { return work_->shots; }
-std::uint64_t Scanner::shots_done() const { return work_->done; }
-std::uint64_t Scanner::no_return() const { return work_->no_return; }
-const std::vector<double>& Scanner::start_angles() const { return work_->settings.start_angles; }
+const SimulationSettings& Scanner::settings() const { return state_->settings; }
+const recordings::RecordingHeader& Scanner::header() const { return state_->header; }
+std::uint64_t Scanner::shots() const { return state_->shots; }
+std::uint64_t Scanner::shots_done() const { return state_->done; }
+std::uint64_t Scanner::no_return() const { return state_->no_return; }
+const std::vector<double>& Scanner::start_angles() const { return state_->settings.start_angles; }
 
 bool Scanner::read(recordings::Chunk& chunk, recordings::TruthColumns& truth,
                    std::size_t max_rows) {
   require_at_least("max_rows", max_rows, 1);
-  return work_->read(chunk, truth, max_rows);
+  return state_->read(chunk, truth, max_rows);
 }
 
 }  // namespace risley::simulation

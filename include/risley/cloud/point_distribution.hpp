@@ -126,8 +126,8 @@ class PointDistribution {
   PointDistributionSummary summary(std::size_t most_squares = 12'000);
 
  private:
-  class Work;
-  std::unique_ptr<Work> work_;
+  class Counts;
+  std::unique_ptr<Counts> counts_;
 };
 
 }  // namespace risley::cloud
