@@ -7,11 +7,8 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
-#include "risley/algebra/rotation_vector.hpp"
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/random.hpp"
@@ -21,8 +18,8 @@
 #include "risley/trajectories/clock.hpp"
 
 #include "calibration/eigen_vectors.hpp"
+#include "calibration/flight_findings.hpp"
 #include "calibration/flight_start.hpp"
-#include "calibration/flight_words.hpp"
 #include "calibration/judge_flight.hpp"
 #include "calibration/process_check.hpp"
 #include "calibration/rough_ground.hpp"
@@ -47,16 +44,11 @@ constexpr double kPoseMargin = 5;       // sigmas of the clock offset
 /// Done when a step promises less, in squared sigmas of all unknowns together: shots that come and
 /// go at the gate move the answer by about as much.
 constexpr double kSettled = 0.1;
-/// A drift of the clock, or a held parameter that is off, counts from so many sigmas on. Known
-/// before to no better than these, s/s and SI.
-constexpr double kTestedSigmas = 5, kDriftPrior = 1e-3, kHeldPrior = 1e-2;
-constexpr double kDelayPrior = 1;  // s
-/// Attitudes count as late from so many sigmas on, since few flights tell a delay well; from the
-/// first number on, and where the clock offset is so far from what is stated, what a delay would do
-/// counts as an error of everything else.
-constexpr double kDelayConsidered = 2, kDelaySigmas = 3;
-/// The clock offset contradicts what is stated of it from so many sigmas on.
-constexpr double kClockSigmas = 4;
+/// What is tested is known before to no better than these: drift, s/s, delay, s, and what is held.
+constexpr double kDriftPrior = 1e-3, kDelayPrior = 1, kHeldPrior = 1e-2;
+/// From so many sigmas of a delay on, and where the clock offset is so far from what is stated,
+/// what a delay would do counts as an error of everything else.
+constexpr double kDelayConsidered = 2;
 /// A trajectory that jumps more often does not fit, nor does one that so many repetitions do not
 /// mend.
 constexpr std::size_t kMostJumps = 8;
@@ -83,23 +75,6 @@ constexpr CoarseRound kCellRounds[] = {
 constexpr int kAllRounds = 3, kManySteps = 2, kLastSteps = 8;
 
 double flight_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
-
-/// What sigmas of corrections are in the words of a trajectory.
-trajectories::PoseAccuracy accuracy_of(const Eigen::Matrix<double, kCorrections, 1>& sigma,
-                                       double heading) {
-  const auto of = [&](trajectories::PoseError error) {
-    int c = 0;
-    while (error_of(c) != error) ++c;
-    return sigma[c];
-  };
-  using trajectories::PoseError;
-  const double along = std::cos(heading), across = std::sin(heading);
-  const double north = of(PoseError::tilt_north), east = of(PoseError::tilt_east);
-  return {{of(PoseError::north), of(PoseError::east), of(PoseError::up)},
-          std::hypot(along * north, across * east),
-          std::hypot(across * north, along * east),
-          of(PoseError::heading)};
-}
 
 /// Shots, poses and what they are labelled with.
 struct LabelledFlight {
@@ -293,9 +268,7 @@ class FlightCalibrator {
     };
     for (const CoarseRound& own : kCellRounds) round(own.cell, own.unlocked, own.steps, true);
     with_control_ = true;  // before, shots are metres off
-    for (int i = 0; i < kAllRounds; ++i) {
-      round(options_.cell_size, Unlocked::all, 2, i == 0);
-    }
+    for (int i = 0; i < kAllRounds; ++i) round(options_.cell_size, Unlocked::all, 2, i == 0);
   }
 
   /// How far strips are apart with what was given.
@@ -416,14 +389,8 @@ class FlightCalibrator {
   void break_process(const ProcessCheck& check, const std::vector<std::size_t>& jumps);
   void solve_last();
   void fill_trajectory_fit();
-  void judge_attitude_delay(double value, double sigma);
-  void judge_clock_offset();
   void fill_result();
-  void fill_mount_and_sensor();
   void test_assumptions();
-  void judge_clock_drift(double value, double sigma);
-  void judge_held(HeldParameter held);
-  void fill_trajectory();
   void fill_control();
 
   const FlightCalibrationOptions& options_;
@@ -494,11 +461,12 @@ void FlightCalibrator::fill_result() {
       judge_flight({full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_, priors_,
                     start_.prior_sigma, start_.considered, *system_, &band_.diagonal, may_be_off_,
                     rough_ ? &*rough_ : nullptr});
-  fill_mount_and_sensor();
-  judge_clock_offset();
+  fill_mount_and_sensor(options_, model_, priors_.held, start_.considered, result_);
+  judge_clock_offset(result_);
   fill_trajectory_fit();
   fill_control();
-  fill_trajectory();
+  result_.trajectory = trajectories::from_tangent_frame(
+      corrected(local_, model_, priors_.process, result_.correction_sigma), tangent_);
   result_.tangent = tangent_;
   result_.converged = last_.converged && result_.reason.empty();
   if (!last_.converged && result_.reason.empty()) {
@@ -551,13 +519,10 @@ void FlightCalibrator::mend_trajectory() {
 }
 
 bool FlightCalibrator::known_ground_contradicts() const {
-  for (const PlanePrior& known : priors_.planes) {
+  return std::ranges::any_of(priors_.planes, [&](const PlanePrior& known) {
     const GroundPlane& plane = model_.planes[known.plane];
-    if (std::abs(plane.normal.dot(plane.centre - known.place)) > kTestedSigmas * known.sigma) {
-      return true;
-    }
-  }
-  return false;
+    return std::abs(plane.normal.dot(plane.centre - known.place)) > kTestedSigmas * known.sigma;
+  });
 }
 
 /// @return whether anything has changed, so that the adjustment has to be repeated
@@ -593,56 +558,6 @@ void FlightCalibrator::break_process(const ProcessCheck& check,
     priors_.breaks.push_back(one);
     break_score_.push_back(check.score.col(step).cwiseAbs().maxCoeff());
   }
-}
-
-/// Mount and sensor with what was found.
-void FlightCalibrator::fill_mount_and_sensor() {
-  const Index globals = model_.unknowns().size();
-  const std::vector<std::string> names = unknown_names(model_);
-  const VectorXd values = unknown_values(model_);
-  result_.mount = options_.mount;
-  const auto found = [&](trajectories::StatedValue& stated, Index i) {
-    if (priors_.held[i]) return;
-    stated = {values[i], std::sqrt(result_.covariance(i, i)), "calibrated in flight by risley"};
-  };
-  for (Index i = 0; i < 3; ++i) {
-    found(result_.mount.boresight[i], i);
-    found(result_.mount.lever_arm[i], 3 + i);
-  }
-  found(result_.mount.clock_offset, FlightUnknowns::clock_offset());
-  sensors::Sensor& sensor = result_.sensor;
-  sensor = options_.sensor;
-  sensor.train = model_.train;
-  sensor.range_offset = model_.range_offset;
-  sensor.reference = sensors::CalibrationReference::planes;
-  sensor.provenance.clear();
-  std::vector<Index> of_mount_rows, of_sensor_rows;
-  for (Index i = 0; i < globals; ++i) {
-    const bool adjusted = !priors_.held[i];
-    const std::string& name = names[i];
-    if (i < FlightUnknowns::range_offset() || i == FlightUnknowns::clock_offset()) {
-      if (adjusted) of_mount_rows.push_back(i);
-      continue;
-    }
-    if (!adjusted && i < globals - static_cast<Index>(start_.considered)) continue;
-    of_sensor_rows.push_back(i);
-    if (adjusted) {
-      sensor.set_knowledge({name, std::sqrt(result_.covariance(i, i)),
-                            "calibrated in flight by risley calibrate", 0});
-    }
-  }
-  const auto named = [&](const std::vector<Index>& rows) {
-    algebra::NamedCovariance some;
-    for (const Index i : rows) some.names.push_back(names[i]);
-    some.matrix = result_.covariance(rows, rows);
-    return some;
-  };
-  algebra::NamedCovariance own = named(of_sensor_rows);
-  sensor.covariance_names = std::move(own.names);
-  sensor.covariance = std::move(own.matrix);
-  std::vector<Index> all_rows = of_mount_rows;
-  all_rows.insert(all_rows.end(), of_sensor_rows.begin(), of_sensor_rows.end());
-  result_.mount.covariance = named(all_rows);
 }
 
 /// Equations in which the clock may drift, attitudes may be late, and what is held, though it may
@@ -696,9 +611,11 @@ void FlightCalibrator::test_assumptions() {
   const MatrixXd covariance =
       flight_covariance(full_.shots, full_.poses, full_.cells.plane, model, final_weights_, priors,
                         system, functionals, rough_ ? &*rough_ : nullptr);
-  judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)));
-  judge_attitude_delay(steps[considered + 1],
-                       std::sqrt(covariance(considered + 1, considered + 1)));
+  judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)),
+                    flight_seconds(full_.shots.time_ns.back() - full_.shots.time_ns.front()),
+                    result_);
+  judge_attitude_delay(steps[considered + 1], std::sqrt(covariance(considered + 1, considered + 1)),
+                       result_);
   const AttitudeDelay& late = result_.attitude_delay;
   const auto clock = static_cast<Index>(FlightUnknowns::clock_offset());
   const double clock_off = std::abs(model_.clock_offset - options_.mount.clock_offset.value);
@@ -717,48 +634,8 @@ void FlightCalibrator::test_assumptions() {
                 .held = values[row],
                 .stated_sigma = start_.prior_sigma[row],
                 .told = values[row] + steps[i],
-                .sigma = std::sqrt(covariance(i, i))});
-  }
-}
-
-void FlightCalibrator::judge_clock_drift(double value, double sigma) {
-  ClockDrift& found = result_.clock_drift;
-  found.value = value;
-  found.sigma = sigma;
-  found.seconds = flight_seconds(full_.shots.time_ns.back() - full_.shots.time_ns.front());
-  found.significant = std::abs(found.value) > kTestedSigmas * found.sigma;
-  if (!found.significant) return;
-  result_.warnings.push_back(fmt::format(
-      "the clocks of sensor and trajectory drift apart: the trajectory's gains {:.2g} +- {:.1g} "
-      "ppm on the recording's, {:.2g} ms over the {:.0f} s between the first shot and the last. A "
-      "constant clock offset cannot describe that, and the results are off by more than their "
-      "sigmas. Synchronise the sensor's clock by PPS or PTP, or calibrate shorter parts of the "
-      "flight",
-      1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds));
-}
-
-void FlightCalibrator::judge_attitude_delay(double value, double sigma) {
-  AttitudeDelay& found = result_.attitude_delay;
-  found.value = value;
-  found.sigma = sigma;
-  found.significant = std::abs(found.value) > kDelaySigmas * found.sigma;
-  if (!found.significant) return;
-  result_.warnings.push_back(
-      in_words(found) +
-      "; a clock offset moves positions and attitudes together and cannot describe that, so clock "
-      "offset and lever arm are off by more than their sigmas. Correct the time stamps of the "
-      "attitudes, and calibrate again");
-}
-
-/// A clock offset that takes what it cannot be is an error of something else.
-void FlightCalibrator::judge_clock_offset() {
-  const FlightUnknown& clock = result_.unknowns[FlightUnknowns::clock_offset()];
-  if (clock.held) return;
-  result_.clock_contradicts = std::abs(clock.value - clock.start) >
-                              kClockSigmas * std::hypot(clock.prior_sigma, clock.sigma);
-  if (result_.clock_contradicts) {
-    result_.warnings.push_back(clock_in_words(result_) +
-                               "; correct the times or what the mount states of them");
+                .sigma = std::sqrt(covariance(i, i))},
+               options_.sensor, result_);
   }
 }
 
@@ -790,36 +667,12 @@ void FlightCalibrator::fill_trajectory_fit() {
   std::ranges::sort(fit.jumps, [](const TrajectoryJump& a, const TrajectoryJump& b) {
     return a.begin_ns < b.begin_ns;
   });
-  for (const TrajectoryJump& jump : fit.jumps) {
-    result_.warnings.push_back(in_words(jump, full_.shots.time_ns.front()) +
-                               "; it has a step of its own in the adjustment. Is there a loss of "
-                               "the GNSS fix, or an alignment, in the trajectory's log?");
-  }
-  for (int c = 0; c < kCorrections; ++c) {
-    if (fit.factor[c] == 1) continue;
-    result_.warnings.push_back(fmt::format(
-        "the trajectory's error {} is {:.2g} times as large as stated (chi2 of its corrections "
-        "{:.3g}, {:.3g} expected); the adjustment counts it as that large, and the sigmas with it",
-        correction_name(c), fit.factor[c], fit.chi2[c], fit.expected[c]));
-  }
-  if (!fit.fits) result_.warnings.push_back(misfit_in_words(result_));
-}
-
-void FlightCalibrator::judge_held(HeldParameter held) {
-  held.significant =
-      std::abs(held.told - held.held) > kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
-  if (held.significant) {
-    result_.warnings.push_back(fmt::format(
-        "the strips contradict what is held: {}; the results are off by more than their "
-        "sigmas. Estimate it as well (option additional)",
-        in_words(held, options_.sensor)));
-  }
-  result_.held.push_back(std::move(held));
+  warn_of_trajectory(full_.shots.time_ns.front(), result_);
 }
 
 void FlightCalibrator::fill_control() {
   for (std::size_t i = 0; i < control_.size(); ++i) {
-    SeenControl& seen = result_.control.emplace_back();
+    SeenControl seen;
     const scenes::KnownGround& ground = options_.control[i];
     seen.name = ground.name;
     seen.sigma = ground.sigma;
@@ -827,47 +680,12 @@ void FlightCalibrator::fill_control() {
     seen.shots = static_cast<std::size_t>(std::ranges::count_if(
         full_.points, [&](const std::array<float, 3>& point) { return circle.holds(point); }));
     seen.used = control_plane_[i] != kNoPlane;
-    if (!seen.used) {
-      result_.warnings.push_back(fmt::format(
-          "known ground \"{}\" is left out: {} shots within {:g} m of it{}", ground.name,
-          seen.shots, ground.radius,
-          seen.shots < GroundCellOptions{}.least_shots
-              ? fmt::format(", at least {} are needed; is it on the map that is stated?",
-                            GroundCellOptions{}.least_shots)
-              : " are not on a plane"));
-      continue;
+    if (seen.used) {
+      const GroundPlane& plane = model_.planes[control_plane_[i]];
+      seen.off = plane.normal.dot(plane.centre - control_[i].place);
     }
-    const GroundPlane& plane = model_.planes[control_plane_[i]];
-    seen.off = plane.normal.dot(plane.centre - control_[i].place);
-    seen.significant = std::abs(seen.off) > kTestedSigmas * seen.sigma;
-    if (!seen.significant) continue;
-    result_.warnings.push_back(fmt::format(
-        "known ground \"{}\" contradicts the flight: the strips see it {:.3f} m {} what is stated, "
-        "{:.0f} of its sigmas. Is the place right, and is the ground flat within {:g} m of it?",
-        ground.name, std::abs(seen.off), seen.off > 0 ? "above" : "below",
-        std::abs(seen.off) / seen.sigma, ground.radius));
+    judge_control(ground, std::move(seen), result_);
   }
-}
-
-void FlightCalibrator::fill_trajectory() {
-  trajectories::Trajectory corrected = local_;
-  corrected.accuracy.resize(corrected.size());
-  const auto clock_ns = static_cast<std::int64_t>(std::llround(model_.clock_offset * 1e9));
-  for (std::size_t i = 0; i < corrected.size(); ++i) {
-    const Eigen::Matrix<double, kCorrections, 1> error = correction_at(
-        model_.knots, model_.corrections, priors_.process, corrected.time_ns[i] - clock_ns);
-    corrected.position[i] += error.head<3>();
-    corrected.attitude[i] =
-        (Eigen::Quaterniond(algebra::rotation_by(error.tail<3>())) * corrected.attitude[i])
-            .normalized();
-    corrected.accuracy[i] =
-        accuracy_of(correction_sigma_at(model_.knots, result_.correction_sigma, priors_.process,
-                                        corrected.time_ns[i] - clock_ns),
-                    trajectories::roll_pitch_heading(corrected.frame, corrected.position[i],
-                                                     corrected.attitude[i])
-                        .heading);
-  }
-  result_.trajectory = trajectories::from_tangent_frame(corrected, tangent_);
 }
 
 }  // namespace
