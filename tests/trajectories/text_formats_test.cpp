@@ -541,6 +541,26 @@ TEST(Tum, DecimalCommasAndUtf16) {
   }
 }
 
+TEST(TrajectoryCsv, EurocIsRead) {
+  const Trajectory wanted = read(tum_drive("", false));
+  for (const char* names :
+       {"#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],"
+        "q_RS_z []",
+        "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+        "q_RS_z []"}) {
+    std::string text = std::string(names) + "\n";
+    for (int i = 0; i < 40; ++i) {
+      text += fmt::format("{},{:.2f},0,0,{:.9f},0,0,{:.9f}\n",
+                          1'700'000'000'000'000'000 + 50'000'000LL * i, 0.05 * i,
+                          std::cos(0.01 * i), std::sin(0.01 * i));
+    }
+    const Trajectory t = read(text, "data.csv");
+    EXPECT_EQ(t.time_ns, wanted.time_ns);
+    EXPECT_EQ(t.position, wanted.position);
+    EXPECT_LT(t.attitude.back().angularDistance(wanted.attitude.back()), 1e-8);
+  }
+}
+
 TEST(TrajectoryCsv, NamesWithUnitsInBrackets) {
   const std::string rows =
       "400825.000;47.0;8.5;480.0;1.9;-0.2;359.5\n400825.050;47.00000225;8.5;480.0;1.8;-0.3;359.5\n";

@@ -125,16 +125,32 @@ const std::vector<std::string>& all_csv_names() {
 struct CsvAlias {
   std::string_view written, base;
 };
-constexpr std::array kCsvAliases{
-    CsvAlias{"timestamp", "time"}, CsvAlias{"time_stamp", "time"},
-    CsvAlias{"t", "time"},         CsvAlias{"lat", "latitude"},
-    CsvAlias{"lon", "longitude"},  CsvAlias{"long", "longitude"},
-    CsvAlias{"lng", "longitude"},  CsvAlias{"ellipsoid_height", "ellipsoidal_height"},
-    CsvAlias{"tx", "x"},           CsvAlias{"ty", "y"},
-    CsvAlias{"tz", "z"},           CsvAlias{"q_x", "qx"},
-    CsvAlias{"q_y", "qy"},         CsvAlias{"q_z", "qz"},
-    CsvAlias{"q_w", "qw"},
-};
+constexpr CsvAlias kCsvAliases[] = {{"timestamp", "time"},
+                                    {"time_stamp", "time"},
+                                    {"t", "time"},
+                                    {"lat", "latitude"},
+                                    {"lon", "longitude"},
+                                    {"long", "longitude"},
+                                    {"lng", "longitude"},
+                                    {"ellipsoid_height", "ellipsoidal_height"},
+                                    {"tx", "x"},
+                                    {"ty", "y"},
+                                    {"tz", "z"},
+                                    {"q_x", "qx"},
+                                    {"q_y", "qy"},
+                                    {"q_z", "qz"},
+                                    {"q_w", "qw"},
+                                    {"p_rs_r_x", "x"},
+                                    {"p_rs_r_y", "y"},
+                                    {"p_rs_r_z", "z"},
+                                    {"q_rs_x", "qx"},
+                                    {"q_rs_y", "qy"},
+                                    {"q_rs_z", "qz"},
+                                    {"q_rs_w", "qw"},
+                                    {"v_rs_r_x", "velocity_x"},
+                                    {"v_rs_r_y", "velocity_y"},
+                                    {"v_rs_r_z", "velocity_z"}};
+constexpr std::string_view kEurocPosition = "p_rs_r_x";
 
 /// Units as they stand in brackets.
 struct CsvUnitAlias {
@@ -194,6 +210,10 @@ std::vector<std::string> header_names(std::string_view line) {
   std::vector<std::string> names;
   for (const std::string_view field : io::fields_of(line, csv_delimiter(line))) {
     names.push_back(csv_name(field));
+  }
+  // EuRoC counts nanoseconds, whether its header says so or not.
+  if (lower_case(std::string(line)).find(kEurocPosition) != std::string::npos) {
+    std::ranges::replace(names, std::string("time"), std::string("time_ns"));
   }
   return names;
 }
