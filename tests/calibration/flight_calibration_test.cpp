@@ -24,12 +24,7 @@ using testing::FlightSettings;
 using testing::SimulatedFlight;
 
 std::string failure(const SimulatedFlight& flight, const FlightCalibrationOptions& options) {
-  try {
-    calibrate_flight(flight.shots, flight.trajectory, options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+  return refusal<Error>([&] { calibrate_flight(flight.shots, flight.trajectory, options); });
 }
 
 /// A short flight with few shots: finds what a full one does, less well.

@@ -17,6 +17,7 @@
 
 #include "cloud/cloud_samples.hpp"
 #include "parameter_name.hpp"
+#include "refusal.hpp"
 
 namespace risley::cloud::las_recording_test {
 
@@ -131,12 +132,7 @@ std::string laz_error(const std::string& path, std::uint64_t at, const std::stri
     stream.seekp(static_cast<std::streamoff>(at));
     stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   }
-  try {
-    recordings::load_recording(path);
-  } catch (const FileError& error) {
-    return error.what();
-  }
-  return "was read";
+  return refusal<FileError>([&] { recordings::load_recording(path); });
 }
 
 TEST(LazRecordingTest, ChunkTablesThatCannotBeAreRefused) {

@@ -11,9 +11,12 @@
 #include "risley/core/error.hpp"
 #include "risley/scenes/scene.hpp"
 
+#include "refusal.hpp"
+
 namespace risley::scenes::furniture_test {
 
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 const std::string kRoom = R"(
 planes:
@@ -87,13 +90,9 @@ struct Mistake {
 class FurnitureMistake : public ::testing::TestWithParam<Mistake> {};
 
 TEST_P(FurnitureMistake, IsNamedWithItsLine) {
-  try {
-    parse_scene(GetParam().text, "scene.yaml");
-    FAIL() << "was accepted";
-  } catch (const FileError& error) {
-    EXPECT_EQ(error.place().line, GetParam().line) << error.what();
-    EXPECT_THAT(error.problem(), HasSubstr(GetParam().message));
-  }
+  EXPECT_THAT(
+      line_and_problem([] { parse_scene(GetParam().text, "scene.yaml"); }),
+      AllOf(StartsWith(std::to_string(GetParam().line) + ": "), HasSubstr(GetParam().message)));
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -11,11 +11,13 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
+#include "refusal.hpp"
 #include "source_tree.hpp"
 
 namespace risley::scenes::scene_test {
 
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 Vector3<double> towards(double azimuth_deg, double zenith_deg) {
   return direction_from_angles<double>(
@@ -51,12 +53,8 @@ TEST(Scene, ReadsPlanesAndStations) {
   EXPECT_DOUBLE_EQ(flipped.yaw, radians_from_degrees(30));
   EXPECT_DOUBLE_EQ(flipped.sigma, radians_from_degrees(0.02));
   EXPECT_EQ(scene.station("").position.x, 0.0);
-  try {
-    static_cast<void>(scene.station("sideways"));
-    FAIL();
-  } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("upright, flipped"));
-  }
+  EXPECT_THAT(refusal([&] { static_cast<void>(scene.station("sideways")); }),
+              HasSubstr("upright, flipped"));
 }
 
 TEST(Scene, BundledRoomIsClosedTowardsTheFront) {
@@ -151,14 +149,9 @@ struct Mistake {
 class SceneMistake : public ::testing::TestWithParam<Mistake> {};
 
 TEST_P(SceneMistake, IsNamedWithItsLine) {
-  try {
-    parse_scene(GetParam().text, "scene.yaml");
-    FAIL() << "was accepted";
-  } catch (const FileError& error) {
-    ASSERT_TRUE(error.place().line.has_value()) << error.what();
-    EXPECT_EQ(*error.place().line, GetParam().line) << error.what();
-    EXPECT_THAT(error.problem(), HasSubstr(GetParam().message));
-  }
+  EXPECT_THAT(
+      line_and_problem([] { parse_scene(GetParam().text, "scene.yaml"); }),
+      AllOf(StartsWith(std::to_string(GetParam().line) + ": "), HasSubstr(GetParam().message)));
 }
 
 INSTANTIATE_TEST_SUITE_P(

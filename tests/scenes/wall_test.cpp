@@ -19,6 +19,7 @@
 namespace risley::scenes::wall_test {
 
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 /// A wall 5 m ahead, 4 m wide and 3 m high.
 Scene wall_with(const std::string& fields) {
@@ -274,16 +275,13 @@ struct Mistake {
 class WallMistake : public ::testing::TestWithParam<Mistake> {};
 
 TEST_P(WallMistake, IsNamedWithItsLine) {
-  try {
-    parse_scene(std::string("planes:\n  - name: a\n    distance_m: 3\n    normal_azimuth_deg: 0\n"
-                            "    normal_zenith_deg: 90\n    ") +
-                    GetParam().field + "\n",
-                "scene.yaml");
-    FAIL() << "was accepted";
-  } catch (const FileError& error) {
-    EXPECT_EQ(error.place().line, 6U) << error.what();
-    EXPECT_THAT(error.problem(), HasSubstr(GetParam().message));
-  }
+  const std::string text =
+      std::string(
+          "planes:\n  - name: a\n    distance_m: 3\n    normal_azimuth_deg: 0\n"
+          "    normal_zenith_deg: 90\n    ") +
+      GetParam().field + "\n";
+  EXPECT_THAT(line_and_problem([&] { parse_scene(text, "scene.yaml"); }),
+              AllOf(StartsWith("6: "), HasSubstr(GetParam().message)));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -308,14 +306,10 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& each) { return std::string(each.param.name); });
 
 TEST(Wall, PatchesLieWithinTheExtent) {
-  try {
-    wall_with("patches: [{center_m: [1.8, 0], size_m: [1, 1]}]");
-    FAIL() << "was accepted";
-  } catch (const FileError& error) {
-    EXPECT_EQ(error.place().line, 1U);
-    EXPECT_THAT(error.problem(),
-                HasSubstr("planes[0].patches[0].size_m reaches beyond the extent of \"wall\""));
-  }
+  EXPECT_EQ(line_and_problem([] {
+              wall_with("patches: [{center_m: [1.8, 0], size_m: [1, 1]}]");
+            }).find("1: planes[0].patches[0].size_m reaches beyond the extent of \"wall\""),
+            0U);
 }
 
 }  // namespace risley::scenes::wall_test

@@ -13,17 +13,14 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
+#include "refusal.hpp"
+
 namespace risley::trajectories::mount_test {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using ::testing::HasSubstr;
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), by);
-}
+using ::testing::StartsWith;
 
 const std::string kHexacopter = R"(risley_mount: 1
 name: hexacopter
@@ -183,12 +180,8 @@ TEST(Mount, RefusesACovarianceThatIsNotOfItsSigmas) {
   const auto at = text.find(sigma, text.find("lever_arm"));
   ASSERT_NE(at, std::string::npos);
   text.replace(at, sigma.size(), "sigma: 0.02, source");
-  try {
-    parse_mount(text, "mount.yaml");
-    FAIL() << "not refused";
-  } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("lever_arm_x_m has a sigma of 0.01 here, and 0.02"));
-  }
+  EXPECT_THAT(refusal<FileError>([&] { parse_mount(text, "mount.yaml"); }),
+              HasSubstr("lever_arm_x_m has a sigma of 0.01 here, and 0.02"));
 }
 
 TEST(Mount, TheTextOfAnEmptyMountIsRead) {
@@ -220,14 +213,10 @@ class MountMistake : public ::testing::TestWithParam<Mistake> {};
 
 TEST_P(MountMistake, IsNamedWithItsLine) {
   const Mistake& mistake = GetParam();
-  try {
-    parse_mount(replaced(kHexacopter, mistake.what, mistake.by), "mount.yaml");
-    FAIL() << "was accepted";
-  } catch (const FileError& error) {
-    ASSERT_TRUE(error.place().line.has_value()) << error.what();
-    EXPECT_EQ(*error.place().line, mistake.line) << error.what();
-    EXPECT_THAT(error.problem(), HasSubstr(mistake.message));
-  }
+  EXPECT_THAT(line_and_problem([&] {
+                parse_mount(replaced(kHexacopter, mistake.what, mistake.by), "mount.yaml");
+              }),
+              AllOf(StartsWith(std::to_string(mistake.line) + ": "), HasSubstr(mistake.message)));
 }
 
 constexpr const char* kAxes = "sensor_axes: {x: down, y: left, z: forward, source: drawing}";

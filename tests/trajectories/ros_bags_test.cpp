@@ -24,6 +24,7 @@
 #include "bags/written_bags.hpp"
 #include "bags/written_mcap.hpp"
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 #include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::ros_bags_test {
@@ -148,12 +149,7 @@ std::string write(BagKind kind, const std::vector<TopicOfSamples>& topics) {
 
 /// What reading says is wrong, "" when nothing is.
 std::string fault(const std::string& path, const std::string& topic = {}) {
-  try {
-    require_trajectory(load_trajectory(path, {}, topic));
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+  return refusal<Error>([&] { require_trajectory(load_trajectory(path, {}, topic)); });
 }
 
 std::string fault(BagKind kind, const std::vector<Sample>& samples, Type type = Type::odometry) {

@@ -18,6 +18,7 @@
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 #include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::text_formats_test {
@@ -40,20 +41,11 @@ Trajectory read(const std::string& text, const std::string& name = "a.txt") {
 }
 
 std::string fault(const std::string& text, const std::string& name = "a.txt") {
-  try {
+  return refusal<FileError>([&] {
     const std::string path = folder().file(name);
     write_bytes(path, text);
     load_trajectory(path);
-  } catch (const FileError& error) {
-    return error.what();
-  }
-  return {};
-}
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return text.replace(at, what.size(), by);
+  });
 }
 
 /// Rows of the flight by a function of the time.
@@ -708,12 +700,8 @@ TEST(TextFormats, OtherTextsAreNoTrajectory) {
 
 TEST(TextFormats, UnknownEndingsListTheKnownOnes) {
   const Trajectory t = trajectory_of(KnownFlight(), 3);
-  try {
-    write_trajectory(folder().file("a.xyz"), t);
-    FAIL();
-  } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("unknown ending, allowed .csv, .sbet"));
-  }
+  EXPECT_THAT(refusal([&] { write_trajectory(folder().file("a.xyz"), t); }),
+              HasSubstr("unknown ending, allowed .csv, .sbet"));
   EXPECT_THROW(write_trajectory(folder().file("a.csv"), t, "tum"), InvalidArgument);
   EXPECT_THROW(write_trajectory(folder().file("a.csv"), {}), InvalidArgument);
   EXPECT_EQ(writable_trajectories().size(), 2U);
