@@ -421,49 +421,39 @@ struct PointCase {
 
 class PointsOfEveryTrain : public ::testing::TestWithParam<PointCase> {};
 
-// All columns of every length of tail.
+// All columns of every length of tail, where ranges have an offset alone, and where they have all
+// errors: corrected, and their uncertainties along the beam.
 TEST_P(PointsOfEveryTrain, EqualPlainNumbersInEveryInstructionSet) {
   PointingOptions options;
   options.reported_directions = GetParam().reported;
   options.beam_origin = GetParam().origin;
-  for (const InstructionSet set : available_instruction_sets()) {
-    SCOPED_TRACE(to_string(set));
-    for (unsigned count = 1; count <= 17; ++count) {
-      options.beam_divergence = count % 4 != 0;
-      const PointingModel model = imperfect_model(GetParam().order, count, options);
-      const PointedShots shots = random_shots(model, count, count);
+  for (unsigned count = 1; count <= 17; ++count) {
+    options.beam_divergence = count % 4 != 0;
+    PointingModel model = imperfect_model(GetParam().order, count, options);
+    PointedShots shots = random_shots(model, count, count);
+    for (const InstructionSet set : available_instruction_sets()) {
+      SCOPED_TRACE(to_string(set));
       expect_points(model, shots, points_of(model, header_of(model), shots, set));
     }
-  }
-}
-
-// Ranges with all errors: corrected, and their uncertainties along the beam.
-TEST_P(PointsOfEveryTrain, HaveRangesWithoutTheirErrors) {
-  PointingOptions options;
-  options.reported_directions = GetParam().reported;
-  options.beam_origin = GetParam().origin;
-  for (const InstructionSet set : available_instruction_sets()) {
-    SCOPED_TRACE(to_string(set));
-    for (unsigned count = 1; count <= 17; ++count) {
-      PointingModel model = imperfect_model(GetParam().order, count, options);
-      if (count % 5 != 0) model.range_errors = {0.02, 0.3, 0.01, {0.004}};
-      for (std::size_t j = 0; j < model.factors.size(); ++j) {
-        const double size = 1e-3 * static_cast<double>(j + 1);
-        sensors::RangeErrors& errors = model.factors[j].range_errors;
-        if (j != 1) errors.near = size;
-        if (j != 2) errors.incidence = -20 * size;
-        if (j > 2) errors.per_decade = size;
-        if (j == 4) errors.emitter = {size};
+    if (count % 5 != 0) model.range_errors = {0.02, 0.3, 0.01, {0.004}};
+    for (std::size_t j = 0; j < model.factors.size(); ++j) {
+      const double size = 1e-3 * static_cast<double>(j + 1);
+      sensors::RangeErrors& errors = model.factors[j].range_errors;
+      if (j != 1) errors.near = size;
+      if (j != 2) errors.incidence = -20 * size;
+      if (j > 2) errors.per_decade = size;
+      if (j == 4) errors.emitter = {size};
+    }
+    for (std::size_t i = 3; i < count; i += 6) shots.intensity[i] = -1;  // not known
+    for (std::size_t i = 0; i < count; i += 7) {                         // grazing
+      const Expected e = expected_point(model, shots, i);
+      const Vector3d across = e.direction.unitOrthogonal() + 0.01 * e.direction;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        shots.surface_normal[axis][i] = across.normalized()[axis];
       }
-      PointedShots shots = random_shots(model, count, count);
-      for (std::size_t i = 3; i < count; i += 6) shots.intensity[i] = -1;  // not known
-      for (std::size_t i = 0; i < count; i += 7) {                         // grazing
-        const Expected e = expected_point(model, shots, i);
-        const Vector3d across = e.direction.unitOrthogonal() + 0.01 * e.direction;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          shots.surface_normal[axis][i] = across.normalized()[axis];
-        }
-      }
+    }
+    for (const InstructionSet set : available_instruction_sets()) {
+      SCOPED_TRACE(to_string(set));
       expect_points(model, shots, points_of(model, header_of(model), shots, set), 1e-12);
     }
   }
@@ -791,36 +781,6 @@ TEST(ComputePoints, ABeamThatDoesNotGetThroughHasNoPoint) {
   }
 }
 
-// Each part alone, so that one cannot hide behind another.
-TEST(RangeNoise, FollowsTheSensorsRangeVariance) {
-  PointingModel quiet = imperfect_model("PA-AP", 6);
-  quiet.factors.clear();
-  quiet.places.clear();
-  sensors::Sensor& sensor = quiet.sensor;
-  sensor.range_noise = sensor.range_noise_per_range = 0;
-  sensor.range_noise_incidence = sensor.range_noise_weak_return = 0;
-  PointedShots shots = random_shots(quiet, 33, 6);
-  shots.intensity[0] = 0;
-  shots.intensity[2] = 255;
-  for (const auto part :
-       {&sensors::Sensor::range_noise, &sensors::Sensor::range_noise_per_range,
-        &sensors::Sensor::range_noise_incidence, &sensors::Sensor::range_noise_weak_return}) {
-    PointingModel model = quiet;
-    model.sensor.*part = 0.01;
-    for (const InstructionSet set : available_instruction_sets()) {
-      const Points points = points_of(model, header_of(model), shots, set);
-      for (std::size_t i = 0; i < shots.size(); ++i) {
-        const Expected e = expected_point(model, shots, i);
-        const double tangent = std::isnan(e.incidence) ? 0.0 : std::tan(e.incidence);
-        const double variance = model.sensor.range_variance(e.range, tangent, shots.intensity[i]) +
-                                shots.range_rounding[i];
-        const double along = e.direction.dot(covariance_of(points, i) * e.direction);
-        EXPECT_NEAR(along / variance, 1.0, 1e-6) << to_string(set) << " shot " << i;
-      }
-    }
-  }
-}
-
 /// Rebuilt from a model's factors: the covariance of all places, of the rotation angles, of
 /// thickness and spacing, and of the range offset.
 MatrixXd covariance_of_factors(const PointingModel& model) {
@@ -927,6 +887,11 @@ struct Case {
     for (const auto& free : belief.free) names.push_back(free.name);
     return names;
   }
+
+  PointingModel model(const PointingOptions& options = {}) const {
+    return pointing_model(calibration, belief, options);
+  }
+  MatrixXd covariance_against_planes() const;
 };
 
 /// Variances of thickness, spacing and (when it is not with the others) the range offset.
@@ -940,6 +905,15 @@ MatrixXd geometry_variance(const sensors::Sensor& sensor, Index size) {
   all[size - 2] = variance("prism_spacing_m");
   all[size - 1] = variance("range_offset_m");
   return all.asDiagonal();
+}
+
+/// The beam's by the calibration, that of the rotation angles by the recording.
+MatrixXd Case::covariance_against_planes() const {
+  const MatrixXd beam = effect(calibration.covariance_names, true, false);
+  const MatrixXd angles = effect(free_names(), false, true);
+  const MatrixXd sum = beam * calibration.covariance * beam.transpose() +
+                       angles * belief.covariance * angles.transpose();
+  return sum + geometry_variance(calibration, sum.rows());
 }
 
 void expect_same_covariance(const MatrixXd& found, const MatrixXd& stated) {
@@ -958,7 +932,7 @@ TEST(PointingModel, OfATypeTakesTheRecordingsParametersAndTheirErrors) {
     one.calibration.set_knowledge({name, 0.05, "assumed"});
   }
   one.calibration.set_knowledge({"range_offset_m", 0.005, "assumed"});
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  const PointingModel model = one.model();
   EXPECT_EQ(model.train.parameters(), one.belief.sensor.train.parameters());
   EXPECT_EQ(model.believed.parameters(), one.belief.sensor.train.parameters());
   EXPECT_EQ(model.angle_noise, 6e-5);
@@ -977,11 +951,13 @@ TEST(PointingModel, OfATypeTakesTheRecordingsParametersAndTheirErrors) {
 // A unit whose parameters are known to 0.002 degree and that reports directions 0.2 degree off.
 TEST(PointingModel, AUnitThatContradictsTheRecordingIsTakenAtItsWord) {
   Case one(CalibrationReference::none);
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  one.calibration.set_knowledge({"wedge_angle_deg", 1e-4, "assumed"});  // no recording tells
+  const PointingModel model = one.model();
   EXPECT_EQ(model.reference, CalibrationReference::planes);
   EXPECT_EQ(model.train.parameters(), one.calibration.train.parameters());
   EXPECT_EQ(model.believed.parameters(), one.belief.sensor.train.parameters());
   const auto names = names_of(model);
+  EXPECT_THAT(names, ::testing::Contains("wedge_angle_deg"));
   for (const std::string& name : one.free_names()) {
     EXPECT_THAT(names, ::testing::Contains(name));
   }
@@ -994,7 +970,7 @@ TEST(PointingModel, AUnitThatContradictsTheRecordingIsTakenAtItsWord) {
 
 TEST(PointingModel, CalibratedAgainstDirectionsMovesTheRotationAnglesToo) {
   const Case one(CalibrationReference::directions);
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  const PointingModel model = one.model();
   EXPECT_EQ(model.train.parameters(), one.belief.sensor.train.parameters());
   const auto& names = one.calibration.covariance_names;
   const MatrixXd effect = one.effect(names, true, true);
@@ -1014,10 +990,9 @@ TEST(PointingModel, ReportedDirectionsOwnNothingToTheParameters) {
   const Case one(CalibrationReference::directions);
   PointingOptions options;
   options.reported_directions = true;
-  EXPECT_THAT(names_of(pointing_model(one.calibration, one.belief, options)),
-              ElementsAre("prism_thickness_m", "prism_spacing_m"));
+  EXPECT_THAT(names_of(one.model(options)), ElementsAre("prism_thickness_m", "prism_spacing_m"));
   options.beam_origin = false;
-  const PointingModel thin = pointing_model(one.calibration, one.belief, options);
+  const PointingModel thin = one.model(options);
   EXPECT_THAT(names_of(thin), ElementsAre());
   EXPECT_THAT(thin.geometry.thickness, ElementsAre());
   EXPECT_TRUE(thin.places.empty());
@@ -1037,12 +1012,7 @@ TEST(PointingModel, CalibratedAgainstPlanesHasErrorsOfBothTrains) {
   names.push_back("prism_thickness_m");
   names.push_back("prism_spacing_m");
   EXPECT_EQ(names_of(model), names);
-  const MatrixXd beam = one.effect(one.calibration.covariance_names, true, false);
-  const MatrixXd angles = one.effect(one.free_names(), false, true);
-  MatrixXd stated = beam * one.calibration.covariance * beam.transpose() +
-                    angles * one.belief.covariance * angles.transpose();
-  stated += geometry_variance(one.calibration, stated.rows());
-  expect_same_covariance(covariance_of_factors(model), stated);
+  expect_same_covariance(covariance_of_factors(model), one.covariance_against_planes());
 }
 
 /// Sigma of the point that all factors together give to a size of the model, m.
@@ -1070,7 +1040,7 @@ TEST(PointingModel, TakesSizesOfPrismsJointlyWithTheOthers) {
   VectorXd sigma = typical_sigmas(names);
   sigma.tail(3) << 0.4e-3, 0.3e-3, 2e-3;
   one.calibration.covariance = correlated(sigma, 21);
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  const PointingModel model = one.model();
   std::vector<std::string> found;
   for (const PrismSize& size : model.sizes) found.push_back(size.name);
   EXPECT_EQ(found, sizes);
@@ -1095,7 +1065,7 @@ TEST(PointingModel, TakesSizesOfPrismsJointlyWithTheOthers) {
   // Beams that start at the frame's origin know no sizes; what the others say stays.
   PointingOptions from_zero;
   from_zero.beam_origin = false;
-  const PointingModel thin = pointing_model(one.calibration, one.belief, from_zero);
+  const PointingModel thin = one.model(from_zero);
   EXPECT_TRUE(thin.sizes.empty());
   EXPECT_EQ(names_of(thin).size(), expected.size() - 3);
 }
@@ -1122,7 +1092,7 @@ TEST(PointingModel, TakesRangeErrorsJointlyWithTheOthers) {
   one.calibration.range_errors = {0.015, 0.3, 0.01, {0.002}};
   // What is in the covariance does not count again.
   one.calibration.set_knowledge({"range_near_m", 0.01, "calibrated"});
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  const PointingModel model = one.model();
   EXPECT_EQ(model.range_errors, one.calibration.range_errors);
   std::vector<std::string> expected = names;
   for (const char* own :
@@ -1147,7 +1117,7 @@ TEST(PointingModel, TakesRangeErrorsJointlyWithTheOthers) {
 TEST(PointingModel, ARangeErrorThatIsStatedCountsWhereTheCovarianceHasNone) {
   Case one(CalibrationReference::planes);
   one.calibration.set_knowledge({"range_per_decade_m", 0.001, "measured", 0.004});
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  const PointingModel model = one.model();
   ASSERT_EQ(model.factors.back().name, "range_per_decade_m");
   EXPECT_EQ(range_numbers(model.factors.back())[3], 0.004);  // with what was held
 }
@@ -1165,8 +1135,7 @@ TEST(PointingModel, RefusesNamesThatItDoesNotKnow) {
             correlated(typical_sigmas(one.calibration.covariance_names), 24);
         PointingOptions options;
         options.reported_directions = reported;
-        EXPECT_THAT(refusal([&] { pointing_model(one.calibration, one.belief, options); }),
-                    ::testing::HasSubstr(name));
+        EXPECT_THAT(refusal([&] { one.model(options); }), ::testing::HasSubstr(name));
       }
     }
   }
@@ -1206,19 +1175,10 @@ TEST(PointingModel, ASizeThatIsStatedCountsWhereTheCovarianceHasNone) {
   VectorXd sigma = typical_sigmas(one.calibration.covariance_names);
   sigma.tail(1) << 2e-3;
   one.calibration.covariance = correlated(sigma, 22);
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  const PointingModel model = one.model();
   EXPECT_EQ(model.sizes.size(), 2u);
   EXPECT_EQ(sigma_of_size(model, "prism_thickness_m"), 0.004);  // with what was held
   EXPECT_NEAR(sigma_of_size(model, "prism_spacing_a_m"), 2e-3, 1e-12);
-}
-
-// Everything that a preset states counts, also of what no recording tells.
-TEST(PointingModel, OfATypeTakenAtItsWordCountsWhatWasHeldToo) {
-  Case one(CalibrationReference::none);
-  one.calibration.set_knowledge({"wedge_angle_deg", 1e-4, "assumed"});
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
-  ASSERT_EQ(model.reference, CalibrationReference::planes);
-  EXPECT_THAT(names_of(model), ::testing::Contains("wedge_angle_deg"));
 }
 
 // Names that are no parameters of the beam have no factor.
@@ -1228,7 +1188,7 @@ TEST(PointingModel, LeavesOutSpeedsOfACalibration) {
   auto& names = one.calibration.covariance_names;
   names.insert(names.begin() + 1, "angular_velocity_a_deg_per_s");
   one.calibration.covariance = correlated(VectorXd::Constant(names.size(), 1e-3), 9);
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  const PointingModel model = one.model();
   EXPECT_EQ(std::ranges::count(names, "angular_velocity_a_deg_per_s"), 1);
   const auto factors = names_of(model);
   EXPECT_EQ(std::ranges::count(factors, "angular_velocity_a_deg_per_s"), 0);
@@ -1238,7 +1198,7 @@ TEST(PointingModel, LeavesOutSpeedsOfACalibration) {
 TEST(PointingModel, RefusesAnotherFaceOrder) {
   Case one(CalibrationReference::directions);
   one.belief.sensor.train = PrismTrain(parse_face_order("AP-PA"));
-  EXPECT_THAT(refusal([&] { pointing_model(one.calibration, one.belief, {}); }),
+  EXPECT_THAT(refusal([&] { one.model(); }),
               AllOf(::testing::HasSubstr("PA-AP"), ::testing::HasSubstr("AP-PA")));
 }
 
@@ -1259,13 +1219,8 @@ TEST(PointingModel, TakesACovarianceThatHasNoInverse) {
     MatrixXd from = MatrixXd::Identity(c.rows(), c.rows());
     from.row(dependent) = times;
     c = MatrixXd(from * c * from.transpose());
-    const PointingModel model = pointing_model(one.calibration, one.belief, {});
-    const MatrixXd beam = one.effect(one.calibration.covariance_names, true, false);
-    const MatrixXd angles = one.effect(one.free_names(), false, true);
-    MatrixXd stated =
-        beam * c * beam.transpose() + angles * one.belief.covariance * angles.transpose();
-    stated += geometry_variance(one.calibration, stated.rows());
-    expect_same_covariance(covariance_of_factors(model), stated);
+    const PointingModel model = one.model();
+    expect_same_covariance(covariance_of_factors(model), one.covariance_against_planes());
     const auto names = names_of(model);
     const std::string& name = one.calibration.covariance_names[dependent];
     EXPECT_EQ(std::ranges::count(names, name), 0);
@@ -1278,7 +1233,7 @@ TEST(PointingModel, RefusesMoreFactorsThanItCanHold) {
   const std::size_t many = 100;
   one.calibration.covariance_names.assign(many, "wedge_angle_a_deg");
   one.calibration.covariance = 1e-8 * MatrixXd::Identity(many, many);
-  EXPECT_THROW(pointing_model(one.calibration, one.belief, {}), InvalidArgument);
+  EXPECT_THROW(one.model(), InvalidArgument);
 }
 
 TEST(PointingModel, OfFourPrismsGivesPoints) {
@@ -1289,14 +1244,9 @@ TEST(PointingModel, OfFourPrismsGivesPoints) {
   one.set_free(estimation::default_free_names({4}), 23);
   one.calibration.covariance_names = estimation::default_free_names({4});
   one.calibration.covariance = correlated(typical_sigmas(one.calibration.covariance_names), 24);
-  const PointingModel model = pointing_model(one.calibration, one.belief, {});
+  const PointingModel model = one.model();
   EXPECT_EQ(model.factors.size(), one.belief.free.size() + 4 + 2);
-  const MatrixXd beam = one.effect(one.calibration.covariance_names, true, false);
-  const MatrixXd angles = one.effect(one.free_names(), false, true);
-  MatrixXd stated = beam * one.calibration.covariance * beam.transpose() +
-                    angles * one.belief.covariance * angles.transpose();
-  stated += geometry_variance(one.calibration, stated.rows());
-  expect_same_covariance(covariance_of_factors(model), stated);
+  expect_same_covariance(covariance_of_factors(model), one.covariance_against_planes());
   const PointedShots shots = random_shots(model, 11, 25);
   expect_points(model, shots, points_of(model, header_of(model), shots));
 }
@@ -1325,7 +1275,7 @@ TEST(PointingModel, AngleSensitivityTakesParameterErrorsOutOfThePoint) {
   PointingOptions options;
   for (const bool origin : {false, true}) {
     options.beam_origin = origin;
-    const PointingModel model = pointing_model(one.calibration, one.belief, options);
+    const PointingModel model = one.model(options);
     const Points points = points_of(model, header_of(model), shots);
     for (std::size_t j = 0; j < one.belief.free.size(); ++j) {
       EXPECT_LT(loading_of(points, j, 0).norm(), origin ? 1e-5 : 1e-11) << model.factors[j].name;
