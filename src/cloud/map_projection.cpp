@@ -90,6 +90,13 @@ std::optional<AreaOfUse> area_of(PJ_CONTEXT* context, const PJ* crs) {
                    radians_from_degrees(east), radians_from_degrees(north)};
 }
 
+Vector3d transformed(PJ* operation, PJ_DIRECTION direction, const Vector3d& place_m) {
+  proj_errno_reset(operation);
+  const PJ_COORD to =
+      proj_trans(operation, direction, proj_coord(place_m.x(), place_m.y(), place_m.z(), HUGE_VAL));
+  return {to.xyz.x, to.xyz.y, to.xyz.z};
+}
+
 }  // namespace
 
 double AreaOfUse::beyond(double latitude, double longitude) const {
@@ -227,11 +234,7 @@ MapProjection& MapProjection::operator=(MapProjection&&) noexcept = default;
 Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
   const std::lock_guard lock(state_->mutex);
   PJ* operation = state_->operation.get();
-  proj_errno_reset(operation);
-  const PJ_COORD to =
-      proj_trans(operation, PJ_FWD,
-                 proj_coord(geocentric_m.x(), geocentric_m.y(), geocentric_m.z(), HUGE_VAL));
-  Vector3d mapped(to.xyz.x, to.xyz.y, to.xyz.z);
+  const Vector3d mapped = transformed(operation, PJ_FWD, geocentric_m);
   if (!mapped.allFinite()) {
     throw InvalidArgument(
         fmt::format("{} is not defined at the place x = {:.3f}, y = {:.3f}, z = {:.3f} m "
@@ -246,11 +249,7 @@ Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
 
 Vector3d MapProjection::unproject(const Vector3d& on_map_m) const {
   const std::lock_guard lock(state_->mutex);
-  PJ* operation = state_->operation.get();
-  proj_errno_reset(operation);
-  const PJ_COORD from =
-      proj_trans(operation, PJ_INV, proj_coord(on_map_m.x(), on_map_m.y(), on_map_m.z(), HUGE_VAL));
-  Vector3d place(from.xyz.x, from.xyz.y, from.xyz.z);
+  const Vector3d place = transformed(state_->operation.get(), PJ_INV, on_map_m);
   if (!place.allFinite()) {
     throw InvalidArgument(fmt::format("{} has no place with the coordinates {:.3f}, {:.3f}, {:.3f}",
                                       state_->name, on_map_m.x(), on_map_m.y(), on_map_m.z()));

@@ -151,8 +151,6 @@ class RosbagWriter final : public CloudWriter {
   }
 
   void write(const Points& points) override {
-    require_usable();
-    failed_ = true;  // unless all goes well
     const std::size_t step = point_bytes();
     records_.resize(points.size() * step);
     packer_.pack(points, records_.data(), step);
@@ -178,11 +176,9 @@ class RosbagWriter final : public CloudWriter {
     }
     take(points.size());
     points_ += points.size();
-    failed_ = false;
   }
 
   void close() override {
-    require_usable();
     put_message();
     call([this] { bag_->close(); });
     output_.commit();
@@ -211,11 +207,6 @@ class RosbagWriter final : public CloudWriter {
         fmt::format("{}: time of point {} = {} s, allowed in a ROS 1 bag up to {} s after {} s",
                     output_.path(), point, time / kNanoseconds, kLast,
                     -static_cast<double>(*shift_) / static_cast<double>(kNanoseconds)));
-  }
-
-  void require_usable() const {
-    if (!bag_ || failed_)
-      throw FileError(output_.path(), {}, "cannot be written: it failed before");
   }
 
   void put_message() {
@@ -274,7 +265,6 @@ class RosbagWriter final : public CloudWriter {
   PointCloudMessage message_;
   std::optional<std::int64_t> begin_;   ///< time of the first point of message_, ns
   std::optional<std::uint64_t> shift_;  ///< from the recording's clock to the bag's, ns
-  bool failed_ = false;
   std::uint64_t points_ = 0;
   std::uint32_t messages_ = 0;
 };

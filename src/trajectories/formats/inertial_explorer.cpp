@@ -21,35 +21,31 @@
 namespace risley::trajectories {
 namespace {
 
-struct ExplorerName {
-  std::string_view name;  ///< in lower case
-  PoseField field;
-};
-
-constexpr std::array kExplorerNames{
-    ExplorerName{"week", PoseField::gps_week},
-    ExplorerName{"gpsweek", PoseField::gps_week},
-    ExplorerName{"date", PoseField::date},
-    ExplorerName{"gpsdate", PoseField::date},
-    ExplorerName{"gpstime", PoseField::time},
-    ExplorerName{"corrtime", PoseField::time},
-    ExplorerName{"latitude", PoseField::latitude},
-    ExplorerName{"longitude", PoseField::longitude},
-    ExplorerName{"h-ell", PoseField::height},
-    ExplorerName{"roll", PoseField::roll},
-    ExplorerName{"pitch", PoseField::pitch},
-    ExplorerName{"heading", PoseField::heading},
-    ExplorerName{"veast", PoseField::velocity_1},
-    ExplorerName{"vnorth", PoseField::velocity_2},
-    ExplorerName{"vup", PoseField::velocity_3},
-    ExplorerName{"sdnorth", PoseField::sigma_north},
-    ExplorerName{"sdeast", PoseField::sigma_east},
-    ExplorerName{"sdheight", PoseField::sigma_down},
-    ExplorerName{"sdup", PoseField::sigma_down},
-    ExplorerName{"rollsd", PoseField::sigma_roll},
-    ExplorerName{"pitchsd", PoseField::sigma_pitch},
-    ExplorerName{"hdngsd", PoseField::sigma_heading},
-    ExplorerName{"headingsd", PoseField::sigma_heading},
+/// In lower case.
+constexpr FieldName kFieldNames[] = {
+    {"week", PoseField::gps_week},
+    {"gpsweek", PoseField::gps_week},
+    {"date", PoseField::date},
+    {"gpsdate", PoseField::date},
+    {"gpstime", PoseField::time},
+    {"corrtime", PoseField::time},
+    {"latitude", PoseField::latitude},
+    {"longitude", PoseField::longitude},
+    {"h-ell", PoseField::height},
+    {"roll", PoseField::roll},
+    {"pitch", PoseField::pitch},
+    {"heading", PoseField::heading},
+    {"veast", PoseField::velocity_1},
+    {"vnorth", PoseField::velocity_2},
+    {"vup", PoseField::velocity_3},
+    {"sdnorth", PoseField::sigma_north},
+    {"sdeast", PoseField::sigma_east},
+    {"sdheight", PoseField::sigma_down},
+    {"sdup", PoseField::sigma_down},
+    {"rollsd", PoseField::sigma_roll},
+    {"pitchsd", PoseField::sigma_pitch},
+    {"hdngsd", PoseField::sigma_heading},
+    {"headingsd", PoseField::sigma_heading},
 };
 
 constexpr std::size_t kLongestHeader = 200;  // lines
@@ -278,7 +274,7 @@ Trajectory read_explorer(const std::string& path, const Progress& progress) {
   for (std::size_t i = 0; i < header.names.size(); ++i) {
     PoseColumn column;
     column.name = io::printable(header.names[i]);
-    for (const ExplorerName& known : kExplorerNames) {
+    for (const FieldName& known : kFieldNames) {
       if (known.name != header.names[i]) continue;
       const bool second_time = known.name == "corrtime" && has_gps_time;
       if (second_time || has_field(table.columns, known.field)) continue;

@@ -46,6 +46,12 @@ enum class PoseField : std::uint8_t {
   count,
 };
 
+/// How a format calls what a column holds.
+struct FieldName {
+  std::string_view name;
+  PoseField field;
+};
+
 /// In which order a date has year, month and day.
 enum class DateOrder : std::uint8_t { ymd, mdy, dmy };
 

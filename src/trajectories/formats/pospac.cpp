@@ -20,30 +20,26 @@
 namespace risley::trajectories {
 namespace {
 
-struct PospacName {
-  std::string_view name;  ///< in lower case
-  PoseField field;
-};
-
-constexpr std::array kPospacNames{
-    PospacName{"time", PoseField::time},
-    PospacName{"latitude", PoseField::latitude},
-    PospacName{"lat", PoseField::latitude},
-    PospacName{"longitude", PoseField::longitude},
-    PospacName{"long", PoseField::longitude},
-    PospacName{"ellipsoid height", PoseField::height},
-    PospacName{"roll", PoseField::roll},
-    PospacName{"pitch", PoseField::pitch},
-    PospacName{"heading", PoseField::heading},
-    PospacName{"east velocity", PoseField::velocity_1},
-    PospacName{"north velocity", PoseField::velocity_2},
-    PospacName{"up velocity", PoseField::velocity_3},
-    PospacName{"north sd", PoseField::sigma_north},
-    PospacName{"east sd", PoseField::sigma_east},
-    PospacName{"height sd", PoseField::sigma_down},
-    PospacName{"roll sd", PoseField::sigma_roll},
-    PospacName{"pitch sd", PoseField::sigma_pitch},
-    PospacName{"heading sd", PoseField::sigma_heading},
+/// In lower case.
+constexpr FieldName kFieldNames[] = {
+    {"time", PoseField::time},
+    {"latitude", PoseField::latitude},
+    {"lat", PoseField::latitude},
+    {"longitude", PoseField::longitude},
+    {"long", PoseField::longitude},
+    {"ellipsoid height", PoseField::height},
+    {"roll", PoseField::roll},
+    {"pitch", PoseField::pitch},
+    {"heading", PoseField::heading},
+    {"east velocity", PoseField::velocity_1},
+    {"north velocity", PoseField::velocity_2},
+    {"up velocity", PoseField::velocity_3},
+    {"north sd", PoseField::sigma_north},
+    {"east sd", PoseField::sigma_east},
+    {"height sd", PoseField::sigma_down},
+    {"roll sd", PoseField::sigma_roll},
+    {"pitch sd", PoseField::sigma_pitch},
+    {"heading sd", PoseField::sigma_heading},
 };
 
 std::vector<std::string> pospac_names(std::string_view line) {
@@ -112,7 +108,7 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
   for (const std::string& name : pospac_names(names)) {
     PoseColumn column;
     column.name = io::printable(name);
-    for (const PospacName& known : kPospacNames) {
+    for (const FieldName& known : kFieldNames) {
       if (known.name == name && !has_field(table.columns, known.field)) column.field = known.field;
     }
     // "H" behind the longitude, where the other height has another name.
