@@ -163,6 +163,25 @@ TEST(DirectionErrors, RefuseWhatCannotBeCompared) {
   EXPECT_THROW(direction_errors(Bundle(10, {kNaN, kNaN, kNaN}), beams), InvalidArgument);
 }
 
+/// Root of a covariance with some correlation, of the size of a calibration's.
+Eigen::MatrixXd some_root(Index n) {
+  Eigen::MatrixXd root(n, n);
+  const RandomStream entries(7, 1);
+  for (Index i = 0; i < n; ++i) {
+    for (Index j = 0; j < n; ++j) {
+      root(i, j) = 2e-5 * entries.normal(static_cast<std::uint64_t>(i * n + j));
+    }
+  }
+  return root;
+}
+
+Eigen::VectorXd white_noise(const RandomStream& draws, int draw, Index n) {
+  Eigen::VectorXd white(n);
+  draws.fill_normal(static_cast<std::uint64_t>(draw * n),
+                    {white.data(), static_cast<std::size_t>(n)});
+  return white;
+}
+
 /// Against draws from the covariance, each measured with the errors above.
 TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   constexpr int kDraws = 5000;
@@ -174,14 +193,7 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   names.push_back("refractive_index");  // of two places
   const auto free = estimation::free_parameters(names, {2});
   const Index n = free.size();
-  // Some correlation, of the size of a calibration.
-  Eigen::MatrixXd root(n, n);
-  const RandomStream entries(7, 1);
-  for (Index i = 0; i < n; ++i) {
-    for (Index j = 0; j < n; ++j) {
-      root(i, j) = 2e-5 * entries.normal(static_cast<std::uint64_t>(i * n + j));
-    }
-  }
+  Eigen::MatrixXd root = some_root(n);
   root.row(n - 1) *= 0.3;
   const Eigen::MatrixXd covariance = root * root.transpose();
   const auto angles = some_angles(80, 4);
@@ -191,11 +203,8 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   const RandomStream draws(8, 1);
   double roll = 0, pitch = 0, yaw = 0, gauge = 0, shape = 0, total = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    Eigen::VectorXd white(n);
-    draws.fill_normal(static_cast<std::uint64_t>(draw * n),
-                      {white.data(), static_cast<std::size_t>(n)});
     PrismTrain off = shared;
-    add_errors(off, free, root * white);
+    add_errors(off, free, root * white_noise(draws, draw, n));
     const DirectionErrors errors = direction_errors(beams_of(off, angles), truth);
     roll += errors.rotation.x * errors.rotation.x / kDraws;
     pitch += errors.rotation.y * errors.rotation.y / kDraws;
@@ -282,13 +291,7 @@ TEST(PointingError, ScatterOverDrawsAsTheirSigmasSay) {
   const PrismTrain truth = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
   const Index n = free.size();
-  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(n, n);
-  const RandomStream entries(7, 1);
-  for (Index i = 0; i < n; ++i) {
-    for (Index j = 0; j < n; ++j) {
-      root(i, j) = 2e-5 * entries.normal(static_cast<std::uint64_t>(i * n + j));
-    }
-  }
+  const Eigen::MatrixXd root = some_root(n);
   const Eigen::MatrixXd covariance = root * root.transpose();
   const auto angles = some_angles(80, 4);
   PrismTrain believed = truth;
@@ -304,11 +307,8 @@ TEST(PointingError, ScatterOverDrawsAsTheirSigmasSay) {
   const RandomStream draws(8, 1);
   double total = 0, gauge = 0, shape = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    Eigen::VectorXd white(n);
-    draws.fill_normal(static_cast<std::uint64_t>(draw * n),
-                      {white.data(), static_cast<std::size_t>(n)});
     PrismTrain found = truth;
-    add_errors(found, free, root * white);
+    add_errors(found, free, root * white_noise(draws, draw, n));
     const DirectionErrors errors =
         BeamBundle(found, free, angles).pointing_error(believed, covariance).errors;
     total += std::pow(errors.total - known.total, 2) / kDraws;
@@ -337,11 +337,8 @@ TEST(PointingError, TellHowProbablyACalibrationIsBetter) {
     const Bundle reported = beams_of(believed, angles);
     double better = 0;
     for (int draw = 0; draw < kDraws; ++draw) {
-      Eigen::VectorXd white(n);
-      draws.fill_normal(static_cast<std::uint64_t>(draw * n),
-                        {white.data(), static_cast<std::size_t>(n)});
       PrismTrain truth = found;
-      add_errors(truth, free, sigma * white);
+      add_errors(truth, free, sigma * white_noise(draws, draw, n));
       const Bundle beams = beams_of(truth, angles);
       better += direction_errors(calibrated, beams).total < direction_errors(reported, beams).total;
     }

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "risley/cloud/cloud_writer.hpp"
 #include "risley/cloud/points.hpp"
 
@@ -35,7 +37,7 @@ std::vector<CloudCase> cloud_cases();
 Points make_points(const CloudCase& one);
 
 /// Points [first, first + count).
-Points slice(const CloudHeader& header, const Points& points, std::size_t first, std::size_t count);
+Points slice(const Points& points, std::size_t first, std::size_t count);
 
 /// Writes a whole cloud in pieces of uneven lengths, the first and some others empty.
 void write_uneven(const std::string& path, const std::string& format, const CloudHeader& header,
@@ -80,6 +82,16 @@ class TestFolder {
 
  private:
   std::string path_;
+};
+
+/// A cloud that a format is written with, and what a file of it has to hold.
+class CloudTest : public ::testing::TestWithParam<CloudCase> {
+ protected:
+  const CloudHeader& header() const { return GetParam().header; }
+
+  TestFolder folder_;
+  Points points_ = make_points(GetParam());
+  TestTable expected_ = expected_table(header(), points_);
 };
 
 /// A Python that has a module; empty when there is none.

@@ -17,6 +17,7 @@
 #include "risley/cloud/cloud_writer.hpp"
 #include "risley/core/error.hpp"
 
+#include "cloud/cloud_samples.hpp"
 #include "cloud/file_size_limit.hpp"
 #include "cloud/las_checker.hpp"
 
@@ -105,33 +106,6 @@ Points random_points(const CloudHeader& header, std::size_t rows, unsigned seed 
     if (i % 7 == 3) points.incidence[i] = std::numeric_limits<double>::quiet_NaN();
   }
   return points;
-}
-
-template <class Column>
-Column part(const Column& column, std::size_t first, std::size_t rows) {
-  if (column.empty()) return {};
-  const auto begin = column.begin() + first;
-  return Column(begin, begin + rows);
-}
-
-Points slice(const Points& points, std::size_t first, std::size_t rows) {
-  Points piece = points;
-  const auto cut = [=](auto& column) { column = part(column, first, rows); };
-  cut(piece.time_ns);
-  for (auto* column : {&piece.x, &piece.y, &piece.z, &piece.range, &piece.incidence,
-                       &piece.azimuth_residual, &piece.zenith_residual}) {
-    cut(*column);
-  }
-  for (auto& column : piece.covariance) cut(column);
-  for (auto& column : piece.rotation_angle) cut(column);
-  for (auto* column : {&piece.intensity, &piece.return_number, &piece.number_of_returns, &piece.tag,
-                       &piece.beam}) {
-    cut(*column);
-  }
-  for (auto& factor : piece.loading) {
-    for (auto& column : factor) cut(column);
-  }
-  return piece;
 }
 
 class LasTest : public ::testing::Test {

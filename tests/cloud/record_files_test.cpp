@@ -16,14 +16,7 @@
 
 namespace risley::cloud::record_files_test {
 
-class RecordFiles : public ::testing::TestWithParam<CloudCase> {
- protected:
-  const CloudHeader& header() const { return GetParam().header; }
-
-  TestFolder folder_;
-  Points points_ = make_points(GetParam());
-  TestTable expected_ = expected_table(header(), points_);
-};
+class RecordFiles : public CloudTest {};
 
 INSTANTIATE_TEST_SUITE_P(Clouds, RecordFiles, ::testing::ValuesIn(cloud_cases()),
                          [](const auto& one) { return one.param.name; });

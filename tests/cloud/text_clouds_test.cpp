@@ -14,14 +14,7 @@
 
 namespace risley::cloud::text_clouds_test {
 
-class TextClouds : public ::testing::TestWithParam<CloudCase> {
- protected:
-  const CloudHeader& header() const { return GetParam().header; }
-
-  TestFolder folder_;
-  Points points_ = make_points(GetParam());
-  TestTable expected_ = expected_table(header(), points_);
-};
+class TextClouds : public CloudTest {};
 
 INSTANTIATE_TEST_SUITE_P(Clouds, TextClouds, ::testing::ValuesIn(cloud_cases()),
                          [](const auto& one) { return one.param.name; });

@@ -48,10 +48,28 @@ std::string fault(const std::string& text, const std::string& name = "a.txt") {
   });
 }
 
-/// Rows of the flight by a function of the time.
-std::string rows(int count, const std::function<std::string(double)>& row) {
+/// The flight at a time, s, angles in degrees.
+struct FlightRow {
+  double t, latitude, longitude, height, roll, pitch, heading;
+  Vector3d velocity_ned;
+
+  explicit FlightRow(double time, const KnownFlight& flight = {}) : t(time) {
+    const Geodetic place = flight.place(t);
+    const RollPitchHeading angles = flight.angles(t);
+    latitude = degrees_from_radians(place.latitude);
+    longitude = degrees_from_radians(place.longitude);
+    height = place.height;
+    roll = degrees_from_radians(angles.roll);
+    pitch = degrees_from_radians(angles.pitch);
+    heading = degrees_from_radians(angles.heading);
+    velocity_ned = flight.velocity_ned(t);
+  }
+};
+
+/// Rows of the flight.
+std::string rows(int count, const std::function<std::string(const FlightRow&)>& row) {
   std::string text;
-  for (int i = 0; i < count; ++i) text += row(KnownFlight::kStep * i) + "\n";
+  for (int i = 0; i < count; ++i) text += row(FlightRow(KnownFlight::kStep * i)) + "\n";
   return text;
 }
 
@@ -95,7 +113,6 @@ const std::string kExplorerHead =
     "\n";
 
 std::string explorer_text(int count, bool sexagesimal_places) {
-  const KnownFlight flight;
   std::string text = kExplorerHead;
   text +=
       "  GPSTime      Latitude       Longitude     H-Ell  VEast VNorth  VUp  SDNorth SDEast "
@@ -106,20 +123,15 @@ std::string explorer_text(int count, bool sexagesimal_places) {
       sexagesimal_places ? "(+/-D M S)" : "(Deg)");
   text.back() = ' ';
   text += "(none)\n\n";
-  text += rows(count, [&](double t) {
-    const Geodetic place = flight.place(t);
-    const double latitude = degrees_from_radians(place.latitude);
-    const double longitude = degrees_from_radians(place.longitude);
-    const RollPitchHeading angles = flight.angles(t);
-    const Vector3d v = flight.velocity_ned(t);
+  text += rows(count, [&](const FlightRow& f) {
+    const Vector3d& v = f.velocity_ned;
     return fmt::format(
         "{:.4f} {} {} {:.4f} {:.4f} {:.4f} {:.4f} 0.011 0.012 0.023 {:.8f} 0.004 {:.8f} 0.005 "
         "{:.8f} 0.021 1",
-        KnownFlight::kBegin + t,
-        sexagesimal_places ? sexagesimal(latitude) : fmt::format("{:.10f}", latitude),
-        sexagesimal_places ? sexagesimal(longitude) : fmt::format("{:.10f}", longitude),
-        place.height, v.y(), v.x(), -v.z(), degrees_from_radians(angles.roll),
-        degrees_from_radians(angles.pitch), degrees_from_radians(angles.heading));
+        KnownFlight::kBegin + f.t,
+        sexagesimal_places ? sexagesimal(f.latitude) : fmt::format("{:.10f}", f.latitude),
+        sexagesimal_places ? sexagesimal(f.longitude) : fmt::format("{:.10f}", f.longitude),
+        f.height, v.y(), v.x(), -v.z(), f.roll, f.pitch, f.heading);
   });
   return text;
 }
@@ -206,18 +218,13 @@ const std::string kPospacHead =
     "\n";
 
 std::string pospac_text(int count) {
-  const KnownFlight flight;
-  return kPospacHead + rows(count, [&](double t) {
-           const Geodetic place = flight.place(t);
-           const RollPitchHeading angles = flight.angles(t);
-           const Vector3d v = flight.velocity_ned(t);
+  return kPospacHead + rows(count, [&](const FlightRow& f) {
+           const Vector3d& v = f.velocity_ned;
            return fmt::format(
                "{:.4f} 0.000 500000.0 4190000.0 {:.4f} {:.10f} {:.10f} {:.4f} {:.8f} {:.8f} {:.8f} "
                "{:.5f} {:.5f} {:.5f} 0.012 0.011 0.023 0.004 0.005 0.021",
-               KnownFlight::kBegin + t, place.height, degrees_from_radians(place.latitude),
-               degrees_from_radians(place.longitude), place.height,
-               degrees_from_radians(angles.roll), degrees_from_radians(angles.pitch),
-               degrees_from_radians(angles.heading), v.y(), v.x(), -v.z());
+               KnownFlight::kBegin + f.t, f.height, f.latitude, f.longitude, f.height, f.roll,
+               f.pitch, f.heading, v.y(), v.x(), -v.z());
          });
 }
 
@@ -242,21 +249,16 @@ TEST(Pospac, MistakesAreNamed) {
 }
 
 std::string openmms_text(int count, bool real_time = false) {
-  const KnownFlight flight;
   const std::string head =
       real_time ? "\n"
                 : "UTM North,Zone 13,WGS84,WGS 84,2020.5,0,0,0,0,0,0,1,2,3,0,0,0,0,0,0,0,0,0\n";
-  return head + rows(count, [&](double t) {
-           const Geodetic place = flight.place(t);
-           const RollPitchHeading angles = flight.angles(t);
-           const Vector3d v = real_time ? Vector3d(0, 0, 0) : flight.velocity_ned(t);
+  return head + rows(count, [&](const FlightRow& f) {
+           const Vector3d v = real_time ? Vector3d(0, 0, 0) : f.velocity_ned;
            return fmt::format(
                "{:.6f},{:.8f},{:.8f},{:.4f},-21.500,{:.4f},{:.4f},{:.4f},0.100,0.200,9.800,1.000,"
                "{:.2f},{:.2f},{:.2f}",
-               40000 + t, degrees_from_radians(place.latitude),
-               degrees_from_radians(place.longitude), place.height,
-               degrees_from_radians(angles.roll), degrees_from_radians(angles.pitch),
-               degrees_from_radians(angles.heading), v.y(), v.x(), -v.z());
+               40000 + f.t, f.latitude, f.longitude, f.height, f.roll, f.pitch, f.heading, v.y(),
+               v.x(), -v.z());
          });
 }
 
@@ -296,17 +298,12 @@ const std::string kCsvHead =
     "heading_deg,velocity_north_m_per_s,velocity_east_m_per_s,velocity_up_m_per_s";
 
 std::string csv_text(int count, const std::string& head = kCsvHead) {
-  const KnownFlight flight;
-  return head + "\n" + rows(count, [&](double t) {
-           const Geodetic place = flight.place(t);
-           const RollPitchHeading angles = flight.angles(t);
-           const Vector3d v = flight.velocity_ned(t);
+  return head + "\n" + rows(count, [&](const FlightRow& f) {
+           const Vector3d& v = f.velocity_ned;
            return fmt::format(
                "{:.4f},{:.12f},{:.12f},{:.6f},{:.9f},{:.9f},{:.9f},{:.6f},{:.6f},{:.6f}",
-               KnownFlight::kBegin + t, degrees_from_radians(place.latitude),
-               degrees_from_radians(place.longitude), place.height,
-               degrees_from_radians(angles.roll), degrees_from_radians(angles.pitch),
-               degrees_from_radians(angles.heading), v.x(), v.y(), -v.z());
+               KnownFlight::kBegin + f.t, f.latitude, f.longitude, f.height, f.roll, f.pitch,
+               f.heading, v.x(), v.y(), -v.z());
          });
 }
 
