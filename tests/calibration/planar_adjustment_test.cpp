@@ -942,42 +942,31 @@ TEST(PlanarAdjustment, ReportsItsProgress) {
 
 TEST(PlanarAdjustment, RefusesWhatMakesNoSense) {
   const PlanarProblem sound = everything({});
-  const auto with = [&](const std::function<void(PlanarProblem&)>& spoil) {
+  const std::function<void(PlanarProblem&)> damages[] = {
+      [](auto& p) {
+        p.free.clear();
+        p.prior_sigma.clear();
+      },
+      [](auto& p) { p.views[1].shots = nullptr; },
+      [](auto& p) { p.views[1].shots = std::make_shared<const RangedShots>(); },
+      [](auto& p) { p.prior_sigma.pop_back(); },
+      [](auto& p) { p.views[0].wall = 2; },
+      [](auto& p) { p.views[0].recording = 2; },
+      [](auto& p) { p.views[0].range_variance = 0; },
+      [](auto& p) { p.prior_sigma[0] = 0; },
+      [](auto& p) { p.considered = p.free; },  // without a covariance
+      [](auto& p) { p.mean_angle_covariance.assign(2, Eigen::MatrixXd::Zero(1, 1)); },
+      [](auto& p) { p.angle_sensitivity.assign(2, Eigen::MatrixXd::Zero(5, 1)); }};
+  for (std::size_t i = 0; i < std::size(damages); ++i) {
     PlanarProblem p = sound;
-    spoil(p);
-    return p;
-  };
-  EXPECT_THROW(adjust(with([](auto& p) { p.views.clear(); })), EstimationError);
-  EXPECT_THROW(adjust(with([](auto& p) {
-                 p.free.clear();
-                 p.prior_sigma.clear();
-               })),
-               InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.views[1].shots = nullptr; })), InvalidArgument);
-  EXPECT_THROW(
-      adjust(with([](auto& p) { p.views[1].shots = std::make_shared<const RangedShots>(); })),
-      InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.prior_sigma.pop_back(); })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.views[0].wall = 2; })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.views[0].recording = 2; })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.views[0].range_variance = 0; })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.prior_sigma[0] = 0; })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) {
-                 p.considered = p.free;
-                 p.considered_covariance.resize(0, 0);
-               })),
-               InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) {
-                 p.mean_angle_covariance.assign(p.stations.size(), Eigen::MatrixXd::Zero(1, 1));
-               })),
-               InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) {
-                 p.angle_sensitivity.assign(p.stations.size(), Eigen::MatrixXd::Zero(5, 1));
-               })),
-               InvalidArgument);
-  // A wall that stands behind the sensor is met by no shot.
-  EXPECT_THROW(adjust(with([](auto& p) { p.walls[0].normal = -p.walls[0].normal; })),
-               EstimationError);
+    damages[i](p);
+    EXPECT_THROW(adjust(p), InvalidArgument) << i;
+  }
+  PlanarProblem empty = sound, behind = sound;
+  empty.views.clear();
+  EXPECT_THROW(adjust(empty), EstimationError);
+  behind.walls[0].normal = -behind.walls[0].normal;  // met by no shot
+  EXPECT_THROW(adjust(behind), EstimationError);
 }
 
 TEST(PlanarAdjustment, LostShotsAddNoRedundancy) {
