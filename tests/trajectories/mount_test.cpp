@@ -202,62 +202,49 @@ TEST(Mount, RoundedMatricesBecomeRotations) {
   EXPECT_NEAR(mount.nominal(0, 0), std::sin(radians_from_degrees(15)), 5e-5);
 }
 
-struct Mistake {
-  const char* name;
-  const char *what, *by;
-  std::uint64_t line;
-  const char* message;
-};
-
-class MountMistake : public ::testing::TestWithParam<Mistake> {};
-
-TEST_P(MountMistake, IsNamedWithItsLine) {
-  const Mistake& mistake = GetParam();
-  EXPECT_THAT(line_and_problem([&] {
-                parse_mount(replaced(kHexacopter, mistake.what, mistake.by), "mount.yaml");
-              }),
-              AllOf(StartsWith(std::to_string(mistake.line) + ": "), HasSubstr(mistake.message)));
+TEST(Mount, MistakesAreNamedWithTheirLine) {
+  constexpr const char* kAxes = "sensor_axes: {x: down, y: left, z: forward, source: drawing}";
+  struct Mistake {
+    const char *what, *by;
+    int line;
+    const char* message;
+  };
+  const Mistake mistakes[] = {
+      {"risley_mount: 1", "mount: 1", 1, "is not a mount of a sensor"},
+      {"risley_mount: 1", "risley_mount: 2", 1, "risley_mount = 2"},
+      {"lever_arm:", "lever_arms:", 9, "did you mean lever_arm?"},
+      {"x_deg:", "x_rad:", 6, "unknown field boresight.x_rad"},
+      {"value: 0.1,", "", 10, "lever_arm.x_m.value is missing"},
+      {"sigma: 0.002, ", "", 13, "clock_offset_s.sigma is missing"},
+      {"sigma: 0.002", "sigma: -1", 13, "sigma = -1 s, allowed 0"},
+      {"source: GPS less UTC", "source: \"\"", 13, "source is empty"},
+      {"value: 0.2", "value: 90", 6, "x_deg.value = 90 deg, allowed -45"},
+      {"value: 0.12", "value: 1200", 12, "allowed -1000 to 1000"},
+      {"value: 0.12", "value: .nan", 12, "finite number"},
+      {"reference_point: centre of the IMU\n", "", 1, "reference_point is missing"},
+      {"x: down", "x: donw", 4, "did you mean down?"},
+      {"z: forward", "z: backward", 4,
+       "left-handed: where x points down and y left, z points forward"},
+      {"y: left", "y: up", 4, "same line"},
+      {kAxes, "", 1, "body_from_sensor may be given instead"},
+      {kAxes,
+       "sensor_axes: {x: down, y: left, z: forward, source: a}\n"
+       "body_from_sensor: {matrix: [[1,0,0],[0,1,0],[0,0,1]], source: a}",
+       5, "expected only one of them"},
+      {kAxes, "body_from_sensor: {matrix: [[1,0,0],[0,1,0],[0,0,-1]], source: a}", 4,
+       "mirror image"},
+      {kAxes, "body_from_sensor: {matrix: [[1,0,0],[0,1,0.1],[0,0,1]], source: a}", 4,
+       "is not a rotation"},
+      {kAxes, "body_from_sensor: {matrix: [[1,0,0],[0,57,0],[0,0,1]], source: a}", 4,
+       "matrix[1][1] = 57, allowed -1 to 1"},
+      {kAxes, "body_from_sensor: {matrix: [[1,0,0],[0,1]], source: a}", 4, "3 rows of 3 numbers"},
+      {kAxes, "body_from_sensor: {matrix: [[1,0],[0,1],[0,0]], source: a}", 4,
+       "3 rows of 3 numbers"}};
+  for (const auto& [what, by, line, message] : mistakes) {
+    EXPECT_THAT(
+        line_and_problem([&] { parse_mount(replaced(kHexacopter, what, by), "mount.yaml"); }),
+        AllOf(StartsWith(std::to_string(line) + ": "), HasSubstr(message)));
+  }
 }
-
-constexpr const char* kAxes = "sensor_axes: {x: down, y: left, z: forward, source: drawing}";
-
-INSTANTIATE_TEST_SUITE_P(
-    Schema, MountMistake,
-    ::testing::Values(
-        Mistake{"NoMount", "risley_mount: 1", "mount: 1", 1, "is not a mount of a sensor"},
-        Mistake{"LaterVersion", "risley_mount: 1", "risley_mount: 2", 1, "risley_mount = 2"},
-        Mistake{"WrongKey", "lever_arm:", "lever_arms:", 9, "did you mean lever_arm?"},
-        Mistake{"WrongUnit", "x_deg:", "x_rad:", 6, "unknown field boresight.x_rad"},
-        Mistake{"MissingValue", "value: 0.1,", "", 10, "lever_arm.x_m.value is missing"},
-        Mistake{"MissingSigma", "sigma: 0.002, ", "", 13, "clock_offset_s.sigma is missing"},
-        Mistake{"NegativeSigma", "sigma: 0.002", "sigma: -1", 13, "sigma = -1 s, allowed 0"},
-        Mistake{"EmptySource", "source: GPS less UTC", "source: \"\"", 13, "source is empty"},
-        Mistake{"HugeBoresight", "value: 0.2", "value: 90", 6, "x_deg.value = 90 deg, allowed -45"},
-        Mistake{"MillimetresAsMetres", "value: 0.12", "value: 1200", 12, "allowed -1000 to 1000"},
-        Mistake{"NotANumber", "value: 0.12", "value: .nan", 12, "finite number"},
-        Mistake{"NoPoint", "reference_point: centre of the IMU\n", "", 1,
-                "reference_point is missing"},
-        Mistake{"WrongWord", "x: down", "x: donw", 4, "did you mean down?"},
-        Mistake{"LeftHanded", "z: forward", "z: backward", 4,
-                "left-handed: where x points down and y left, z points forward"},
-        Mistake{"AxisTwice", "y: left", "y: up", 4, "same line"},
-        Mistake{"NoAxes", kAxes, "", 1, "body_from_sensor may be given instead"},
-        Mistake{"Both", kAxes,
-                "sensor_axes: {x: down, y: left, z: forward, source: a}\n"
-                "body_from_sensor: {matrix: [[1,0,0],[0,1,0],[0,0,1]], source: a}",
-                5, "expected only one of them"},
-        Mistake{"Mirror", kAxes,
-                "body_from_sensor: {matrix: [[1,0,0],[0,1,0],[0,0,-1]], source: a}", 4,
-                "mirror image"},
-        Mistake{"NoRotation", kAxes,
-                "body_from_sensor: {matrix: [[1,0,0],[0,1,0.1],[0,0,1]], source: a}", 4,
-                "is not a rotation"},
-        Mistake{"Entry", kAxes, "body_from_sensor: {matrix: [[1,0,0],[0,57,0],[0,0,1]], source: a}",
-                4, "matrix[1][1] = 57, allowed -1 to 1"},
-        Mistake{"Size", kAxes, "body_from_sensor: {matrix: [[1,0,0],[0,1]], source: a}", 4,
-                "3 rows of 3 numbers"},
-        Mistake{"RowSize", kAxes, "body_from_sensor: {matrix: [[1,0],[0,1],[0,0]], source: a}", 4,
-                "3 rows of 3 numbers"}),
-    [](const auto& each) { return std::string(each.param.name); });
 
 }  // namespace risley::trajectories::mount_test
