@@ -5,14 +5,12 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <random>
 #include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "risley/cloud/cloud_writer.hpp"
 #include "risley/core/error.hpp"
@@ -29,53 +27,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr double kPi = 3.14159265358979323846;
-
-/// What a file's extra bytes must hold, worked out apart from the writer.
-struct Expected {
-  std::string name;
-  std::function<double(const Points&, std::size_t)> value;
-};
-
-std::vector<Expected> expected_floats(const CloudHeader& header) {
-  std::vector<Expected> list;
-  const auto degrees = [](double radians) { return radians * (180.0 / kPi); };
-  if (header.has_covariance) {
-    const std::pair<const char*, int> terms[] = {{"VarianceX", 0},    {"VarianceY", 3},
-                                                 {"VarianceZ", 5},    {"CovarianceXY", 1},
-                                                 {"CovarianceXZ", 2}, {"CovarianceYZ", 4}};
-    const std::pair<const char*, int> deviations[] = {{"StdX", 0}, {"StdY", 3}, {"StdZ", 5}};
-    for (const auto& [name, term] : deviations) {
-      list.push_back({name, [term = static_cast<std::size_t>(term)](const Points& p, auto i) {
-                        return std::sqrt(p.covariance[term][i]);
-                      }});
-    }
-    for (const auto& [name, term] : terms) {
-      list.push_back({name, [term = static_cast<std::size_t>(term)](const Points& p, auto i) {
-                        return p.covariance[term][i];
-                      }});
-    }
-  }
-  list.push_back({"LidarRange", [](const Points& p, auto i) { return p.range[i]; }});
-  list.push_back(
-      {"IncidenceAngle", [=](const Points& p, auto i) { return degrees(p.incidence[i]); }});
-  if (header.has_rotation_angles) {
-    for (std::size_t k = 0; k < static_cast<std::size_t>(header.prisms); ++k) {
-      list.push_back({"PrismAngle" + std::to_string(k + 1),
-                      [=](const Points& p, auto i) { return degrees(p.rotation_angle[k][i]); }});
-    }
-    list.push_back({"ResidualAzimuth",
-                    [=](const Points& p, auto i) { return degrees(p.azimuth_residual[i]); }});
-    list.push_back(
-        {"ResidualZenith", [=](const Points& p, auto i) { return degrees(p.zenith_residual[i]); }});
-  }
-  for (std::size_t k = 0; k < header.factors.size(); ++k) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      list.push_back({"Loading" + std::to_string(k + 1) + "XYZ"[axis],
-                      [=](const Points& p, auto i) { return p.loading[k][axis][i]; }});
-    }
-  }
-  return list;
-}
 
 Points random_points(const CloudHeader& header, std::size_t rows, unsigned seed = 1) {
   std::mt19937_64 generator(seed);
@@ -111,24 +62,12 @@ Points random_points(const CloudHeader& header, std::size_t rows, unsigned seed 
 class LasTest : public ::testing::Test {
  protected:
   LasTest() {
-    static int count = 0;
-    folder_ = std::filesystem::temp_directory_path() /
-              ("risley-las-" + std::to_string(::getpid()) + "-" + std::to_string(++count));
-    std::filesystem::create_directories(folder_);
     header_.sensor = "Livox Mid-40";
     header_.serial = "0TFDG3B006H2Z11";
     header_.provenance = {{"command", "risley cloud"}, {"version", "0.1.0"}};
   }
-  ~LasTest() override {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
 
-  std::string path(const std::string& name = "cloud.las") const {
-    return (folder_ / name).string();
-  }
-
-  bool folder_is_empty() const { return std::filesystem::is_empty(folder_); }
+  std::string path() const { return folder_ / "cloud.las"; }
 
   /// Writes all points in pieces of these lengths, again and again.
   void write(const Points& points, std::vector<std::size_t> pieces = {100'000}) {
@@ -153,7 +92,7 @@ class LasTest : public ::testing::Test {
     try {
       write(points, std::move(pieces));
     } catch (const Exception& error) {
-      EXPECT_TRUE(folder_is_empty());
+      EXPECT_TRUE(folder_.empty());
       return error.what();
     }
     ADD_FAILURE() << "nothing was thrown";
@@ -162,7 +101,8 @@ class LasTest : public ::testing::Test {
 
   void expect_equal(const las_checker::File& file, const Points& points) const {
     ASSERT_EQ(file.points.size(), points.size());
-    const std::vector<Expected> floats = expected_floats(header_);
+    TestTable floats = expected_table(header_, points);
+    std::erase_if(floats, [](const TestColumn& one) { return one.type != 'f'; });
     std::vector<std::string> names, expected_names;
     for (const auto& field : file.extra) names.push_back(field.name);
     for (const auto& field : floats) expected_names.push_back(field.name);
@@ -189,7 +129,7 @@ class LasTest : public ::testing::Test {
       }
       for (std::size_t k = 0; k < floats.size(); ++k) {
         const float stored = file.real(i, file.extra[k]);
-        const float expected = static_cast<float>(floats[k].value(points, i));
+        const float expected = static_cast<float>(floats[k].values[i]);
         if (std::isnan(expected)) {
           ASSERT_TRUE(std::isnan(stored)) << floats[k].name << i;
         } else {
@@ -201,7 +141,7 @@ class LasTest : public ::testing::Test {
     }
   }
 
-  std::filesystem::path folder_;
+  TestFolder folder_;
   CloudHeader header_;
   CloudWriterOptions options_;
 };
