@@ -6,17 +6,14 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
 #include <limits>
 #include <numbers>
 #include <numeric>
 #include <random>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 namespace risley::cloud {
-namespace fs = std::filesystem;
 
 std::vector<CloudCase> cloud_cases() {
   CloudHeader header;
@@ -224,19 +221,6 @@ void expect_same(const TestTable& found, const TestTable& expected) {
     }
   }
 }
-
-TestFolder::TestFolder() {
-  std::string name = (fs::temp_directory_path() / "risley-cloud-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) ADD_FAILURE() << "no folder " << name;
-  path_ = name;
-}
-
-TestFolder::~TestFolder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
-}
-
-bool TestFolder::empty() const { return fs::is_empty(path_); }
 
 std::string find_python(const std::string& module) {
   for (const char* python : {"python3", "/usr/bin/python3"}) {

@@ -15,6 +15,8 @@
 #include "risley/cloud/cloud_writer.hpp"
 #include "risley/cloud/points.hpp"
 
+#include "io/test_folder.hpp"
+
 namespace risley::cloud {
 
 /// A cloud to be written: what its points have and how many there are.
@@ -69,20 +71,7 @@ std::size_t record_bytes(const TestTable& table);
 /// Same names, types and numbers, bit by bit but for the kind of NaN.
 void expect_same(const TestTable& found, const TestTable& expected);
 
-/// A new empty folder of this test, removed with what is in it.
-class TestFolder {
- public:
-  TestFolder();
-  ~TestFolder();
-  TestFolder(const TestFolder&) = delete;
-  TestFolder& operator=(const TestFolder&) = delete;
-
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-  bool empty() const;
-
- private:
-  std::string path_;
-};
+using io::TestFolder;
 
 /// A cloud that a format is written with, and what a file of it has to hold.
 class CloudTest : public ::testing::TestWithParam<CloudCase> {

@@ -52,7 +52,7 @@ class LasRecordingTest : public ::testing::TestWithParam<std::string> {
   CloudCase one_{"cloud", 9000, {}};
   Points points_;
   TestFolder folder_;
-  std::string path_ = folder_ / "cloud";
+  std::string path_ = folder_.file("cloud");
 };
 
 TEST_P(LasRecordingTest, GivesBackEveryPoint) {
@@ -137,7 +137,7 @@ std::string laz_error(const std::string& path, std::uint64_t at, const std::stri
 
 TEST(LazRecordingTest, ChunkTablesThatCannotBeAreRefused) {
   const TestFolder folder;
-  const std::string path = folder / "cloud.laz";
+  const std::string path = folder.file("cloud.laz");
   const CloudCase one{"cloud", 2000, {}};
   Points points = make_points(one);
   std::ranges::fill(points.return_number, std::uint8_t{1});

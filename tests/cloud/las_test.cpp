@@ -67,7 +67,7 @@ class LasTest : public ::testing::Test {
     header_.provenance = {{"command", "risley cloud"}, {"version", "0.1.0"}};
   }
 
-  std::string path() const { return folder_ / "cloud.las"; }
+  std::string path() const { return folder_.file("cloud.las"); }
 
   /// Writes all points in pieces of these lengths, again and again.
   void write(const Points& points, std::vector<std::size_t> pieces = {100'000}) {
@@ -92,7 +92,7 @@ class LasTest : public ::testing::Test {
     try {
       write(points, std::move(pieces));
     } catch (const Exception& error) {
-      EXPECT_TRUE(folder_.empty());
+      EXPECT_TRUE(folder_.names().empty());
       return error.what();
     }
     ADD_FAILURE() << "nothing was thrown";

@@ -124,7 +124,7 @@ TestTable join(const std::vector<Message>& messages) {
 class RosbagCloud : public ::testing::TestWithParam<CloudCase> {
  protected:
   std::string write() {
-    std::string path = folder_ / "cloud.bag";
+    std::string path = folder_.file("cloud.bag");
     write_uneven(path, "ros1-bag", GetParam().header, points_);
     return path;
   }
@@ -185,7 +185,8 @@ TEST_P(RosbagCloud, HoldsEveryField) {
 TEST_P(RosbagCloud, IsReadByPython) {
   const std::string python = find_python("rosbag");
   if (python.empty()) GTEST_SKIP() << "no Python with rosbag";
-  const std::string path = write(), script = folder_ / "read.py", answer = folder_ / "answer";
+  const std::string path = write(), script = folder_.file("read.py"),
+                    answer = folder_.file("answer");
   // The classes of the messages come from the definition in the bag, so that is read too.
   io::write_text_file(script, R"(
 import sys
@@ -233,8 +234,8 @@ std::vector<std::uint64_t> stamps_of(const std::vector<std::int64_t>& times) {
   one.points = times.size();
   Points points = make_points(one);
   points.time_ns = times;
-  write_uneven(folder / "cloud.bag", "ros1-bag", one.header, points);
-  std::vector<Message> messages = read_bag(folder / "cloud.bag");
+  write_uneven(folder.file("cloud.bag"), "ros1-bag", one.header, points);
+  std::vector<Message> messages = read_bag(folder.file("cloud.bag"));
   std::ranges::sort(messages,
                     [](const Message& a, const Message& b) { return a.sequence < b.sequence; });
   std::vector<std::uint64_t> stamps;
@@ -271,7 +272,7 @@ TEST(RosbagClouds, RefuseTimesAfterTheLast) {
   Points points = make_points(one);
   CloudWriterOptions options;
   options.format = "ros1-bag";
-  const auto writer = create_cloud(folder / "cloud.bag", one.header, options);
+  const auto writer = create_cloud(folder.file("cloud.bag"), one.header, options);
   points.time_ns[0] = 4'294'967'295'999'999'999;
   writer->write(points);
   ++points.time_ns[0];
@@ -288,8 +289,8 @@ TEST(RosbagClouds, DivideLongMessages) {
   one.points = 400'000;
   Points points = make_points(one);
   std::ranges::fill(points.time_ns, 1);
-  write_uneven(folder / "cloud.bag", "ros1-bag", one.header, points);
-  const std::vector<Message> messages = read_bag(folder / "cloud.bag");
+  write_uneven(folder.file("cloud.bag"), "ros1-bag", one.header, points);
+  const std::vector<Message> messages = read_bag(folder.file("cloud.bag"));
   EXPECT_GT(messages.size(), 1U);
   std::size_t found = 0;
   for (const Message& message : messages) {
