@@ -22,7 +22,7 @@ namespace risley::trajectories {
 namespace {
 
 /// In lower case.
-constexpr FieldName kFieldNames[] = {
+constexpr FieldName kExplorerNames[] = {
     {"week", PoseField::gps_week},
     {"gpsweek", PoseField::gps_week},
     {"date", PoseField::date},
@@ -274,7 +274,7 @@ Trajectory read_explorer(const std::string& path, const Progress& progress) {
   for (std::size_t i = 0; i < header.names.size(); ++i) {
     PoseColumn column;
     column.name = io::printable(header.names[i]);
-    for (const FieldName& known : kFieldNames) {
+    for (const FieldName& known : kExplorerNames) {
       if (known.name != header.names[i]) continue;
       const bool second_time = known.name == "corrtime" && has_gps_time;
       if (second_time || has_field(table.columns, known.field)) continue;

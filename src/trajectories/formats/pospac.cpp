@@ -21,7 +21,7 @@ namespace risley::trajectories {
 namespace {
 
 /// In lower case.
-constexpr FieldName kFieldNames[] = {
+constexpr FieldName kPospacNames[] = {
     {"time", PoseField::time},
     {"latitude", PoseField::latitude},
     {"lat", PoseField::latitude},
@@ -108,7 +108,7 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
   for (const std::string& name : pospac_names(names)) {
     PoseColumn column;
     column.name = io::printable(name);
-    for (const FieldName& known : kFieldNames) {
+    for (const FieldName& known : kPospacNames) {
       if (known.name == name && !has_field(table.columns, known.field)) column.field = known.field;
     }
     // "H" behind the longitude, where the other height has another name.
