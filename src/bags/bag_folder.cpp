@@ -54,7 +54,7 @@ std::string some_names(std::vector<std::string> names) {
                     "is a folder; expected a file, or a ROS 2 bag folder with its metadata.yaml "
                     "and the files that it names");
   }
-  std::sort(bags.begin(), bags.end());
+  std::ranges::sort(bags);
   throw FileError(folder, {},
                   fmt::format("is a folder of bags ({}) without metadata.yaml, which states their "
                               "order: name one of the files, or let `ros2 bag reindex` write it",
@@ -127,8 +127,8 @@ class BagFolder final : public Bag {
         break;  // told when reading comes to it, behind the sound files
       }
     }
-    std::sort(topics_.begin(), topics_.end(),
-              [](const Topic& a, const Topic& b) { return key_of(a) < key_of(b); });
+    std::ranges::sort(topics_,
+                      [](const Topic& a, const Topic& b) { return key_of(a) < key_of(b); });
   }
 
   void rewind(const std::vector<bool>& wanted) override {
@@ -183,8 +183,7 @@ class BagFolder final : public Bag {
 
   std::size_t find(const Topic& topic) const {
     const auto is_same = [&](const Topic& other) { return key_of(other) == key_of(topic); };
-    return static_cast<std::size_t>(std::find_if(topics_.begin(), topics_.end(), is_same) -
-                                    topics_.begin());
+    return static_cast<std::size_t>(std::ranges::find_if(topics_, is_same) - topics_.begin());
   }
 
   void open_part() {

@@ -277,7 +277,7 @@ class McapBag final : public Bag {
       summary_problem_ = error;
     }
     // Names of schemas may be left out of it.
-    const bool complete = std::all_of(channels_.begin(), channels_.end(), [this](const auto& one) {
+    const bool complete = std::ranges::all_of(channels_, [this](const auto& one) {
       return one.second.schema == 0 || schemas_.contains(one.second.schema);
     });
     if (!summary_problem_ && complete && channels == channels_.size()) return true;

@@ -282,7 +282,7 @@ class BagStructure {
       case kChunkInfo: {
         require_entries(record, 8);
         const auto position = number<std::uint64_t>(record, "chunk_pos");
-        if (!std::binary_search(chunks_.begin(), chunks_.end(), position)) {
+        if (!std::ranges::binary_search(chunks_, position)) {
           fail(record.offset,
                fmt::format("expected a chunk at byte {}, as the index says, found none", position));
         }
@@ -378,7 +378,7 @@ class BagStructure {
     read(record.data, reinterpret_cast<char*>(entries.data()), entries.size());
     for (std::size_t at = 0; at < entries.size(); at += kEntryBytes) {
       const auto offset = load<std::uint32_t>(entries.data() + at + kOffsetAt);
-      if (!std::binary_search(messages_.begin(), messages_.end(), offset)) {
+      if (!std::ranges::binary_search(messages_, offset)) {
         fail(
             record.data + at,
             fmt::format("expected a message at byte {} of the chunk, as the index says, found none",

@@ -108,7 +108,7 @@ std::span<const std::uint8_t> Unpacker::message(std::span<const std::uint8_t> by
         fmt::format("is compressed (Zstandard): expected it to state its size, at most {} bytes",
                     std::min(kMostBytes, most_per_byte(kZstd) * bytes.size()))};
   }
-  message_.resize(static_cast<std::size_t>(size));
+  message_.resize(size);
   unpack(kZstd, bytes, message_);
   return message_;
 }

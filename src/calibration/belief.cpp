@@ -37,8 +37,8 @@ void check_same_sensor(const std::vector<RangedRecording>& recordings) {
 /// Row of a held parameter, entered where it is new.
 Index row_of(const estimation::FreeParameter& parameter,
              std::vector<estimation::FreeParameter>& held) {
-  const auto at = std::find_if(held.begin(), held.end(),
-                               [&](const auto& known) { return known.name == parameter.name; });
+  const auto at =
+      std::ranges::find_if(held, [&](const auto& known) { return known.name == parameter.name; });
   const Index row = at - held.begin();
   if (at == held.end()) held.push_back(parameter);
   return row;
@@ -46,7 +46,7 @@ Index row_of(const estimation::FreeParameter& parameter,
 
 /// Errors of held parameters are the same in all recordings: it is one sensor.
 void pool_held(const std::vector<RangedRecording>& recordings, Belief& belief) {
-  const auto n = static_cast<Index>(belief.free.size());
+  const Index n = belief.free.size();
   std::vector<std::vector<Index>> rows;
   for (const RangedRecording& recording : recordings) {
     rows.emplace_back();
@@ -54,7 +54,7 @@ void pool_held(const std::vector<RangedRecording>& recordings, Belief& belief) {
       rows.back().push_back(row_of(parameter, belief.held));
     }
   }
-  const auto count = static_cast<Index>(belief.held.size());
+  const Index count = belief.held.size();
   std::vector<Eigen::MatrixXd> own_changes;
   belief.held_changes = Eigen::MatrixXd::Zero(n, count);
   for (std::size_t r = 0; r < recordings.size(); ++r) {
@@ -63,8 +63,8 @@ void pool_held(const std::vector<RangedRecording>& recordings, Belief& belief) {
     Eigen::MatrixXd& angles = belief.held_angle_changes.emplace_back(
         Eigen::MatrixXd::Zero(belief.sensor.prisms(), count));
     for (std::size_t h = 0; h < rows[r].size(); ++h) {
-      values.col(rows[r][h]) = of.values.col(static_cast<Index>(h)).head(n);
-      angles.col(rows[r][h]) = of.mean_angles.col(static_cast<Index>(h));
+      values.col(rows[r][h]) = of.values.col(h).head(n);
+      angles.col(rows[r][h]) = of.mean_angles.col(h);
     }
     if (count == 0 || n == 0) continue;
     // As the means of the values: each recording counts by its information.
@@ -86,12 +86,12 @@ void pool_held(const std::vector<RangedRecording>& recordings, Belief& belief) {
 Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
   check_same_sensor(recordings);
   const RangedRecording& first = recordings.front();
-  const auto n = static_cast<Index>(first.free.size());
+  const Index n = first.free.size();
   Belief belief{first.believed, first.free, first.covariance, {}, {}, {}, {}};
   const auto values = [n](const RangedRecording& recording) {
     Eigen::VectorXd v(n);
     for (Index j = 0; j < n; ++j) {
-      v[j] = recording.believed.train[recording.free[static_cast<std::size_t>(j)].places.front()];
+      v[j] = recording.believed.train[recording.free[j].places.front()];
     }
     return v;
   };
@@ -111,8 +111,8 @@ Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
       const estimation::Disagreement apart =
           estimation::disagreement(off, recording.covariance - belief.covariance);
       if (!apart.same_sensor()) {
-        const ParameterInfo& info = find_parameter(
-            belief.free[static_cast<std::size_t>(apart.worst)].name, belief.sensor.shape());
+        const ParameterInfo& info =
+            find_parameter(belief.free[apart.worst].name, belief.sensor.shape());
         throw EstimationError(fmt::format(
             "the recordings are of different sensors, or of one whose stored calibration changed: "
             "{} differs from the others in its {} by {:.4g} {}",
@@ -121,7 +121,7 @@ Belief pooled_belief(const std::vector<RangedRecording>& recordings) {
     }
   }
   for (Index j = 0; j < n; ++j) {
-    for (const int place : belief.free[static_cast<std::size_t>(j)].places) {
+    for (const int place : belief.free[j].places) {
       belief.sensor.train.set_place(place, mean[j]);
     }
   }

@@ -58,13 +58,13 @@ void update_range_variances(PlanarSolution& solution) {
 
 /// Columns and matrices of one recording that belong together.
 void require_recording(const RangedRecording& recording) {
-  require_at_least("number of shots", static_cast<long long>(recording.shots.size()), 1);
+  require_at_least("number of shots", recording.shots.size(), 1);
   require_shots(recording.shots, recording.believed.train);
   const auto prisms = static_cast<std::size_t>(recording.believed.prisms());
   const auto matrix = [](const char* rows, const char* columns, const Eigen::MatrixXd& m,
                          std::size_t expected_rows, std::size_t expected_columns) {
-    require_length(rows, static_cast<std::size_t>(m.rows()), expected_rows);
-    require_length(columns, static_cast<std::size_t>(m.cols()), expected_columns);
+    require_length(rows, m.rows(), expected_rows);
+    require_length(columns, m.cols(), expected_columns);
   };
   const std::size_t free = recording.free.size();
   matrix("rows of the covariance", "columns of the covariance", recording.covariance, free, free);
@@ -91,10 +91,10 @@ RangedShots shifted(const RangedShots& shots, const std::vector<double>& shift) 
 }
 
 /// One run, from recordings to results.
-class Work {
+class WallCalibration {
  public:
-  Work(const std::vector<RangedRecording>& recordings, const CalibrationOptions& options,
-       const Progress& progress)
+  WallCalibration(const std::vector<RangedRecording>& recordings, const CalibrationOptions& options,
+                  const Progress& progress)
       : recordings_(recordings), options_(options), progress_(progress) {
     range_noise_ = options.range_noise.value_or(options.sensor.range_noise);
     require_entries();
@@ -124,7 +124,7 @@ class Work {
 
  private:
   void require_entries() const {
-    require_at_least("number of recordings", static_cast<long long>(recordings_.size()), 1);
+    require_at_least("number of recordings", recordings_.size(), 1);
     require_length_or_none("stations", options_.stations.size(), recordings_.size());
     require_above("range noise", range_noise_, 0, "m");
     require_not_below("range resolution", options_.sensor.range_resolution, 0, "m");
@@ -165,9 +165,8 @@ class Work {
     p.prior = p.train;
     p.range_offset_sigma = options_.range_offset_sigma;
     if (!paper() && !flat()) {
-      const bool intensities =
-          std::all_of(recordings_.begin(), recordings_.end(),
-                      [](const RangedRecording& one) { return !one.shots.intensity.empty(); });
+      const bool intensities = std::ranges::all_of(
+          recordings_, [](const RangedRecording& one) { return !one.shots.intensity.empty(); });
       p.range_terms = range_terms_of(options_.sensor, intensities);
       p.divergence = {options_.sensor.beam_divergence_horizontal,
                       options_.sensor.beam_divergence_vertical};
@@ -225,8 +224,8 @@ class Work {
     problem_.stations_known = matching.stations_known;
     result_.warnings.insert(result_.warnings.end(), matching.warnings.begin(),
                             matching.warnings.end());
-    const bool planes = std::any_of(problem_.walls.begin(), problem_.walls.end(),
-                                    [](const Wall& wall) { return wall.normal_sigma >= 0; });
+    const bool planes = std::ranges::any_of(
+        problem_.walls, [](const Wall& wall) { return wall.normal_sigma >= 0; });
     const bool stations =
         problem_.stations_known && !options_.stations.empty() && recordings_.size() > 1;
     result_.datum_kind = datum_kind(planes, stations);
@@ -377,7 +376,7 @@ class Work {
   Calibration result_;
 };
 
-void Work::fill_result(const PlanarSolution& solution) {
+void WallCalibration::fill_result(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
   result_.method = options_.method;
   result_.believed = belief_.sensor.train;
@@ -420,7 +419,7 @@ void Work::fill_result(const PlanarSolution& solution) {
   for (LabelledShots& own : all_) result_.plane_of_shot.push_back(std::move(own.labels.view));
 }
 
-void Work::fill_held(const PlanarSolution& solution) {
+void WallCalibration::fill_held(const PlanarSolution& solution) {
   if (paper() || !solution.converged || !result_.covariance.allFinite()) return;
   held_ = held_of(options_.sensor, belief_, solution.problem);
   if (held_.names.empty()) return;
@@ -430,7 +429,7 @@ void Work::fill_held(const PlanarSolution& solution) {
   result_.number_held_changes = std::move(response.numbers);
 }
 
-void Work::fill_numbers(const PlanarSolution& solution) {
+void WallCalibration::fill_numbers(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
   const auto add = [&](const std::string& name, double prior, double prior_sigma) {
     const Eigen::Index row = solution.number(name);
@@ -447,9 +446,9 @@ void Work::fill_numbers(const PlanarSolution& solution) {
   add("range_offset_m", 0.0, p.range_offset_sigma);
 }
 
-void Work::fill_datum(const PlanarSolution& solution) {
+void WallCalibration::fill_datum(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
-  std::vector<std::vector<double>> beams(static_cast<std::size_t>(p.train.prisms()));
+  std::vector<std::vector<double>> beams(p.train.prisms());
   std::vector<std::uint8_t> emitter;
   for (std::size_t r = 0; r < recordings_.size(); ++r) {
     for (const std::size_t row :
@@ -474,21 +473,20 @@ void Work::fill_datum(const PlanarSolution& solution) {
 }  // namespace
 
 double Calibration::total_sigma(std::size_t parameter) const {
-  const auto at = static_cast<Eigen::Index>(parameter);
-  double variance = covariance(at, at);
-  if (held_changes.cols() > 0) variance += held_changes.row(at).squaredNorm();
+  double variance = covariance(parameter, parameter);
+  if (held_changes.cols() > 0) variance += held_changes.row(parameter).squaredNorm();
   return std::sqrt(variance);
 }
 
 const CalibratedNumber* Calibration::number(std::string_view name) const {
-  const auto found = std::find_if(numbers.begin(), numbers.end(),
-                                  [name](const auto& number) { return number.name == name; });
+  const auto found =
+      std::ranges::find_if(numbers, [name](const auto& number) { return number.name == name; });
   return found == numbers.end() ? nullptr : &*found;
 }
 
 Calibration calibrate(const std::vector<RangedRecording>& recordings,
                       const CalibrationOptions& options, const Progress& progress) {
-  return Work(recordings, options, progress).run();
+  return WallCalibration(recordings, options, progress).run();
 }
 
 }  // namespace risley::calibration

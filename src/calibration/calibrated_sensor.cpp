@@ -19,8 +19,8 @@ constexpr const char* kSource = "calibrated on plane walls by risley calibrate";
 
 /// Sizes of the prisms and range errors as they were adjusted, and what is known of them.
 void set_numbers(const PlanarProblem& problem, const Calibration& result, sensors::Sensor& sensor) {
-  const bool sizes = std::any_of(problem.sizes.begin(), problem.sizes.end(),
-                                 [](const SizePrior& size) { return size.sigma > 0; });
+  const bool sizes =
+      std::ranges::any_of(problem.sizes, [](const SizePrior& size) { return size.sigma > 0; });
   if (sizes) {
     sensor.set_prism_geometry(problem.geometry);
     for (const SizePrior& size : problem.sizes) {
@@ -45,7 +45,7 @@ void set_numbers(const PlanarProblem& problem, const Calibration& result, sensor
 std::vector<Index> considered_materials(const Belief& belief, const PlanarSolution& solution) {
   std::vector<Index> materials;
   for (Index j = 0; j < solution.considered.parameters.cols(); ++j) {
-    const int place = belief.free[static_cast<std::size_t>(j)].places.front();
+    const int place = belief.free[j].places.front();
     if (is_held_material(place, solution.problem)) materials.push_back(j);
   }
   return materials;
@@ -76,10 +76,9 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
     if (speed || material) sensor.set_knowledge(known);
   }
   for (std::size_t j = 0; j < result.free.size(); ++j) {
-    const auto at = static_cast<Index>(j);
     sensor.covariance_names.push_back(result.free[j].name);
-    sensor.set_knowledge({result.free[j].name, std::sqrt(result.covariance(at, at)), kSource,
-                          result.total_sigma(j)});
+    sensor.set_knowledge(
+        {result.free[j].name, std::sqrt(result.covariance(j, j)), kSource, result.total_sigma(j)});
   }
   sensor.reference = sensors::CalibrationReference::planes;
   set_numbers(solution.problem, result, sensor);
@@ -93,10 +92,9 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   }
   const std::vector<Index> materials = considered_materials(belief, solution);
   for (const Index j : materials) {
-    material_rows.push_back(
-        row_of(belief.free[static_cast<std::size_t>(j)].name, first, sensor.covariance_names));
+    material_rows.push_back(row_of(belief.free[j].name, first, sensor.covariance_names));
   }
-  const auto all = static_cast<Index>(sensor.covariance_names.size());
+  const Index all = sensor.covariance_names.size();
   sensor.covariance = Eigen::MatrixXd::Zero(all, all);
   sensor.covariance.topLeftCorner(n, n) = result.covariance;
   sensor.covariance.block(n, n, numbers, numbers) = solution.number_covariance;
@@ -107,7 +105,7 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
     Eigen::MatrixXd with_others(first, of_materials.cols());
     with_others.topRows(n) = algebra::product(solution.considered.parameters, of_materials);
     with_others.bottomRows(numbers) = algebra::product(solution.considered.numbers, of_materials);
-    std::vector<Index> others(static_cast<std::size_t>(first));
+    std::vector<Index> others(first);
     std::iota(others.begin(), others.end(), Index{0});
     sensor.covariance(others, material_rows) = with_others;
     sensor.covariance(material_rows, others) = with_others.transpose();
@@ -121,7 +119,7 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
     movement.row(moved_rows[i]) = held.moved[i].by_held;
   }
   for (std::size_t h = 0; h < held.moves_optics.size(); ++h) {
-    if (!held.moves_optics[h]) movement.col(static_cast<Index>(h)).setZero();
+    if (!held.moves_optics[h]) movement.col(h).setZero();
   }
   sensor.covariance +=
       algebra::propagated(movement, Eigen::MatrixXd::Identity(movement.cols(), movement.cols()));

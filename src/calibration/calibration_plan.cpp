@@ -113,13 +113,13 @@ std::vector<estimation::FreeParameter> calibration_parameters(
       throw InvalidArgument(
           fmt::format("{} cannot be held, only parameters of the prisms can", name));
     }
-    if (std::find(additional.begin(), additional.end(), name) != additional.end()) {
+    if (std::ranges::find(additional, name) != additional.end()) {
       throw InvalidArgument(fmt::format("{} can be held or freed, not both", name));
     }
     std::erase(names, name);
   }
   for (const std::string& name : additional) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    if (std::ranges::find(names, name) == names.end()) names.push_back(name);
   }
   return estimation::free_parameters(names, shape);
 }
@@ -133,7 +133,7 @@ AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
   adjusted.prior_sigma = prior_sigmas(adjusted.free, shape, angle_sigma);
   for (const auto& tilt : estimation::uncertain_held(sensor, adjusted.free)) {
     if (is_material(tilt.places.front(), shape.prisms) ||
-        std::find(fixed.begin(), fixed.end(), tilt.name) != fixed.end()) {
+        std::ranges::find(fixed, tilt.name) != fixed.end()) {
       continue;
     }
     adjusted.free.push_back(estimation::free_parameters({tilt.name}, shape).front());
@@ -182,7 +182,7 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
   if (!with_stations) stations.push_back({});
   std::vector<FoundPlane> found;
   std::vector<std::string> names;
-  std::vector<std::vector<double>> bundle(static_cast<std::size_t>(sensor.prisms()));
+  std::vector<std::vector<double>> bundle(sensor.prisms());
   std::vector<std::uint8_t> bundle_beam;
   for (std::size_t r = 0; r < stations.size(); ++r) {
     progress.report(static_cast<double>(r) / static_cast<double>(stations.size() + 1));
@@ -244,9 +244,9 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
   }
   if (problem.views.empty()) throw EstimationError("no shot of the plan meets a wall");
 
-  const bool known_normals =
-      std::any_of(plan.scene.planes.begin(), plan.scene.planes.end(),
-                  [](const scenes::ScenePlane& plane) { return plane.normal_sigma.has_value(); });
+  const bool known_normals = std::ranges::any_of(
+      plan.scene.planes,
+      [](const scenes::ScenePlane& plane) { return plane.normal_sigma.has_value(); });
   const bool tied = (plan.stations_known || poses_found) && with_stations;
   std::optional<scenes::Scene> planes;
   if (known_normals || tied) planes = plan.scene;

@@ -61,7 +61,7 @@ bool is_same(const Sought& a, const Sought& b) {
 void require_no_copies(const std::vector<RangedRecording>& recordings) {
   if (recordings.size() < 2) return;
   std::vector<Sought> sought;
-  std::vector<bool> marked(static_cast<std::size_t>(kCells * kCells));
+  std::vector<bool> marked(kCells * kCells);
   std::unordered_map<std::int64_t, std::vector<std::size_t>> by_cell;
   std::vector<std::size_t> count;
   for (std::size_t r = 0; r < recordings.size(); ++r) {
@@ -76,7 +76,7 @@ void require_no_copies(const std::vector<RangedRecording>& recordings) {
         for (std::int64_t j = -1; j <= 1; ++j) {
           const std::int64_t cell =
               ((a + i + kCells) % kCells) * kCells + (b + j + kCells) % kCells;
-          marked[static_cast<std::size_t>(cell)] = true;
+          marked[cell] = true;
           by_cell[cell].push_back(sought.size());
         }
       }
@@ -90,7 +90,7 @@ void require_no_copies(const std::vector<RangedRecording>& recordings) {
     for (std::size_t row = 0; row < shots.size(); ++row) {
       const Sought shot = shot_of(shots, row);
       const std::int64_t cell = cell_of(shot.angle_a) * kCells + cell_of(shot.angle_b);
-      if (!marked[static_cast<std::size_t>(cell)]) continue;
+      if (!marked[cell]) continue;
       for (const std::size_t i : by_cell.at(cell)) {
         const std::size_t other = sought[i].recording;
         if (other == r || seen_in[i] == r || !is_same(sought[i], shot)) continue;

@@ -81,24 +81,18 @@ BeamBundle::BeamBundle(const PrismTrain& train, const std::vector<estimation::Fr
                        std::span<const std::uint8_t> emitter, const HeldMovement& held)
     : prisms_(train.prisms()),
       emitters_(train.emitters()),
-      free_(static_cast<Index>(free.size())),
+      free_(free.size()),
       held_(held.train.cols()) {
   if (held_ > 0) {
-    const auto quantities = static_cast<std::size_t>(held_);
-    require_length("rows of the held quantities", static_cast<std::size_t>(held.train.rows()),
-                   train.parameters().size());
-    require_length("rows of their rotation angles",
-                   static_cast<std::size_t>(held.rotation_angles.rows()),
-                   static_cast<std::size_t>(prisms_));
-    require_length("columns of their rotation angles",
-                   static_cast<std::size_t>(held.rotation_angles.cols()), quantities);
+    require_length("rows of the held quantities", held.train.rows(), train.parameters().size());
+    require_length("rows of their rotation angles", held.rotation_angles.rows(), prisms_);
+    require_length("columns of their rotation angles", held.rotation_angles.cols(), held_);
     if (held.turn.size() > 0) {
-      require_length("rows of their turns", static_cast<std::size_t>(held.turn.rows()), 3);
-      require_length("columns of their turns", static_cast<std::size_t>(held.turn.cols()),
-                     quantities);
+      require_length("rows of their turns", held.turn.rows(), 3);
+      require_length("columns of their turns", held.turn.cols(), held_);
     }
   }
-  require_length("rotation_angles", rotation_angles.size(), static_cast<std::size_t>(prisms_));
+  require_length("rotation_angles", rotation_angles.size(), prisms_);
   for (const auto& column : rotation_angles) {
     require_length("rotation angles of a prism", column.size(), rotation_angles.front().size());
   }
@@ -138,10 +132,10 @@ void BeamBundle::add_beams(const PrismTrain& train,
     Beam beam{{angles.begin(), angles.end()}, own, eigen(linear.direction), {}, {}};
     beam.jacobian.resize(3, free_ + held_);
     for (Index row = 0; row < 3; ++row) {
-      const auto& gradient = linear.components[static_cast<std::size_t>(row)];
+      const auto& gradient = linear.components[row];
       for (Index j = 0; j < free_; ++j) {
         double sum = 0;
-        for (const int place : free[static_cast<std::size_t>(j)].places) {
+        for (const int place : free[j].places) {
           sum += derivative_by(gradient, place, own);
         }
         beam.jacobian(row, j) = sum;
@@ -153,7 +147,7 @@ void BeamBundle::add_beams(const PrismTrain& train,
           sum += held.train(at, h) * derivative_by(gradient, static_cast<int>(at), own);
         }
         for (std::size_t k = 0; k < N; ++k) {
-          sum += held.rotation_angles(static_cast<Index>(k), h) * gradient.rotation_angles[k];
+          sum += held.rotation_angles(k, h) * gradient.rotation_angles[k];
         }
         beam.jacobian(row, free_ + h) = sum;
       }
@@ -175,9 +169,8 @@ void BeamBundle::add_beams(const PrismTrain& train,
 /// Of free parameters and what was held, which has sigmas of one [free + held, free + held].
 Eigen::MatrixXd BeamBundle::covariance_of_all(const Eigen::MatrixXd& covariance,
                                               HeldErrors held) const {
-  const auto free = static_cast<std::size_t>(free_);
-  require_length("rows of the covariance", static_cast<std::size_t>(covariance.rows()), free);
-  require_length("columns of the covariance", static_cast<std::size_t>(covariance.cols()), free);
+  require_length("rows of the covariance", covariance.rows(), free_);
+  require_length("columns of the covariance", covariance.cols(), free_);
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(free_ + held_, free_ + held_);
   all.topLeftCorner(free_, free_) = covariance;
   if (held == HeldErrors::included) all.bottomRightCorner(held_, held_).setIdentity();

@@ -48,19 +48,12 @@ DirectionGrid::DirectionGrid(const std::vector<Beam>& beams) : angles_(beams.siz
     size_[axis] = 3 + static_cast<int>((most[axis] - least[axis]) / width_);
   }
   cell_.resize(beams.size());
-  begin_.assign(cells() + 1, 0);
   for (std::size_t i = 0; i < beams.size(); ++i) {
     const int column = 1 + static_cast<int>((angles_[i][0] - least[0]) / width_);
     const int row = 1 + static_cast<int>((angles_[i][1] - least[1]) / width_);
     cell_[i] = row * size_[0] + column;
-    ++begin_[static_cast<std::size_t>(cell_[i]) + 1];
   }
-  for (std::size_t c = 0; c < cells(); ++c) begin_[c + 1] += begin_[c];
-  order_.resize(beams.size());
-  std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
-  for (std::size_t i = 0; i < beams.size(); ++i) {
-    order_[next[static_cast<std::size_t>(cell_[i])]++] = i;
-  }
+  beams_ = {cells(), beams.size(), [this](std::size_t i) { return cell_[i]; }};
 }
 
 std::vector<std::uint32_t> DirectionGrid::block_sums(
@@ -70,8 +63,7 @@ std::vector<std::uint32_t> DirectionGrid::block_sums(
     for (int column = 1; column + 1 < size_[0]; ++column) {
       for (int r = row - 1; r <= row + 1; ++r) {
         for (int c = column - 1; c <= column + 1; ++c) {
-          sums[static_cast<std::size_t>(row * size_[0] + column)] +=
-              counts[static_cast<std::size_t>(r * size_[0] + c)];
+          sums[row * size_[0] + column] += counts[r * size_[0] + c];
         }
       }
     }

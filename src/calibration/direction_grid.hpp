@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "calibration/point_noise.hpp"
+#include "calibration/sorted_rows.hpp"
 
 namespace risley::calibration {
 
@@ -22,9 +23,7 @@ class DirectionGrid {
   double width() const { return width_; }
   std::size_t cells() const { return static_cast<std::size_t>(size_[0] * size_[1]); }
   std::size_t cell(std::size_t beam) const { return static_cast<std::size_t>(cell_[beam]); }
-  std::span<const std::size_t> beams_in(std::size_t cell) const {
-    return {order_.data() + begin_[cell], begin_[cell + 1] - begin_[cell]};
-  }
+  std::span<const std::size_t> beams_in(std::size_t cell) const { return beams_.of(cell); }
   /// The cell so many columns and rows away, or none outside the field of view.
   std::optional<std::size_t> shifted(std::size_t cell, int columns, int rows) const {
     const int column = static_cast<int>(cell) % size_[0] + columns;
@@ -44,7 +43,7 @@ class DirectionGrid {
   double width_ = 0;
   std::array<int, 2> size_{};
   std::vector<int> cell_;
-  std::vector<std::size_t> begin_, order_;  ///< beams sorted by cell
+  SortedRows<> beams_;  ///< by cell
 };
 
 }  // namespace risley::calibration

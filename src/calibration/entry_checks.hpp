@@ -13,8 +13,7 @@ namespace risley::calibration {
 /// Rotation angles of every prism of a train for every range, and as many emitters or none.
 inline void require_angle_columns(const RangedShots& shots, const PrismTrain& train) {
   check_shape(train.shape());
-  require_length("rotation_angle", shots.rotation_angle.size(),
-                 static_cast<std::size_t>(train.prisms()));
+  require_length("rotation_angle", shots.rotation_angle.size(), train.prisms());
   for (const auto& column : shots.rotation_angle) {
     require_length("rotation_angle of a prism", column.size(), shots.size());
   }

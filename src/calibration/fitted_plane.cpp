@@ -22,7 +22,7 @@ Plane fitted_plane(std::span<const Vector3<double>> points, std::span<const std:
   if (use.size() < 3) {
     throw EstimationError(fmt::format("{} points for a plane, at least 3 are needed", use.size()));
   }
-  require_place("row", *std::max_element(use.begin(), use.end()), points.size());
+  require_place("row", *std::ranges::max_element(use), points.size());
   Vector3<double> middle;
   for (std::size_t i : use) middle += (1.0 / static_cast<double>(use.size())) * points[i];
   Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();

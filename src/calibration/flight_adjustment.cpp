@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <map>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -21,7 +19,9 @@
 
 #include "calibration/cholesky.hpp"
 #include "calibration/eigen_vectors.hpp"
+#include "calibration/plane_knowledge.hpp"
 #include "calibration/smooth_ground.hpp"
+#include "calibration/sorted_rows.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -33,45 +33,12 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr Index kTwo = 2 * kCorrections;
-/// What is known of any plane before: keeps those of few shots regular and weighs nothing.
-constexpr double kPlaneTiltSigma = 10, kPlaneOffsetSigma = 1000;  // rad, m
-/// Parts of an interval within which the trajectory's process counts as one value.
-constexpr int kIntervalParts = 8;
 /// A long flight has settled when its corrections move by no more than this, RMS, in their sigmas.
 constexpr double kSettledCorrection = 0.02;
-/// Of a shot's variance, so much stays its own, however rough the ground is.
-constexpr double kLeastOwnShare = 0.25;
 /// Columns of an inverse that are computed together.
 constexpr Index kInverseColumns = 96;
 
-Matrix3d cross_matrix(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
-  return m;
-}
-
 using PlaneRows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// What is known of a plane before, of its two tilts and its offset.
-struct PlaneKnowledge {
-  Vector3d information{1 / (kPlaneTiltSigma * kPlaneTiltSigma),
-                       1 / (kPlaneTiltSigma * kPlaneTiltSigma),
-                       1 / (kPlaneOffsetSigma * kPlaneOffsetSigma)};
-  Vector3d off{0, 0, 0};  ///< of what is known from what there is
-};
-
-PlaneKnowledge knowledge_of(const PlanePrior& prior, const GroundPlane& plane) {
-  PlaneKnowledge known;
-  known.information[2] = 1 / (prior.sigma * prior.sigma);
-  known.off[2] = plane.normal.dot(prior.place - plane.centre);
-  if (!prior.normal) return known;
-  const auto [first, second] = tangents_of(plain(plane.normal));
-  const double along = prior.normal->dot(plane.normal);
-  known.off[0] = prior.normal->dot(eigen(first)) / along;
-  known.off[1] = prior.normal->dot(eigen(second)) / along;
-  known.information.head<2>().setConstant(1 / (prior.normal_sigma * prior.normal_sigma));
-  return known;
-}
 
 std::vector<PlaneKnowledge> plane_knowledge(const FlightPriors& priors, const FlightModel& model) {
   std::vector<PlaneKnowledge> known(model.planes.size());
@@ -88,20 +55,6 @@ struct EliminatedPlane {
   MatrixXd globals;                  // [3, globals]
   std::vector<std::uint32_t> knots;  // ascending
   MatrixXd by_knot;                  // [6 knots, 3]
-};
-
-/// Places in a list, by what they are of.
-struct Listing {
-  std::vector<std::size_t> begin, entry;
-
-  template <class KeyOf>
-  Listing(std::size_t keys, std::size_t count, const KeyOf& key_of) : begin(keys + 1) {
-    for (std::size_t i = 0; i < count; ++i) ++begin[key_of(i) + 1];
-    for (std::size_t k = 0; k < keys; ++k) begin[k + 1] += begin[k];
-    entry.resize(count);
-    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < count; ++i) entry[next[key_of(i)]++] = i;
-  }
 };
 
 /// Takes left own' off a block of rows x 6 entries: by far the most of the work of elimination.
@@ -129,11 +82,9 @@ void subtract_product(const double* left_0, const double* left_1, const double* 
 
 void require_priors(const FlightPriors& priors, const FlightModel& model) {
   const auto globals = static_cast<std::size_t>(model.unknowns().size());
-  require_length("mean of the priors", static_cast<std::size_t>(priors.mean.size()), globals);
-  require_length("rows of the priors' information",
-                 static_cast<std::size_t>(priors.information.rows()), globals);
-  require_length("columns of the priors' information",
-                 static_cast<std::size_t>(priors.information.cols()), globals);
+  require_length("mean of the priors", priors.mean.size(), globals);
+  require_length("rows of the priors' information", priors.information.rows(), globals);
+  require_length("columns of the priors' information", priors.information.cols(), globals);
   if (!priors.mean.allFinite() || !priors.information.allFinite()) {
     throw InvalidArgument("priors contain numbers that are not finite");
   }
@@ -154,7 +105,7 @@ double promised_to_globals(const FlightSystem& system, const FlightSystem::Step&
   std::vector<Index> free;
   const Index globals = system.globals();
   for (Index g = 0; g < globals; ++g) {
-    if (held.empty() || !held[static_cast<std::size_t>(g)]) free.push_back(g);
+    if (held.empty() || !held[g]) free.push_back(g);
   }
   MatrixXd units = MatrixXd::Zero(system.size(), globals);
   units.bottomRows(globals).setIdentity();
@@ -163,30 +114,20 @@ double promised_to_globals(const FlightSystem& system, const FlightSystem::Step&
   return moved.dot(algebra::SymmetricSolver(covariance).inverse() * moved);
 }
 
-/// What the shots of a cell that counts do to the functions, patch by patch, weighted.
-struct PatchSums {
-  std::int32_t plane = 0;
-  Eigen::Matrix<float, Eigen::Dynamic, RoughGround::kPatches> sums;  // [functions, patches]
-};
-
-/// Those of a piece. Its rows come plane by plane.
-std::vector<PatchSums> patch_sums(const FlightRows& rows, const PlaneOfShot& plane,
-                                  const RoughGround& ground, const VectorXd& weight,
-                                  const MatrixXd& moved) {
-  std::vector<PatchSums> all;
-  for (Index i = 0; i < moved.rows(); ++i) {
-    const std::size_t shot = rows.shots[static_cast<std::size_t>(i)];
-    if (ground.patch[shot] < 0 || !(weight[i] > 0)) continue;
-    if (all.empty() || all.back().plane != plane[shot]) {
-      all.push_back({plane[shot], {}});
-      all.back().sums.setZero(moved.cols(), RoughGround::kPatches);
-    }
-    all.back().sums.col(ground.patch[shot]) += (weight[i] * moved.row(i)).cast<float>().transpose();
-  }
-  return all;
-}
-
 }  // namespace
+
+PlaneKnowledge knowledge_of(const PlanePrior& prior, const GroundPlane& plane) {
+  PlaneKnowledge known;
+  known.information[2] = 1 / (prior.sigma * prior.sigma);
+  known.off[2] = plane.normal.dot(prior.place - plane.centre);
+  if (!prior.normal) return known;
+  const auto [first, second] = tangents_of(plain(plane.normal));
+  const double along = prior.normal->dot(plane.normal);
+  known.off[0] = prior.normal->dot(eigen(first)) / along;
+  known.off[1] = prior.normal->dot(eigen(second)) / along;
+  known.information.head<2>().setConstant(1 / (prior.normal_sigma * prior.normal_sigma));
+  return known;
+}
 
 VectorXd unknown_values(const FlightModel& model) {
   VectorXd values = VectorXd::Zero(model.unknowns().size());
@@ -194,7 +135,7 @@ VectorXd unknown_values(const FlightModel& model) {
   values.segment<3>(FlightUnknowns::lever_arm(0)) = model.lever_arm;
   values[FlightUnknowns::range_offset()] = model.range_offset;
   values[FlightUnknowns::clock_offset()] = model.clock_offset;
-  values.segment(FlightUnknowns::parameter(0), static_cast<Index>(model.free.size())) =
+  values.segment(FlightUnknowns::parameter(0), model.free.size()) =
       estimation::free_values(model.train, model.free);
   return values;
 }
@@ -204,7 +145,7 @@ MatrixXd value_rates(const FlightModel& model) {
   MatrixXd rates = MatrixXd::Identity(globals, globals);
   const Vector3d turn = algebra::rotation_vector(model.boresight);
   const double angle = turn.norm();
-  const Matrix3d across = cross_matrix(turn);
+  const Matrix3d across = algebra::cross_matrix(turn);
   const double factor =
       angle < 1e-4 ? 1.0 / 12
                    : 1 / (angle * angle) - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
@@ -212,7 +153,7 @@ MatrixXd value_rates(const FlightModel& model) {
   return rates;
 }
 
-struct FlightSystem::Parts {
+struct FlightSystem::ReducedEquations {
   Index knots = 0, globals = 0;
   std::size_t planes = 0;
   std::vector<EliminatedPlane> eliminated;
@@ -234,11 +175,12 @@ struct FlightSystem::Parts {
   void hold(const FlightPriors& priors, MatrixXd& hessian);
 };
 
-void FlightSystem::Parts::eliminate(const FlightEquations& equations, const FlightModel& model,
-                                    const std::vector<PlaneKnowledge>& known) {
+void FlightSystem::ReducedEquations::eliminate(const FlightEquations& equations,
+                                               const FlightModel& model,
+                                               const std::vector<PlaneKnowledge>& known) {
   const Index stride = globals + kTwo + 1 + 3;
-  const Listing blocks(planes, equations.plane_blocks.size(),
-                       [&](std::size_t i) { return equations.plane_blocks[i].plane; });
+  const SortedRows blocks(planes, equations.plane_blocks.size(),
+                          [&](std::size_t i) { return equations.plane_blocks[i].plane; });
   eliminated.resize(planes);
   parallel::for_each(planes, [&](std::size_t p) {
     Matrix3d own = known[p].information.asDiagonal();
@@ -247,8 +189,8 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
     EliminatedPlane& result = eliminated[p];
     // Blocks come in the order of time: knots ascend.
     std::vector<Eigen::Matrix<double, 3, kCorrections>> by_knot;
-    for (std::size_t b = blocks.begin[p]; b < blocks.begin[p + 1]; ++b) {
-      const PlaneBlock& block = equations.plane_blocks[blocks.entry[b]];
+    for (const std::size_t b : blocks.of(p)) {
+      const PlaneBlock& block = equations.plane_blocks[b];
       const Eigen::Map<const PlaneRows> rows(equations.plane_products.data() + block.at, 3, stride);
       by_global += rows.leftCols(globals);
       gradient += rows.col(globals + kTwo);
@@ -261,8 +203,7 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
         }
         const std::size_t at =
             result.knots.back() == knot + k ? by_knot.size() - 1 : by_knot.size() - 2;
-        by_knot[at] +=
-            rows.middleCols<kCorrections>(globals + kCorrections * static_cast<Index>(k));
+        by_knot[at] += rows.middleCols<kCorrections>(globals + kCorrections * k);
       }
     }
     // Scaled first: a tilt of a large plane is known far better than its offset.
@@ -274,41 +215,40 @@ void FlightSystem::Parts::eliminate(const FlightEquations& equations, const Flig
     result.root_inverse = result.root_inverse * unit.asDiagonal();
     result.gradient = result.root_inverse * gradient;
     result.globals = result.root_inverse * by_global;
-    result.by_knot.resize(kCorrections * static_cast<Index>(by_knot.size()), 3);
+    result.by_knot.resize(kCorrections * std::ssize(by_knot), 3);
     for (std::size_t k = 0; k < by_knot.size(); ++k) {
-      result.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(k)).noalias() =
+      result.by_knot.middleRows<kCorrections>(kCorrections * k).noalias() =
           (result.root_inverse * by_knot[k]).transpose();
     }
   });
 }
 
 /// Takes the planes' part off the lower triangle and the right side.
-void FlightSystem::Parts::reduce(MatrixXd& hessian) {
+void FlightSystem::ReducedEquations::reduce(MatrixXd& hessian) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> places;  // plane, its knot
   for (std::size_t p = 0; p < planes; ++p) {
     for (std::size_t k = 0; k < eliminated[p].knots.size(); ++k) {
       places.emplace_back(static_cast<std::uint32_t>(p), static_cast<std::uint32_t>(k));
     }
   }
-  const Listing by_knot(static_cast<std::size_t>(knots), places.size(), [&](std::size_t i) {
+  const SortedRows by_knot(knots, places.size(), [&](std::size_t i) {
     return eliminated[places[i].first].knots[places[i].second];
   });
   const Index g0 = first_global();
   // Each task has the columns of one knot for itself.
-  parallel::for_each(static_cast<std::size_t>(knots), [&](Index knot) {
+  parallel::for_each(knots, [&](Index knot) {
     const Index column = kCorrections * knot;
-    const auto key = static_cast<std::size_t>(knot);
-    for (std::size_t i = by_knot.begin[key]; i < by_knot.begin[key + 1]; ++i) {
-      const auto [p, slot] = places[by_knot.entry[i]];
+    for (const std::size_t i : by_knot.of(knot)) {
+      const auto [p, slot] = places[i];
       const EliminatedPlane& plane = eliminated[p];
       const Eigen::Matrix<double, kCorrections, 3> own =
-          plane.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(slot));
+          plane.by_knot.middleRows<kCorrections>(kCorrections * slot);
       for (std::size_t first = slot; first < plane.knots.size();) {
         std::size_t end = first + 1;  // of the knots that follow each other
         while (end < plane.knots.size() && plane.knots[end] == plane.knots[end - 1] + 1) ++end;
         const auto rows = kCorrections * static_cast<Index>(end - first);
-        const auto at = kCorrections * static_cast<Index>(first);
-        const Index row = kCorrections * static_cast<Index>(plane.knots[first]);
+        const auto at = kCorrections * first;
+        const Index row = kCorrections * plane.knots[first];
         const auto left = plane.by_knot.middleRows(at, rows);
         subtract_product(left.col(0).data(), left.col(1).data(), left.col(2).data(), rows, own,
                          &hessian(row, column), hessian.rows());
@@ -329,8 +269,8 @@ void FlightSystem::Parts::reduce(MatrixXd& hessian) {
   }
 }
 
-void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPriors& priors,
-                                     MatrixXd& hessian) {
+void FlightSystem::ReducedEquations::add_priors(const FlightModel& model,
+                                                const FlightPriors& priors, MatrixXd& hessian) {
   const MatrixXd rates = value_rates(model);
   prior = rates.transpose() * priors.information * rates;
   const VectorXd off = priors.mean - unknown_values(model);
@@ -342,25 +282,24 @@ void FlightSystem::Parts::add_priors(const FlightModel& model, const FlightPrior
     const KnotInformation& own = chain.back();
     for (Index k = 0; k < knots; ++k) {
       const Index at = kCorrections * k + c;
-      const auto i = static_cast<std::size_t>(k);
-      hessian(at, at) += own.diagonal[i];
-      right[at] -= own.diagonal[i] * model.corrections(c, k);
+      hessian(at, at) += own.diagonal[k];
+      right[at] -= own.diagonal[k] * model.corrections(c, k);
       if (k + 1 == knots) continue;
-      hessian(at + kCorrections, at) += own.next[i];
-      right[at] -= own.next[i] * model.corrections(c, k + 1);
-      right[at + kCorrections] -= own.next[i] * model.corrections(c, k);
+      hessian(at + kCorrections, at) += own.next[k];
+      right[at] -= own.next[k] * model.corrections(c, k + 1);
+      right[at + kCorrections] -= own.next[k] * model.corrections(c, k);
     }
   }
 }
 
-void FlightSystem::Parts::hold(const FlightPriors& priors, MatrixXd& hessian) {
+void FlightSystem::ReducedEquations::hold(const FlightPriors& priors, MatrixXd& hessian) {
   for (std::size_t g = 0; g < priors.held.size(); ++g) {
     if (priors.held[g]) held.push_back(static_cast<Index>(g));
   }
-  held_columns.resize(size(), static_cast<Index>(held.size()));
+  held_columns.resize(size(), held.size());
   for (std::size_t h = 0; h < held.size(); ++h) {
     const Index at = first_global() + held[h];
-    auto column = held_columns.col(static_cast<Index>(h));
+    auto column = held_columns.col(h);
     column.head(at) = hessian.row(at).head(at).transpose();
     column.tail(size() - at) = hessian.col(at).tail(size() - at);
   }
@@ -375,14 +314,13 @@ void FlightSystem::Parts::hold(const FlightPriors& priors, MatrixXd& hessian) {
 
 FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& model,
                            const FlightPriors& priors)
-    : parts_(std::make_unique<Parts>()) {
+    : reduced_(std::make_unique<ReducedEquations>()) {
   require_priors(priors, model);
-  require_length("globals of the equations", static_cast<std::size_t>(equations.globals),
-                 static_cast<std::size_t>(model.unknowns().size()));
+  require_length("globals of the equations", equations.globals, model.unknowns().size());
   require_length("intervals of the equations", equations.knot_hessian.size(),
                  model.knots.intervals.size());
-  Parts& p = *parts_;
-  p.knots = static_cast<Index>(model.knots.size());
+  ReducedEquations& p = *reduced_;
+  p.knots = std::ssize(model.knots);
   p.globals = model.unknowns().size();
   p.planes = model.planes.size();
   const Index size = p.size(), g0 = p.first_global();
@@ -391,7 +329,7 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
   hessian.bottomRightCorner(p.globals, p.globals) = equations.hessian;
   p.right.segment(g0, p.globals) = equations.gradient;
   for (std::size_t i = 0; i < equations.knot_hessian.size(); ++i) {
-    const Index at = kCorrections * static_cast<Index>(model.knots.intervals[i].knot);
+    const Index at = kCorrections * model.knots.intervals[i].knot;
     hessian.block<kTwo, kTwo>(at, at) += equations.knot_hessian[i];
     hessian.block(g0, at, p.globals, kTwo) += equations.knot_global[i].transpose();
     p.right.segment<kTwo>(at) += equations.knot_gradient[i];
@@ -416,56 +354,53 @@ FlightSystem::FlightSystem(FlightSystem&&) noexcept = default;
 FlightSystem& FlightSystem::operator=(FlightSystem&&) noexcept = default;
 FlightSystem::~FlightSystem() = default;
 
-Index FlightSystem::size() const { return parts_->size(); }
-Index FlightSystem::globals() const { return parts_->globals; }
+Index FlightSystem::size() const { return reduced_->size(); }
+Index FlightSystem::globals() const { return reduced_->globals; }
 
 MatrixXd FlightSystem::solve(const MatrixXd& right) const {
-  require_length("rows of the right side", static_cast<std::size_t>(right.rows()),
-                 static_cast<std::size_t>(size()));
-  MatrixXd solution = parts_->scale.asDiagonal() * right;
-  for (const Index g : parts_->held) solution.row(parts_->first_global() + g).setZero();
-  parts_->root.solve_in_place(solution);
-  return parts_->scale.asDiagonal() * solution;
+  require_length("rows of the right side", right.rows(), size());
+  MatrixXd solution = reduced_->scale.asDiagonal() * right;
+  for (const Index g : reduced_->held) solution.row(reduced_->first_global() + g).setZero();
+  reduced_->root.solve_in_place(solution);
+  return reduced_->scale.asDiagonal() * solution;
 }
 
 MatrixXd FlightSystem::planes_of(const MatrixXd& solution) const {
-  const Parts& p = *parts_;
-  MatrixXd result(3 * static_cast<Index>(p.planes), solution.cols());
+  const ReducedEquations& p = *reduced_;
+  MatrixXd result(3 * p.planes, solution.cols());
   parallel::for_each(p.planes, [&](std::size_t i) {
     const EliminatedPlane& plane = p.eliminated[i];
     MatrixXd sum = plane.globals * solution.bottomRows(p.globals);
     for (std::size_t k = 0; k < plane.knots.size(); ++k) {
-      sum.noalias() +=
-          plane.by_knot.middleRows<kCorrections>(kCorrections * static_cast<Index>(k)).transpose() *
-          solution.middleRows<kCorrections>(kCorrections * static_cast<Index>(plane.knots[k]));
+      sum.noalias() += plane.by_knot.middleRows<kCorrections>(kCorrections * k).transpose() *
+                       solution.middleRows<kCorrections>(kCorrections * plane.knots[k]);
     }
-    result.middleRows<3>(3 * static_cast<Index>(i)) = -plane.root_inverse.transpose() * sum;
+    result.middleRows<3>(3 * i) = -plane.root_inverse.transpose() * sum;
   });
   return result;
 }
 
 FlightSystem::Step FlightSystem::step() const {
-  const Parts& p = *parts_;
+  const ReducedEquations& p = *reduced_;
   Step step;
   step.unknowns = solve(p.right);
   step.promised = step.unknowns.dot(p.right);
   const MatrixXd followed = planes_of(step.unknowns);
-  step.planes.resize(3, static_cast<Index>(p.planes));
+  step.planes.resize(3, p.planes);
   for (std::size_t i = 0; i < p.planes; ++i) {
-    const auto at = static_cast<Index>(i);
-    step.planes.col(at) = followed.col(0).segment<3>(3 * at) +
-                          p.eliminated[i].root_inverse.transpose() * p.eliminated[i].gradient;
+    step.planes.col(i) = followed.col(0).segment<3>(3 * i) +
+                         p.eliminated[i].root_inverse.transpose() * p.eliminated[i].gradient;
   }
   return step;
 }
 
 FlightSystem::Band FlightSystem::inverse_band() const {
-  const Parts& p = *parts_;
+  const ReducedEquations& p = *reduced_;
   const Index n = size(), blocks = (n + kInverseColumns - 1) / kInverseColumns;
   const Index steps = kCorrections * std::max<Index>(p.knots - 1, 0);
   Band band{VectorXd::Zero(n), VectorXd::Zero(steps)};
   // Column j of L^-1 begins in row j; the inverse holds the products of its columns.
-  parallel::for_each(static_cast<std::size_t>(blocks), [&](Index block) {
+  parallel::for_each(blocks, [&](Index block) {
     const Index at = block * kInverseColumns, columns = std::min(kInverseColumns, n - at);
     const Index all = std::min(columns + kCorrections, n - at);
     MatrixXd part = MatrixXd::Zero(n - at, all);
@@ -488,32 +423,30 @@ FlightSystem::Band FlightSystem::inverse_band() const {
 
 MatrixXd FlightSystem::inverse() const { return solve(MatrixXd::Identity(size(), size())); }
 
-MatrixXd FlightSystem::held_changes() const { return -solve(parts_->held_columns); }
+MatrixXd FlightSystem::held_changes() const { return -solve(reduced_->held_columns); }
 
 MatrixXd FlightSystem::prior_times(const MatrixXd& columns) const {
-  const Parts& p = *parts_;
+  const ReducedEquations& p = *reduced_;
   MatrixXd result = MatrixXd::Zero(size(), columns.cols());
   result.bottomRows(p.globals) = p.prior * columns.bottomRows(p.globals);
   for (int c = 0; c < kCorrections; ++c) {
-    const KnotInformation& own = p.chain[static_cast<std::size_t>(c)];
+    const KnotInformation& own = p.chain[c];
     for (Index k = 0; k < p.knots; ++k) {
       const Index at = kCorrections * k + c;
-      const auto i = static_cast<std::size_t>(k);
-      result.row(at) += own.diagonal[i] * columns.row(at);
+      result.row(at) += own.diagonal[k] * columns.row(at);
       if (k + 1 == p.knots) continue;
-      result.row(at) += own.next[i] * columns.row(at + kCorrections);
-      result.row(at + kCorrections) += own.next[i] * columns.row(at);
+      result.row(at) += own.next[k] * columns.row(at + kCorrections);
+      result.row(at + kCorrections) += own.next[k] * columns.row(at);
     }
   }
   return result;
 }
 
 void apply(const FlightSystem::Step& step, FlightModel& model) {
-  const Index knots = static_cast<Index>(model.knots.size());
-  require_length("unknowns of the step", static_cast<std::size_t>(step.unknowns.size()),
-                 static_cast<std::size_t>(kCorrections * knots + model.unknowns().size()));
-  require_length("planes of the step", static_cast<std::size_t>(step.planes.cols()),
-                 model.planes.size());
+  const Index knots = std::ssize(model.knots);
+  require_length("unknowns of the step", step.unknowns.size(),
+                 kCorrections * knots + model.unknowns().size());
+  require_length("planes of the step", step.planes.cols(), model.planes.size());
   model.corrections += Eigen::Map<const MatrixXd>(step.unknowns.data(), kCorrections, knots);
   const VectorXd own = step.unknowns.tail(model.unknowns().size());
   const Eigen::Quaterniond turned(model.boresight * algebra::rotation_by(own.head<3>()));
@@ -529,7 +462,7 @@ void apply(const FlightSystem::Step& step, FlightModel& model) {
   }
   for (std::size_t i = 0; i < model.planes.size(); ++i) {
     GroundPlane& plane = model.planes[i];
-    const auto change = step.planes.col(static_cast<Index>(i));
+    const auto change = step.planes.col(i);
     const auto [first, second] = tangents_of(plain(plane.normal));
     plane.centre += change[2] * plane.normal;
     plane.normal =
@@ -579,142 +512,6 @@ FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
     }
   }
   return result;
-}
-
-MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,
-                           const PlaneOfShot& plane, const FlightModel& model,
-                           const FlightWeights& weights, const FlightPriors& priors,
-                           const FlightSystem& system, const MatrixXd& functionals,
-                           const RoughGround* ground, InstructionSet set) {
-  if (ground != nullptr) require_length("patches", ground->patch.size(), shots.size());
-  const double of_ground = ground == nullptr ? 0 : ground->covariance.diagonal().mean();
-  const MatrixXd solved = system.solve(functionals);
-  const MatrixXd planes = system.planes_of(solved);
-  const Index count = solved.cols(), globals = system.globals();
-  const MatrixXd by_global = solved.bottomRows(globals);
-  const std::size_t pieces = flight_pieces(model);
-  struct Sums {
-    MatrixXd noise, parts;  // [count, count]; [count, 6 parts]
-    std::vector<PatchSums> patches;
-    std::size_t interval = 0;
-  };
-  std::vector<Sums> sums(pieces);
-  const double sample_ns = weights.sample_interval * 1e9;
-  for_each_flight_piece(
-      shots, poses, plane, model, weights,
-      [&](std::size_t piece, const FlightRows& rows) {
-        Sums& own = sums[piece];
-        own.interval = rows.interval;
-        own.noise = MatrixXd::Zero(count, count);
-        own.parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);
-        if (rows.shots.empty()) return;
-        const TrajectoryKnots::Interval& interval = model.knots.intervals[rows.interval];
-        const auto n = static_cast<Index>(rows.shots.size());
-        const Eigen::Map<
-            const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>
-            values(rows.values.data(), n, rows.columns);
-        const MatrixXd pose = values.middleCols(globals, kCorrections);
-        const Index knot = kCorrections * static_cast<Index>(interval.knot);
-        MatrixXd moved = values.leftCols(globals) * by_global;  // [n, count]
-        VectorXd weight_behind(n);
-        const auto length = static_cast<double>(interval.end_ns - interval.begin_ns);
-        for (Index i = 0; i < n; ++i) {
-          const std::int64_t time = shots.time_ns[rows.shots[static_cast<std::size_t>(i)]];
-          weight_behind[i] = static_cast<double>(time - interval.begin_ns) / length;
-        }
-        const MatrixXd before = pose * solved.middleRows<kCorrections>(knot);
-        const MatrixXd behind = pose * solved.middleRows<kCorrections>(knot + kCorrections);
-        moved += before + weight_behind.asDiagonal() * (behind - before);
-        for (Index i = 0; i < n; ++i) {
-          const std::int32_t p = plane[rows.shots[static_cast<std::size_t>(i)]];
-          for (Index k = 0; k < 3; ++k) {
-            moved.row(i) +=
-                values(i, globals + kCorrections + k) * planes.row(3 * static_cast<Index>(p) + k);
-          }
-        }
-        const VectorXd weight = values.col(globals + 11);
-        // Rows of shots that are lost may hold NaN.
-        for (Index i = 0; i < n; ++i) {
-          if (weight[i] == 0) moved.row(i).setZero();
-        }
-        const VectorXd variance =
-            (weight.array() > 0)
-                .select(weight.array().square() * values.col(globals + 10).array(), 0.0);
-        if (ground == nullptr) {
-          own.noise = moved.transpose() * variance.asDiagonal() * moved;
-        } else {
-          const VectorXd left = (variance.array() - of_ground * weight.array().square())
-                                    .max(kLeastOwnShare * variance.array());
-          own.noise = moved.transpose() * left.asDiagonal() * moved;
-          own.patches = patch_sums(rows, plane, *ground, weight, moved);
-        }
-        const std::int64_t first_ns = shots.time_ns[rows.begin];
-        const auto samples =
-            static_cast<Index>(static_cast<double>(shots.time_ns[rows.end - 1] - first_ns) /
-                               sample_ns) +
-            2;
-        MatrixXd shared = MatrixXd::Zero(count, kCorrections * samples);
-        const auto first_sample = static_cast<Index>(
-            std::floor(static_cast<double>(first_ns - interval.begin_ns) / sample_ns));
-        for (Index i = 0; i < n; ++i) {
-          if (weight[i] == 0) continue;
-          const std::int64_t time = shots.time_ns[rows.shots[static_cast<std::size_t>(i)]];
-          const auto sample = static_cast<Index>(std::floor(
-                                  static_cast<double>(time - interval.begin_ns) / sample_ns)) -
-                              first_sample;
-          const auto part = std::clamp<Index>(static_cast<Index>(weight_behind[i] * kIntervalParts),
-                                              0, kIntervalParts - 1);
-          const VectorXd weighted = weight[i] * moved.row(i).transpose();
-          for (Index k = 0; k < kCorrections; ++k) {
-            own.parts.col(kCorrections * part + k) += pose(i, k) * weighted;
-            const double white = weights.white[static_cast<std::size_t>(k)];
-            if (white == 0) continue;
-            shared.col(kCorrections * std::min(sample, samples - 1) + k) +=
-                white * pose(i, k) * weighted;
-          }
-        }
-        own.noise += shared * shared.transpose();
-      },
-      set);
-
-  MatrixXd covariance = solved.transpose() * system.prior_times(solved);
-  for (const PlanePrior& prior : priors.planes) {
-    const auto own = planes.middleRows<3>(3 * static_cast<Index>(prior.plane));
-    const PlaneKnowledge known = knowledge_of(prior, model.planes[prior.plane]);
-    covariance += own.transpose() * known.information.asDiagonal() * own;
-  }
-  if (ground != nullptr) {
-    std::map<std::int32_t, MatrixXd> by_plane;
-    for (const Sums& own : sums) {
-      for (const PatchSums& one : own.patches) {
-        MatrixXd& all = by_plane[one.plane];
-        if (all.size() == 0) all = MatrixXd::Zero(count, RoughGround::kPatches);
-        all += one.sums.cast<double>();
-      }
-    }
-    for (const auto& [number, all] : by_plane) {
-      covariance += ground->cells_for_each * all * ground->covariance * all.transpose();
-    }
-  }
-  for (std::size_t first = 0; first < pieces;) {
-    MatrixXd parts = MatrixXd::Zero(count, kCorrections * kIntervalParts);
-    const std::size_t interval = sums[first].interval;
-    while (first < pieces && sums[first].interval == interval) {
-      covariance += sums[first].noise;
-      parts += sums[first].parts;
-      ++first;
-    }
-    const TrajectoryKnots::Interval& own = model.knots.intervals[interval];
-    for (int c = 0; c < kCorrections; ++c) {
-      MatrixXd of_part(count, kIntervalParts);
-      for (Index k = 0; k < kIntervalParts; ++k) of_part.col(k) = parts.col(kCorrections * k + c);
-      covariance +=
-          of_part *
-          covariance_between_knots(priors.process, c, own.begin_ns, own.end_ns, kIntervalParts) *
-          of_part.transpose();
-    }
-  }
-  return 0.5 * (covariance + covariance.transpose());
 }
 
 }  // namespace risley::calibration

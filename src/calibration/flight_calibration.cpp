@@ -7,11 +7,8 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
-#include "risley/algebra/rotation_vector.hpp"
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/random.hpp"
@@ -21,8 +18,8 @@
 #include "risley/trajectories/clock.hpp"
 
 #include "calibration/eigen_vectors.hpp"
+#include "calibration/flight_findings.hpp"
 #include "calibration/flight_start.hpp"
-#include "calibration/flight_words.hpp"
 #include "calibration/judge_flight.hpp"
 #include "calibration/process_check.hpp"
 #include "calibration/rough_ground.hpp"
@@ -47,16 +44,11 @@ constexpr double kPoseMargin = 5;       // sigmas of the clock offset
 /// Done when a step promises less, in squared sigmas of all unknowns together: shots that come and
 /// go at the gate move the answer by about as much.
 constexpr double kSettled = 0.1;
-/// A drift of the clock, or a held parameter that is off, counts from so many sigmas on. Known
-/// before to no better than these, s/s and SI.
-constexpr double kTestedSigmas = 5, kDriftPrior = 1e-3, kHeldPrior = 1e-2;
-constexpr double kDelayPrior = 1;  // s
-/// Attitudes count as late from so many sigmas on, since few flights tell a delay well; from the
-/// first number on, and where the clock offset is so far from what is stated, what a delay would do
-/// counts as an error of everything else.
-constexpr double kDelayConsidered = 2, kDelaySigmas = 3;
-/// The clock offset contradicts what is stated of it from so many sigmas on.
-constexpr double kClockSigmas = 4;
+/// What is tested is known before to no better than these: drift, s/s, delay, s, and what is held.
+constexpr double kDriftPrior = 1e-3, kDelayPrior = 1, kHeldPrior = 1e-2;
+/// From so many sigmas of a delay on, and where the clock offset is so far from what is stated,
+/// what a delay would do counts as an error of everything else.
+constexpr double kDelayConsidered = 2;
 /// A trajectory that jumps more often does not fit, nor does one that so many repetitions do not
 /// mend.
 constexpr std::size_t kMostJumps = 8;
@@ -84,23 +76,6 @@ constexpr int kAllRounds = 3, kManySteps = 2, kLastSteps = 8;
 
 double flight_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
-/// What sigmas of corrections are in the words of a trajectory.
-trajectories::PoseAccuracy accuracy_of(const Eigen::Matrix<double, kCorrections, 1>& sigma,
-                                       double heading) {
-  const auto of = [&](trajectories::PoseError error) {
-    int c = 0;
-    while (error_of(c) != error) ++c;
-    return sigma[c];
-  };
-  using trajectories::PoseError;
-  const double along = std::cos(heading), across = std::sin(heading);
-  const double north = of(PoseError::tilt_north), east = of(PoseError::tilt_east);
-  return {{of(PoseError::north), of(PoseError::east), of(PoseError::up)},
-          std::hypot(along * north, across * east),
-          std::hypot(across * north, along * east),
-          of(PoseError::heading)};
-}
-
 /// Shots, poses and what they are labelled with.
 struct LabelledFlight {
   FlightShots shots;
@@ -109,10 +84,10 @@ struct LabelledFlight {
   GroundCells cells;
 };
 
-class FlightWork {
+class FlightCalibrator {
  public:
-  FlightWork(const FlightShots& shots, const trajectories::Trajectory& trajectory,
-             const FlightCalibrationOptions& options, const Progress& progress)
+  FlightCalibrator(const FlightShots& shots, const trajectories::Trajectory& trajectory,
+                   const FlightCalibrationOptions& options, const Progress& progress)
       : options_(options),
         progress_(progress),
         tangent_(trajectories::tangent_frame(trajectory)),
@@ -122,8 +97,7 @@ class FlightWork {
         model_(start_.model),
         priors_(start_.priors) {
     require_flight_shots(shots);
-    require_length("rotation_angle", shots.rotation_angle.size(),
-                   static_cast<std::size_t>(options_.sensor.prisms()));
+    require_length("rotation_angle", shots.rotation_angle.size(), options_.sensor.prisms());
     check_beams(options_.sensor.train, shots.beam, shots.size());
     const Eigen::Matrix3d to_tangent = tangent_.axes.transpose();
     for (const scenes::KnownGround& ground : options_.control) {
@@ -192,7 +166,7 @@ class FlightWork {
   void set_knots(const FlightShots& shots, double spacing) {
     const TrajectoryKnots knots = make_knots(shots, spacing);
     model_.corrections = model_.knots.size() == 0
-                             ? MatrixXd::Zero(kCorrections, static_cast<Index>(knots.size()))
+                             ? MatrixXd::Zero(kCorrections, knots.size())
                              : resampled(model_.knots, model_.corrections, knots);
     model_.knots = knots;
   }
@@ -230,9 +204,8 @@ class FlightWork {
     for (const ProcessBreak& one : priors_.breaks) {
       for (const TrajectoryKnots::Interval& interval : model_.knots.intervals) {
         if (interval.knot != one.knot) continue;
-        std::fill(flight.cells.plane.begin() + static_cast<std::ptrdiff_t>(interval.first_shot),
-                  flight.cells.plane.begin() + static_cast<std::ptrdiff_t>(interval.end_shot),
-                  kNoPlane);
+        std::fill(flight.cells.plane.begin() + interval.first_shot,
+                  flight.cells.plane.begin() + interval.end_shot, kNoPlane);
       }
     }
   }
@@ -295,9 +268,7 @@ class FlightWork {
     };
     for (const CoarseRound& own : kCellRounds) round(own.cell, own.unlocked, own.steps, true);
     with_control_ = true;  // before, shots are metres off
-    for (int i = 0; i < kAllRounds; ++i) {
-      round(options_.cell_size, Unlocked::all, 2, i == 0);
-    }
+    for (int i = 0; i < kAllRounds; ++i) round(options_.cell_size, Unlocked::all, 2, i == 0);
   }
 
   /// How far strips are apart with what was given.
@@ -418,14 +389,8 @@ class FlightWork {
   void break_process(const ProcessCheck& check, const std::vector<std::size_t>& jumps);
   void solve_last();
   void fill_trajectory_fit();
-  void judge_attitude_delay(double value, double sigma);
-  void judge_clock_offset();
   void fill_result();
-  void fill_mount_and_sensor();
   void test_assumptions();
-  void judge_clock_drift(double value, double sigma);
-  void judge_held(HeldParameter held);
-  void fill_trajectory();
   void fill_control();
 
   const FlightCalibrationOptions& options_;
@@ -456,7 +421,7 @@ class FlightWork {
   FlightCalibration result_;
 };
 
-void FlightWork::hold(Unlocked unlocked) {
+void FlightCalibrator::hold(Unlocked unlocked) {
   priors_.held = held_globals(start_);
   for (std::size_t i = 0; i < priors_.held.size(); ++i) {
     const auto at = static_cast<int>(i);
@@ -472,7 +437,7 @@ void FlightWork::hold(Unlocked unlocked) {
   }
 }
 
-void FlightWork::fill_result() {
+void FlightCalibrator::fill_result() {
   result_.pairs_after =
       strip_pairs(georeferenced(full_.shots, full_.poses, model_), full_.shots.strip,
                   full_.cells.plane, model_.planes, kGateSigmas * std::sqrt(range_variance_));
@@ -496,11 +461,12 @@ void FlightWork::fill_result() {
       judge_flight({full_.shots, full_.poses, full_.cells.plane, smooth_, final_weights_, priors_,
                     start_.prior_sigma, start_.considered, *system_, &band_.diagonal, may_be_off_,
                     rough_ ? &*rough_ : nullptr});
-  fill_mount_and_sensor();
-  judge_clock_offset();
+  fill_mount_and_sensor(options_, model_, priors_.held, start_.considered, result_);
+  judge_clock_offset(result_);
   fill_trajectory_fit();
   fill_control();
-  fill_trajectory();
+  result_.trajectory = trajectories::from_tangent_frame(
+      corrected(local_, model_, priors_.process, result_.correction_sigma), tangent_);
   result_.tangent = tangent_;
   result_.converged = last_.converged && result_.reason.empty();
   if (!last_.converged && result_.reason.empty()) {
@@ -515,7 +481,7 @@ void FlightWork::fill_result() {
 }
 
 /// The last equations, and what neighbouring knots share of their inverse.
-void FlightWork::solve_last() {
+void FlightCalibrator::solve_last() {
   progress_.check();
   smooth_ = model_;
   smooth_.planes = smooth_ground(
@@ -530,7 +496,7 @@ void FlightWork::solve_last() {
 
 /// Compares the corrections with the process that is stated of them, and adjusts again until they
 /// fit: jumps get steps of their own, and a process that is larger than stated its size.
-void FlightWork::mend_trajectory() {
+void FlightCalibrator::mend_trajectory() {
   TrajectoryFit& fit = result_.trajectory_fit;
   for (int mended = 0;; ++mended) {
     solve_last();
@@ -552,18 +518,15 @@ void FlightWork::mend_trajectory() {
   }
 }
 
-bool FlightWork::known_ground_contradicts() const {
-  for (const PlanePrior& known : priors_.planes) {
+bool FlightCalibrator::known_ground_contradicts() const {
+  return std::ranges::any_of(priors_.planes, [&](const PlanePrior& known) {
     const GroundPlane& plane = model_.planes[known.plane];
-    if (std::abs(plane.normal.dot(plane.centre - known.place)) > kTestedSigmas * known.sigma) {
-      return true;
-    }
-  }
-  return false;
+    return std::abs(plane.normal.dot(plane.centre - known.place)) > kTestedSigmas * known.sigma;
+  });
 }
 
 /// @return whether anything has changed, so that the adjustment has to be repeated
-bool FlightWork::mend_as_needed(const ProcessCheck& check) {
+bool FlightCalibrator::mend_as_needed(const ProcessCheck& check) {
   const std::vector<std::size_t> jumps = jumps_of(model_.knots, check);
   // A process that was larger than stated is followed to its size.
   const bool alerted = process_factor_ != trajectories::PoseErrorVector::Ones();
@@ -582,74 +545,24 @@ bool FlightWork::mend_as_needed(const ProcessCheck& check) {
   return true;
 }
 
-void FlightWork::break_process(const ProcessCheck& check, const std::vector<std::size_t>& jumps) {
+void FlightCalibrator::break_process(const ProcessCheck& check,
+                                     const std::vector<std::size_t>& jumps) {
   for (const std::size_t knot : jumps) {
     const auto step = static_cast<Index>(knot);
     ProcessBreak one{.knot = knot};
     for (int c = 0; c < kCorrections; ++c) {
       const double usual =
           priors_.process.sigmas(model_.knots.time_ns[knot])[static_cast<Index>(error_of(c))];
-      one.sigma[static_cast<std::size_t>(c)] =
-          kBreakSigmas * std::max(usual, std::abs(check.jump(c, step)));
+      one.sigma[c] = kBreakSigmas * std::max(usual, std::abs(check.jump(c, step)));
     }
     priors_.breaks.push_back(one);
     break_score_.push_back(check.score.col(step).cwiseAbs().maxCoeff());
   }
 }
 
-/// Mount and sensor with what was found.
-void FlightWork::fill_mount_and_sensor() {
-  const Index globals = model_.unknowns().size();
-  const std::vector<std::string> names = unknown_names(model_);
-  const VectorXd values = unknown_values(model_);
-  result_.mount = options_.mount;
-  const auto found = [&](trajectories::StatedValue& stated, Index i) {
-    if (priors_.held[static_cast<std::size_t>(i)]) return;
-    stated = {values[i], std::sqrt(result_.covariance(i, i)), "calibrated in flight by risley"};
-  };
-  for (Index i = 0; i < 3; ++i) {
-    found(result_.mount.boresight[static_cast<std::size_t>(i)], i);
-    found(result_.mount.lever_arm[static_cast<std::size_t>(i)], 3 + i);
-  }
-  found(result_.mount.clock_offset, FlightUnknowns::clock_offset());
-  sensors::Sensor& sensor = result_.sensor;
-  sensor = options_.sensor;
-  sensor.train = model_.train;
-  sensor.range_offset = model_.range_offset;
-  sensor.reference = sensors::CalibrationReference::planes;
-  sensor.provenance.clear();
-  std::vector<Index> of_mount_rows, of_sensor_rows;
-  for (Index i = 0; i < globals; ++i) {
-    const bool adjusted = !priors_.held[static_cast<std::size_t>(i)];
-    const std::string& name = names[static_cast<std::size_t>(i)];
-    if (i < FlightUnknowns::range_offset() || i == FlightUnknowns::clock_offset()) {
-      if (adjusted) of_mount_rows.push_back(i);
-      continue;
-    }
-    if (!adjusted && i < globals - static_cast<Index>(start_.considered)) continue;
-    of_sensor_rows.push_back(i);
-    if (adjusted) {
-      sensor.set_knowledge({name, std::sqrt(result_.covariance(i, i)),
-                            "calibrated in flight by risley calibrate", 0});
-    }
-  }
-  const auto named = [&](const std::vector<Index>& rows) {
-    algebra::NamedCovariance some;
-    for (const Index i : rows) some.names.push_back(names[static_cast<std::size_t>(i)]);
-    some.matrix = result_.covariance(rows, rows);
-    return some;
-  };
-  algebra::NamedCovariance own = named(of_sensor_rows);
-  sensor.covariance_names = std::move(own.names);
-  sensor.covariance = std::move(own.matrix);
-  std::vector<Index> all_rows = of_mount_rows;
-  all_rows.insert(all_rows.end(), of_sensor_rows.begin(), of_sensor_rows.end());
-  result_.mount.covariance = named(all_rows);
-}
-
 /// Equations in which the clock may drift, attitudes may be late, and what is held, though it may
 /// be off, is free.
-FlightWork::TestedSystem FlightWork::tested_system() const {
+FlightCalibrator::TestedSystem FlightCalibrator::tested_system() const {
   const std::vector<std::int64_t>& times = full_.shots.time_ns;
   FlightModel model = smooth_;
   model.drift_about_ns = times.front() + (times.back() - times.front()) / 2;
@@ -661,10 +574,10 @@ FlightWork::TestedSystem FlightWork::tested_system() const {
   priors.information.conservativeResizeLike(MatrixXd::Zero(size, size));
   priors.information(drift, drift) = 1 / (kDriftPrior * kDriftPrior);
   priors.information(delay, delay) = 1 / (kDelayPrior * kDelayPrior);
-  priors.held.resize(static_cast<std::size_t>(size), false);
+  priors.held.resize(size, false);
   for (Index i = drift - static_cast<Index>(start_.considered); i < drift; ++i) {
     priors.information(i, i) = 1 / (kHeldPrior * kHeldPrior);
-    priors.held[static_cast<std::size_t>(i)] = false;
+    priors.held[i] = false;
   }
   FlightSystem system(
       flight_equations(full_.shots, full_.poses, full_.cells.plane, model, final_weights_), model,
@@ -674,12 +587,12 @@ FlightWork::TestedSystem FlightWork::tested_system() const {
 
 /// Whether corrections fit their process once what is tested is free: then it is to blame, and the
 /// trajectory is not.
-bool FlightWork::assumptions_explain() const {
+bool FlightCalibrator::assumptions_explain() const {
   const TestedSystem tested = tested_system();
   const VectorXd step = tested.system.step().unknowns;
   const MatrixXd corrections =
-      model_.corrections + Eigen::Map<const MatrixXd>(step.data(), kCorrections,
-                                                      static_cast<Index>(model_.knots.size()));
+      model_.corrections +
+      Eigen::Map<const MatrixXd>(step.data(), kCorrections, model_.knots.size());
   const ProcessCheck check =
       check_process(model_.knots, corrections, priors_, tested.system.inverse_band());
   return jumps_of(model_.knots, check).empty() &&
@@ -687,7 +600,7 @@ bool FlightWork::assumptions_explain() const {
 }
 
 /// What one more step would do with those equations, and how well that is known.
-void FlightWork::test_assumptions() {
+void FlightCalibrator::test_assumptions() {
   const auto [model, priors, system] = tested_system();
   const auto considered = static_cast<Index>(start_.considered);
   const Index size = model.unknowns().size(), first = model.unknowns().clock_drift() - considered;
@@ -698,15 +611,16 @@ void FlightWork::test_assumptions() {
   const MatrixXd covariance =
       flight_covariance(full_.shots, full_.poses, full_.cells.plane, model, final_weights_, priors,
                         system, functionals, rough_ ? &*rough_ : nullptr);
-  judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)));
-  judge_attitude_delay(steps[considered + 1],
-                       std::sqrt(covariance(considered + 1, considered + 1)));
+  judge_clock_drift(steps[considered], std::sqrt(covariance(considered, considered)),
+                    flight_seconds(full_.shots.time_ns.back() - full_.shots.time_ns.front()),
+                    result_);
+  judge_attitude_delay(steps[considered + 1], std::sqrt(covariance(considered + 1, considered + 1)),
+                       result_);
   const AttitudeDelay& late = result_.attitude_delay;
   const auto clock = static_cast<Index>(FlightUnknowns::clock_offset());
   const double clock_off = std::abs(model_.clock_offset - options_.mount.clock_offset.value);
   if (std::abs(late.value) > kDelayConsidered * late.sigma ||
-      (!priors_.held[static_cast<std::size_t>(clock)] &&
-       clock_off > kDelayConsidered * start_.prior_sigma[clock])) {
+      (!priors_.held[clock] && clock_off > kDelayConsidered * start_.prior_sigma[clock])) {
     // By how much everything else moves where the delay is free.
     const VectorXd moves = system.solve(VectorXd::Unit(system.size(), system.size() - 1));
     may_be_off_ = std::hypot(late.value, late.sigma) / moves[moves.size() - 1] *
@@ -716,61 +630,20 @@ void FlightWork::test_assumptions() {
   const VectorXd values = unknown_values(model_);
   for (Index i = 0; i < considered; ++i) {
     const Index row = first + i;
-    judge_held({.name = names[static_cast<std::size_t>(row)],
+    judge_held({.name = names[row],
                 .held = values[row],
                 .stated_sigma = start_.prior_sigma[row],
                 .told = values[row] + steps[i],
-                .sigma = std::sqrt(covariance(i, i))});
-  }
-}
-
-void FlightWork::judge_clock_drift(double value, double sigma) {
-  ClockDrift& found = result_.clock_drift;
-  found.value = value;
-  found.sigma = sigma;
-  found.seconds = flight_seconds(full_.shots.time_ns.back() - full_.shots.time_ns.front());
-  found.significant = std::abs(found.value) > kTestedSigmas * found.sigma;
-  if (!found.significant) return;
-  result_.warnings.push_back(fmt::format(
-      "the clocks of sensor and trajectory drift apart: the trajectory's gains {:.2g} +- {:.1g} "
-      "ppm on the recording's, {:.2g} ms over the {:.0f} s between the first shot and the last. A "
-      "constant clock offset cannot describe that, and the results are off by more than their "
-      "sigmas. Synchronise the sensor's clock by PPS or PTP, or calibrate shorter parts of the "
-      "flight",
-      1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds));
-}
-
-void FlightWork::judge_attitude_delay(double value, double sigma) {
-  AttitudeDelay& found = result_.attitude_delay;
-  found.value = value;
-  found.sigma = sigma;
-  found.significant = std::abs(found.value) > kDelaySigmas * found.sigma;
-  if (!found.significant) return;
-  result_.warnings.push_back(
-      in_words(found) +
-      "; a clock offset moves positions and attitudes together and cannot describe that, so clock "
-      "offset and lever arm are off by more than their sigmas. Correct the time stamps of the "
-      "attitudes, and calibrate again");
-}
-
-/// A clock offset that takes what it cannot be is an error of something else.
-void FlightWork::judge_clock_offset() {
-  const FlightUnknown& clock =
-      result_.unknowns[static_cast<std::size_t>(FlightUnknowns::clock_offset())];
-  if (clock.held) return;
-  result_.clock_contradicts = std::abs(clock.value - clock.start) >
-                              kClockSigmas * std::hypot(clock.prior_sigma, clock.sigma);
-  if (result_.clock_contradicts) {
-    result_.warnings.push_back(clock_in_words(result_) +
-                               "; correct the times or what the mount states of them");
+                .sigma = std::sqrt(covariance(i, i))},
+               options_.sensor, result_);
   }
 }
 
 /// What was mended of the trajectory, in numbers and words.
-void FlightWork::fill_trajectory_fit() {
+void FlightCalibrator::fill_trajectory_fit() {
   TrajectoryFit& fit = result_.trajectory_fit;
   for (int c = 0; c < kCorrections; ++c) {
-    fit.factor[static_cast<std::size_t>(c)] = process_factor_[static_cast<Index>(error_of(c))];
+    fit.factor[c] = process_factor_[static_cast<Index>(error_of(c))];
   }
   const TrajectoryKnots& knots = model_.knots;
   for (std::size_t i = 0; i < priors_.breaks.size(); ++i) {
@@ -782,99 +655,37 @@ void FlightWork::fill_trajectory_fit() {
     jump.between_strips = knots.strip[knot] != knots.strip[knot + 1];
     jump.score = break_score_[i];
     for (int c = 0; c < kCorrections; ++c) {
-      const Index at = kCorrections * static_cast<Index>(knot) + c, next = at + kCorrections;
-      const auto own = static_cast<std::size_t>(c);
-      const double change = model_.corrections(c, static_cast<Index>(knot) + 1) -
-                            model_.corrections(c, static_cast<Index>(knot));
+      const Index at = kCorrections * knot + c, next = at + kCorrections;
+      const double change =
+          model_.corrections(c, static_cast<Index>(knot) + 1) - model_.corrections(c, knot);
       // Corrections turn about up, and headings about down.
-      jump.size[own] = error_of(c) == trajectories::PoseError::heading ? change : -change;
-      jump.sigma[own] =
+      jump.size[c] = error_of(c) == trajectories::PoseError::heading ? change : -change;
+      jump.sigma[c] =
           std::sqrt(std::max(0.0, band_.diagonal[at] + band_.diagonal[next] - 2 * band_.next[at]));
     }
   }
-  std::sort(
-      fit.jumps.begin(), fit.jumps.end(),
-      [](const TrajectoryJump& a, const TrajectoryJump& b) { return a.begin_ns < b.begin_ns; });
-  for (const TrajectoryJump& jump : fit.jumps) {
-    result_.warnings.push_back(in_words(jump, full_.shots.time_ns.front()) +
-                               "; it has a step of its own in the adjustment. Is there a loss of "
-                               "the GNSS fix, or an alignment, in the trajectory's log?");
-  }
-  for (int c = 0; c < kCorrections; ++c) {
-    const auto own = static_cast<std::size_t>(c);
-    if (fit.factor[own] == 1) continue;
-    result_.warnings.push_back(fmt::format(
-        "the trajectory's error {} is {:.2g} times as large as stated (chi2 of its corrections "
-        "{:.3g}, {:.3g} expected); the adjustment counts it as that large, and the sigmas with it",
-        correction_name(c), fit.factor[own], fit.chi2[own], fit.expected[own]));
-  }
-  if (!fit.fits) result_.warnings.push_back(misfit_in_words(result_));
+  std::ranges::sort(fit.jumps, [](const TrajectoryJump& a, const TrajectoryJump& b) {
+    return a.begin_ns < b.begin_ns;
+  });
+  warn_of_trajectory(full_.shots.time_ns.front(), result_);
 }
 
-void FlightWork::judge_held(HeldParameter held) {
-  held.significant =
-      std::abs(held.told - held.held) > kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
-  if (held.significant) {
-    result_.warnings.push_back(fmt::format(
-        "the strips contradict what is held: {}; the results are off by more than their "
-        "sigmas. Estimate it as well (option additional)",
-        in_words(held, options_.sensor)));
-  }
-  result_.held.push_back(std::move(held));
-}
-
-void FlightWork::fill_control() {
+void FlightCalibrator::fill_control() {
   for (std::size_t i = 0; i < control_.size(); ++i) {
-    SeenControl& seen = result_.control.emplace_back();
+    SeenControl seen;
     const scenes::KnownGround& ground = options_.control[i];
     seen.name = ground.name;
     seen.sigma = ground.sigma;
     const GroundCircle circle{control_[i].place, ground.radius};
-    seen.shots = static_cast<std::size_t>(
-        std::count_if(full_.points.begin(), full_.points.end(),
-                      [&](const std::array<float, 3>& point) { return circle.holds(point); }));
+    seen.shots = static_cast<std::size_t>(std::ranges::count_if(
+        full_.points, [&](const std::array<float, 3>& point) { return circle.holds(point); }));
     seen.used = control_plane_[i] != kNoPlane;
-    if (!seen.used) {
-      result_.warnings.push_back(fmt::format(
-          "known ground \"{}\" is left out: {} shots within {:g} m of it{}", ground.name,
-          seen.shots, ground.radius,
-          seen.shots < GroundCellOptions{}.least_shots
-              ? fmt::format(", at least {} are needed; is it on the map that is stated?",
-                            GroundCellOptions{}.least_shots)
-              : " are not on a plane"));
-      continue;
+    if (seen.used) {
+      const GroundPlane& plane = model_.planes[control_plane_[i]];
+      seen.off = plane.normal.dot(plane.centre - control_[i].place);
     }
-    const GroundPlane& plane = model_.planes[static_cast<std::size_t>(control_plane_[i])];
-    seen.off = plane.normal.dot(plane.centre - control_[i].place);
-    seen.significant = std::abs(seen.off) > kTestedSigmas * seen.sigma;
-    if (!seen.significant) continue;
-    result_.warnings.push_back(fmt::format(
-        "known ground \"{}\" contradicts the flight: the strips see it {:.3f} m {} what is stated, "
-        "{:.0f} of its sigmas. Is the place right, and is the ground flat within {:g} m of it?",
-        ground.name, std::abs(seen.off), seen.off > 0 ? "above" : "below",
-        std::abs(seen.off) / seen.sigma, ground.radius));
+    judge_control(ground, std::move(seen), result_);
   }
-}
-
-void FlightWork::fill_trajectory() {
-  trajectories::Trajectory corrected = local_;
-  corrected.accuracy.resize(corrected.size());
-  const auto clock_ns = static_cast<std::int64_t>(std::llround(model_.clock_offset * 1e9));
-  for (std::size_t i = 0; i < corrected.size(); ++i) {
-    const Eigen::Matrix<double, kCorrections, 1> error = correction_at(
-        model_.knots, model_.corrections, priors_.process, corrected.time_ns[i] - clock_ns);
-    corrected.position[i] += error.head<3>();
-    corrected.attitude[i] =
-        (Eigen::Quaterniond(algebra::rotation_by(error.tail<3>())) * corrected.attitude[i])
-            .normalized();
-    corrected.accuracy[i] =
-        accuracy_of(correction_sigma_at(model_.knots, result_.correction_sigma, priors_.process,
-                                        corrected.time_ns[i] - clock_ns),
-                    trajectories::roll_pitch_heading(corrected.frame, corrected.position[i],
-                                                     corrected.attitude[i])
-                        .heading);
-  }
-  result_.trajectory = trajectories::from_tangent_frame(corrected, tangent_);
 }
 
 }  // namespace
@@ -883,7 +694,7 @@ FlightCalibration calibrate_flight(const FlightShots& shots,
                                    const trajectories::Trajectory& trajectory,
                                    const FlightCalibrationOptions& options,
                                    const Progress& progress) {
-  return FlightWork(shots, trajectory, options, progress).run();
+  return FlightCalibrator(shots, trajectory, options, progress).run();
 }
 
 }  // namespace risley::calibration

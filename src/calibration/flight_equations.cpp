@@ -49,8 +49,7 @@ std::vector<FlightPiece> pieces_of(const TrajectoryKnots& knots) {
 void require_columns(const FlightShots& shots, const ShotPoses& poses, const PlaneOfShot& plane,
                      const FlightModel& model) {
   check_shape(model.train.shape());
-  require_length("rotation_angle", shots.rotation_angle.size(),
-                 static_cast<std::size_t>(model.train.prisms()));
+  require_length("rotation_angle", shots.rotation_angle.size(), model.train.prisms());
   for (const auto& column : shots.rotation_angle) {
     require_length("rotation_angle of a prism", column.size(), shots.size());
   }
@@ -60,9 +59,8 @@ void require_columns(const FlightShots& shots, const ShotPoses& poses, const Pla
   require_length("poses", poses.pose.size(), shots.size());
   require_length("planes of the shots", plane.size(), shots.size());
   const auto planes = static_cast<std::int64_t>(model.planes.size());
-  const auto wrong = std::find_if(plane.begin(), plane.end(), [&](std::int32_t p) {
-    return p != kNoPlane && (p < 0 || p >= planes);
-  });
+  const auto wrong = std::ranges::find_if(
+      plane, [&](std::int32_t p) { return p != kNoPlane && (p < 0 || p >= planes); });
   if (wrong != plane.end()) {
     throw InvalidArgument(fmt::format("plane of shot {} = {}, allowed 0 to {} and {} for none",
                                       wrong - plane.begin(), *wrong, planes - 1, kNoPlane));
@@ -71,9 +69,8 @@ void require_columns(const FlightShots& shots, const ShotPoses& poses, const Pla
 
 void require_knots(const FlightShots& shots, const FlightModel& model) {
   const TrajectoryKnots& knots = model.knots;
-  require_length("rows of the corrections", static_cast<std::size_t>(model.corrections.rows()),
-                 kCorrections);
-  require_length("corrections", static_cast<std::size_t>(model.corrections.cols()), knots.size());
+  require_length("rows of the corrections", model.corrections.rows(), kCorrections);
+  require_length("corrections", model.corrections.cols(), knots.size());
   if (!model.corrections.allFinite()) {
     throw InvalidArgument("corrections contain numbers that are not finite");
   }
@@ -92,8 +89,7 @@ void require_knots(const FlightShots& shots, const FlightModel& model) {
 void require_model(const FlightModel& model, const FlightWeights& weights, double pose_clock) {
   const int places = parameter_count(model.train.shape());
   for (const estimation::FreeParameter& parameter : model.free) {
-    require_at_least("places of a free parameter", static_cast<long long>(parameter.places.size()),
-                     1);
+    require_at_least("places of a free parameter", parameter.places.size(), 1);
     for (const int place : parameter.places) {
       if (place < 0 || place >= places) {
         throw InvalidArgument(
@@ -136,13 +132,13 @@ class RunSorter {
     touched_.clear();
     for (std::size_t i = piece.begin; i < piece.end; ++i) {
       if (plane[i] == kNoPlane) continue;
-      if (count_[static_cast<std::size_t>(plane[i])]++ == 0) touched_.push_back(plane[i]);
+      if (count_[plane[i]]++ == 0) touched_.push_back(plane[i]);
     }
-    std::sort(touched_.begin(), touched_.end());
+    std::ranges::sort(touched_);
     begin_.clear();
     std::uint32_t sum = 0;
     for (const std::int32_t p : touched_) {
-      std::uint32_t& own = count_[static_cast<std::size_t>(p)];
+      std::uint32_t& own = count_[p];
       begin_.push_back(sum);
       sum += own;
       own = begin_.back();
@@ -151,9 +147,9 @@ class RunSorter {
     order_.resize(sum);
     for (std::size_t i = piece.begin; i < piece.end; ++i) {
       if (plane[i] == kNoPlane) continue;
-      order_[count_[static_cast<std::size_t>(plane[i])]++] = static_cast<std::uint32_t>(i);
+      order_[count_[plane[i]]++] = static_cast<std::uint32_t>(i);
     }
-    for (const std::int32_t p : touched_) count_[static_cast<std::size_t>(p)] = 0;
+    for (const std::int32_t p : touched_) count_[p] = 0;
   }
 
   const std::vector<std::int32_t>& planes() const { return touched_; }
@@ -161,7 +157,7 @@ class RunSorter {
   std::vector<FlightRun> runs(const std::vector<FlightPlane>& planes) const {
     std::vector<FlightRun> runs;
     for (std::size_t r = 0; r < touched_.size(); ++r) {
-      runs.push_back({begin_[r], begin_[r + 1], &planes[static_cast<std::size_t>(touched_[r])]});
+      runs.push_back({begin_[r], begin_[r + 1], &planes[touched_[r]]});
     }
     return runs;
   }

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/algebra/rotation_vector.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
@@ -39,7 +40,7 @@ constexpr double kSpuriousOfTrueNormals = 1;
 constexpr double kParameterStep = 1e-6;
 
 /// Everything of one flight that equations are made of.
-struct ForecastWork {
+struct ForecastFlight {
   FlightShots shots;
   ShotPoses poses;
   GroundCells cells;
@@ -76,13 +77,13 @@ void take_true_planes(const GroundCells& truth, GroundCells& cells) {
   std::vector<std::vector<std::int32_t>> seen(cells.planes.size());
   for (std::size_t i = 0; i < cells.plane.size(); ++i) {
     if (cells.plane[i] == kNoPlane || truth.plane[i] == kNoPlane) continue;
-    seen[static_cast<std::size_t>(cells.plane[i])].push_back(truth.plane[i]);
+    seen[cells.plane[i]].push_back(truth.plane[i]);
   }
   for (std::size_t cell = 0; cell < seen.size(); ++cell) {
     std::vector<std::int32_t>& own = seen[cell];
     if (own.empty()) continue;
     // Noise moves few points into a neighbour.
-    cells.planes[cell] = truth.planes[static_cast<std::size_t>(upper_median(own))];
+    cells.planes[cell] = truth.planes[upper_median(own)];
   }
 }
 
@@ -93,13 +94,7 @@ struct PointRates {
   std::int64_t time_ns = 0;
 };
 
-Matrix3d crossing(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
-  return m;
-}
-
-PointRates rates_of(const ForecastWork& work, std::size_t row) {
+PointRates rates_of(const ForecastFlight& work, std::size_t row) {
   const FlightModel& model = work.start.model;
   const FlightShots& shots = work.shots;
   const ShotPose& pose = work.poses.pose[row];
@@ -119,15 +114,14 @@ PointRates rates_of(const ForecastWork& work, std::size_t row) {
   const Vector3d lever = attitude * model.lever_arm;
   const Vector3d arm = lever + turn * (range * own);  // from the reference point
   const FlightUnknowns unknowns = model.unknowns();
-  const auto knots = static_cast<Index>(model.knots.size());
+  const Index knots = model.knots.size();
   const Index first = kCorrections * knots;
   PointRates rates;
   rates.time_ns = shots.time_ns[row];
-  rates.of_pose << Matrix3d::Identity(), -crossing(arm);
+  rates.of_pose << Matrix3d::Identity(), -algebra::cross_matrix(arm);
   rates.of_all = MatrixXd::Zero(3, first + unknowns.size());
   // Between two knots of the strip.
-  const auto behind =
-      std::upper_bound(model.knots.time_ns.begin(), model.knots.time_ns.end(), rates.time_ns);
+  const auto behind = std::ranges::upper_bound(model.knots.time_ns, rates.time_ns);
   auto next = static_cast<std::size_t>(behind - model.knots.time_ns.begin());
   next = std::clamp<std::size_t>(next, 1, model.knots.size() - 1);
   if (model.knots.strip[next] != model.knots.strip[next - 1]) --next;  // the last shot of a strip
@@ -136,11 +130,11 @@ PointRates rates_of(const ForecastWork& work, std::size_t row) {
       std::clamp(static_cast<double>(rates.time_ns - model.knots.time_ns[next - 1]) /
                      static_cast<double>(model.knots.time_ns[next] - model.knots.time_ns[next - 1]),
                  0.0, 1.0);
-  const auto at = kCorrections * static_cast<Index>(next);
+  const auto at = kCorrections * next;
   rates.of_all.middleCols<kCorrections>(at - kCorrections) = (1 - weight) * rates.of_pose;
   rates.of_all.middleCols<kCorrections>(at) = weight * rates.of_pose;
   auto globals = rates.of_all.rightCols(unknowns.size());
-  globals.middleCols<3>(0) = -turn * crossing(range * own);
+  globals.middleCols<3>(0) = -turn * algebra::cross_matrix(range * own);
   globals.middleCols<3>(3) = attitude;
   globals.col(FlightUnknowns::range_offset()) = -turn * own;
   const Vector3d velocity(static_cast<double>(pose.velocity[0]),
@@ -170,12 +164,12 @@ struct Place {
 };
 
 /// Places all over the ground that several strips see.
-std::vector<Place> places_of(const ForecastWork& work) {
+std::vector<Place> places_of(const ForecastFlight& work) {
   std::vector<std::vector<std::size_t>> rows(work.cells.planes.size());
   for (std::size_t i = 0; i < work.shots.size(); ++i) {
     const std::int32_t plane = work.cells.plane[i];
     if (plane == kNoPlane) continue;
-    std::vector<std::size_t>& own = rows[static_cast<std::size_t>(plane)];
+    std::vector<std::size_t>& own = rows[plane];
     // The first shot of every strip that a cell has seen.
     if (own.empty() || work.shots.strip[own.back()] != work.shots.strip[i]) own.push_back(i);
   }
@@ -192,7 +186,7 @@ std::vector<Place> places_of(const ForecastWork& work) {
   return places;
 }
 
-SharedPointErrors point_errors(const ForecastWork& work, const FlightSystem& system) {
+SharedPointErrors point_errors(const ForecastFlight& work, const FlightSystem& system) {
   SharedPointErrors result;
   const std::vector<Place> places = places_of(work);
   if (places.empty()) return result;
@@ -201,20 +195,20 @@ SharedPointErrors point_errors(const ForecastWork& work, const FlightSystem& sys
     rates.push_back(rates_of(work, place.first));
     rates.push_back(rates_of(work, place.second));
   }
-  const auto points = static_cast<Index>(rates.size());
+  const Index points = rates.size();
   const Index globals = system.globals(), size = system.size();
   MatrixXd functionals(size, 3 * points);
   for (Index i = 0; i < points; ++i) {
-    functionals.middleCols<3>(3 * i) = rates[static_cast<std::size_t>(i)].of_all.transpose();
+    functionals.middleCols<3>(3 * i) = rates[i].of_all.transpose();
   }
   // What is held and may be off moves points itself, and all that is adjusted.
-  MatrixXd held_moves(3 * points, static_cast<Index>(work.start.considered));
+  MatrixXd held_moves(3 * points, work.start.considered);
   const std::vector<bool>& held = work.start.priors.held;
   const MatrixXd changes = system.held_changes();
   Index column = 0, considered = 0;
   MatrixXd free = functionals;
   for (Index i = 0; i < globals; ++i) {
-    if (!held[static_cast<std::size_t>(i)]) continue;
+    if (!held[i]) continue;
     free.row(size - globals + i).setZero();
     if (i >= globals - static_cast<Index>(work.start.considered)) {
       held_moves.col(considered++) =
@@ -231,8 +225,8 @@ SharedPointErrors point_errors(const ForecastWork& work, const FlightSystem& sys
   const trajectories::ErrorProcess& process = work.start.priors.process;
   for (Index i = 0; i < points; ++i) {
     for (Index j = 0; j < points; ++j) {
-      const PointRates& a = rates[static_cast<std::size_t>(i)];
-      const PointRates& b = rates[static_cast<std::size_t>(j)];
+      const PointRates& a = rates[i];
+      const PointRates& b = rates[j];
       const VectorXd sigma_a = process.sigmas(a.time_ns), sigma_b = process.sigmas(b.time_ns);
       Eigen::Matrix<double, kCorrections, 1> common;
       for (int c = 0; c < kCorrections; ++c) {
@@ -279,11 +273,11 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
     throw EstimationError(
         "the plan has one strip: at least two that overlap are needed, and crossing ones are best");
   }
-  ForecastWork work{.shots = {},
-                    .poses = {},
-                    .cells = {},
-                    .start = flight_start(calibration, flight.trajectory),
-                    .weights = {}};
+  ForecastFlight work{.shots = {},
+                      .poses = {},
+                      .cells = {},
+                      .start = flight_start(calibration, flight.trajectory),
+                      .weights = {}};
   result.strip_shots.assign(flight.strips.size(), 0);
   for_each_planned_piece(
       own, flight, {result.rate, calibration.seed},
@@ -306,15 +300,14 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   const trajectories::Interpolation local(flight.trajectory);
   work.poses = poses_of(work.shots, local, model.clock_offset);
   // Equations, and points, are made between knots.
-  const auto strips =
-      static_cast<std::size_t>(std::count_if(result.strip_shots.begin(), result.strip_shots.end(),
-                                             [](std::uint64_t shots) { return shots > 0; }));
+  const auto strips = static_cast<std::size_t>(
+      std::ranges::count_if(result.strip_shots, [](std::uint64_t shots) { return shots > 0; }));
   model.knots = make_knots(work.shots, calibration.knot_spacing);
   result.knot_spacing = final_knot_spacing(calibration, model.knots, strips);
   if (result.knot_spacing > calibration.knot_spacing) {
     model.knots = make_knots(work.shots, result.knot_spacing);
   }
-  model.corrections = MatrixXd::Zero(kCorrections, static_cast<Index>(model.knots.size()));
+  model.corrections = MatrixXd::Zero(kCorrections, model.knots.size());
   const ShotPoints clean = georeferenced(work.shots, work.poses, model);
   add_noise(variance, calibration.seed, work.shots);
   const ShotPoints points = georeferenced(work.shots, work.poses, model);

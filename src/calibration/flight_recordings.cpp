@@ -25,10 +25,9 @@ std::vector<std::size_t> by_time(const std::vector<RangedRecording>& recordings)
   std::iota(order.begin(), order.end(), std::size_t{0});
   for (const RangedRecording& recording : recordings) {
     require_length("time_ns", recording.time_ns.size(), recording.shots.size());
-    require_at_least("shots of " + recording.name, static_cast<long long>(recording.shots.size()),
-                     1);
+    require_at_least("shots of " + recording.name, recording.shots.size(), 1);
   }
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
     return recordings[a].time_ns.front() < recordings[b].time_ns.front();
   });
   for (std::size_t i = 1; i < order.size(); ++i) {
@@ -60,13 +59,13 @@ FlightRecordings flight_recordings(const std::vector<RangedRecording>& recording
                                    const sensors::Sensor& given,
                                    const std::vector<trajectories::FlownStrip>& strips,
                                    std::int64_t shift_ns) {
-  require_at_least("recordings", static_cast<long long>(recordings.size()), 1);
+  require_at_least("recordings", recordings.size(), 1);
   require_between("strips", static_cast<double>(strips.size()), 1,
                   std::numeric_limits<std::uint16_t>::max());
   const std::vector<std::size_t> order = by_time(recordings);
   Belief belief = pooled_belief(recordings);
   const auto prisms = static_cast<std::size_t>(belief.sensor.prisms());
-  require_length("prisms of the sensor", static_cast<std::size_t>(given.prisms()), prisms);
+  require_length("prisms of the sensor", given.prisms(), prisms);
   FlightRecordings result;
   result.sensor = sensor_before(given, belief);
   result.believed = belief.sensor.train;

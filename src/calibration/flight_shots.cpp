@@ -91,7 +91,7 @@ void copy_rows(const Column& from, const std::vector<std::size_t>& rows, Column&
 
 void require_flight_shots(const FlightShots& shots) {
   const std::size_t n = shots.size();
-  require_at_least("number of shots", static_cast<long long>(n), 1);
+  require_at_least("number of shots", n, 1);
   require_at_least("number of prisms", shots.prisms(), 1);
   for (const auto& column : shots.rotation_angle) {
     require_length("rotation_angle of a prism", column.size(), n);
@@ -181,7 +181,7 @@ ShotPoses poses_of(const FlightShots& shots, const trajectories::Interpolation& 
   std::atomic<std::size_t> missing = std::numeric_limits<std::size_t>::max();
   for_each_block(shots.size(), [&](std::size_t begin, std::size_t end) {
     auto cursor = local.cursor();
-    const auto behind = std::upper_bound(times.begin(), times.end(), shots.time_ns[begin] + shift);
+    const auto behind = std::ranges::upper_bound(times, shots.time_ns[begin] + shift);
     std::size_t record =
         static_cast<std::size_t>(std::max<std::ptrdiff_t>(behind - times.begin(), 1)) - 1;
     for (std::size_t i = begin; i < end; ++i) {

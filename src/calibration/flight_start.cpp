@@ -42,11 +42,11 @@ void require_flight_options(const FlightCalibrationOptions& options) {
   require_above("prior sigma of angles", options.angle_sigma, 0, "rad");
   require_not_below("noise of the rotation angles", options.rotation_angle_sigma, 0, "rad");
   require_above("spacing of the knots", options.knot_spacing, 0, "s");
-  require_at_least("most knots", static_cast<long long>(options.most_knots), 2);
+  require_at_least("most knots", options.most_knots, 2);
   require_between("size of a cell", options.cell_size, 0.1, 100, "m");
   require_threshold("most roughness", options.most_roughness);
-  require_at_least("coarse shots", static_cast<long long>(options.coarse_shots), 1000);
-  require_at_least("many shots", static_cast<long long>(options.many_shots), 1000);
+  require_at_least("coarse shots", options.coarse_shots, 1000);
+  require_at_least("many shots", options.many_shots, 1000);
 }
 
 void set_model(const FlightCalibrationOptions& options, FlightStart& start) {
@@ -56,9 +56,8 @@ void set_model(const FlightCalibrationOptions& options, FlightStart& start) {
   start.model.nominal = options.mount.nominal;
   Eigen::Vector3d boresight;
   for (Index i = 0; i < 3; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    boresight[i] = options.mount.boresight[at].value;
-    start.model.lever_arm[i] = options.mount.lever_arm[at].value;
+    boresight[i] = options.mount.boresight[i].value;
+    start.model.lever_arm[i] = options.mount.lever_arm[i].value;
   }
   start.model.boresight = algebra::rotation_by(boresight);
   start.model.range_offset = sensor.range_offset;
@@ -88,8 +87,8 @@ void set_priors(const FlightCalibrationOptions& options, FlightStart& start) {
   start.priors.mean = unknown_values(start.model);
   start.prior_sigma = VectorXd::Zero(globals);
   for (Index i = 0; i < 3; ++i) {
-    start.prior_sigma[i] = options.mount.boresight[static_cast<std::size_t>(i)].sigma;
-    start.prior_sigma[3 + i] = options.mount.lever_arm[static_cast<std::size_t>(i)].sigma;
+    start.prior_sigma[i] = options.mount.boresight[i].sigma;
+    start.prior_sigma[3 + i] = options.mount.lever_arm[i].sigma;
   }
   start.prior_sigma[FlightUnknowns::range_offset()] = options.range_offset_sigma;
   start.prior_sigma[FlightUnknowns::clock_offset()] = options.mount.clock_offset.sigma;
@@ -101,11 +100,9 @@ void set_priors(const FlightCalibrationOptions& options, FlightStart& start) {
   // single sigmas.
   MatrixXd covariance = start.prior_sigma.cwiseAbs2().asDiagonal();
   const sensors::Sensor& sensor = options.sensor;
-  require_length("rows of the sensor's covariance",
-                 static_cast<std::size_t>(sensor.covariance.rows()),
+  require_length("rows of the sensor's covariance", sensor.covariance.rows(),
                  sensor.covariance_names.size());
-  require_length("columns of the sensor's covariance",
-                 static_cast<std::size_t>(sensor.covariance.cols()),
+  require_length("columns of the sensor's covariance", sensor.covariance.cols(),
                  sensor.covariance_names.size());
   const algebra::NamedCovariance stated =
       trajectories::joint_covariance({sensor.covariance_names, sensor.covariance}, options.mount);
@@ -113,7 +110,7 @@ void set_priors(const FlightCalibrationOptions& options, FlightStart& start) {
   std::vector<std::pair<Index, Index>> known;  // unknown, its row of what is stated
   const Index adjusted = globals - static_cast<Index>(start.considered);
   for (std::size_t i = 0; i < stated.names.size(); ++i) {
-    const auto at = std::find(names.begin(), names.end(), stated.names[i]) - names.begin();
+    const auto at = std::ranges::find(names, stated.names[i]) - names.begin();
     if (at >= adjusted) continue;
     if (at == FlightUnknowns::range_offset() && options.range_offset_sigma == 0) continue;
     known.emplace_back(at, static_cast<Index>(i));
@@ -152,7 +149,7 @@ std::vector<bool> held_globals(const FlightStart& start) {
   const auto globals = static_cast<std::size_t>(start.model.unknowns().size());
   std::vector<bool> held(globals);
   for (std::size_t i = 0; i < globals; ++i) {
-    held[i] = !(start.prior_sigma[static_cast<Index>(i)] > 0) || i >= globals - start.considered;
+    held[i] = !(start.prior_sigma[i] > 0) || i >= globals - start.considered;
   }
   return held;
 }
@@ -171,8 +168,7 @@ FlightWeights flight_weights(const FlightCalibrationOptions& options, const Flig
   if (priors.process.sample_interval() == 0) return weights;
   weights.sample_interval = priors.process.sample_interval();
   for (int c = 0; c < kCorrections; ++c) {
-    weights.white[static_cast<std::size_t>(c)] =
-        priors.process.white()[static_cast<Index>(error_of(c))];
+    weights.white[c] = priors.process.white()[static_cast<Index>(error_of(c))];
   }
   return weights;
 }

@@ -17,7 +17,7 @@ namespace {
 constexpr double kNamedSigmas = 3;
 
 const FlightUnknown& clock_of(const FlightCalibration& c) {
-  return c.unknowns[static_cast<std::size_t>(FlightUnknowns::clock_offset())];
+  return c.unknowns[FlightUnknowns::clock_offset()];
 }
 
 }  // namespace
@@ -25,7 +25,7 @@ const FlightUnknown& clock_of(const FlightCalibration& c) {
 const char* correction_name(int correction) {
   constexpr std::array<const char*, kCorrections> kNames = {
       "east", "north", "up", "tilt about east", "tilt about north", "heading"};
-  return kNames.at(static_cast<std::size_t>(correction));
+  return kNames.at(correction);
 }
 
 std::string in_words(const AttitudeDelay& delay) {
@@ -37,12 +37,11 @@ std::string in_words(const AttitudeDelay& delay) {
 std::string in_words(const TrajectoryJump& jump, std::int64_t begin_ns) {
   std::string sizes;
   for (int c = 0; c < kCorrections; ++c) {
-    const auto at = static_cast<std::size_t>(c);
-    if (!(std::abs(jump.size[at]) > kNamedSigmas * jump.sigma[at])) continue;
+    if (!(std::abs(jump.size[c]) > kNamedSigmas * jump.sigma[c])) continue;
     const auto unit = [&](double value) {
       return c < 3 ? 1e3 * value : degrees_from_radians(value);
     };
-    const NumberText text = number_text(unit(jump.size[at]), unit(jump.sigma[at]));
+    const NumberText text = number_text(unit(jump.size[c]), unit(jump.sigma[c]));
     sizes += fmt::format("{}{} +- {} {} {}", sizes.empty() ? "" : ", ", text.value, text.sigma,
                          c < 3 ? "mm" : "degree", correction_name(c));
   }

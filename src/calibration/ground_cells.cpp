@@ -11,13 +11,15 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "risley/calibration/rays.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
-#include "risley/optics/batch.hpp"
 #include "risley/parallel/parallel.hpp"
 
+#include "calibration/eigen_vectors.hpp"
 #include "calibration/shot_blocks.hpp"
+#include "calibration/sorted_rows.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -83,10 +85,10 @@ struct FittedGround {
 
 std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::uint32_t> rows) {
   const std::size_t count = std::min(rows.size(), kFittedPoints);
-  Eigen::Matrix3Xd some(3, static_cast<Index>(count));
+  Eigen::Matrix3Xd some(3, count);
   for (std::size_t i = 0; i < count; ++i) {
     const auto& point = points[rows[i * rows.size() / count]];
-    some.col(static_cast<Index>(i)) = Vector3d(point[0], point[1], point[2]);
+    some.col(i) = Vector3d(point[0], point[1], point[2]);
   }
   const Vector3d centre = some.rowwise().mean();
   some.colwise() -= centre;
@@ -109,8 +111,7 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
     const double steep = 1 / normal.norm();
     std::vector<double> distance(count);
     for (Index i = 0; i < some.cols(); ++i) {
-      distance[static_cast<std::size_t>(i)] =
-          std::abs(normal.dot(some.col(i)) - solution[2]) * steep;
+      distance[i] = std::abs(normal.dot(some.col(i)) - solution[2]) * steep;
     }
     result.distance = distance;
     const double scale = kCauchyMads * median(distance);
@@ -118,7 +119,7 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
     result.plane.centre = centre + Vector3d(0, 0, solution[2]);
     if (!(scale > 1e-9)) break;
     for (Index i = 0; i < some.cols(); ++i) {
-      const double part = result.distance[static_cast<std::size_t>(i)] / scale;
+      const double part = result.distance[i] / scale;
       weight[i] = 1 / (1 + part * part);
     }
   }
@@ -154,72 +155,36 @@ void require_cells(const GroundCellOptions& options) {
   require_between("size of a cell", options.size, 0.01, 1e4, "m");
   require_between("shift of the grid", options.shift_east, -1, 1);
   require_between("shift of the grid", options.shift_north, -1, 1);
-  require_at_least("least shots of a cell", static_cast<long long>(options.least_shots), 3);
+  require_at_least("least shots of a cell", options.least_shots, 3);
   require_between("steepest", options.steepest, 0, 1.57, "rad");
   require_threshold("most roughness", options.most_roughness);
   require_not_below("noise of the cells", options.noise, 0, "m");
 }
 
-/// Rows of points sorted by a number below `count`; rows without one are left out.
-struct SortedRows {
-  std::vector<std::size_t> begin;
-  std::vector<std::uint32_t> rows;
+using RowsOfPlanes = SortedRows<std::uint32_t>;
 
-  template <class Number>
-  SortedRows(std::size_t count, const std::vector<Number>& number, Number none) : begin(count + 1) {
-    for (const Number n : number) {
-      if (n != none) ++begin[static_cast<std::size_t>(n) + 1];
-    }
-    for (std::size_t k = 0; k < count; ++k) begin[k + 1] += begin[k];
-    rows.resize(begin.back());
-    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-    for (std::size_t i = 0; i < number.size(); ++i) {
-      if (number[i] != none) {
-        rows[next[static_cast<std::size_t>(number[i])]++] = static_cast<std::uint32_t>(i);
-      }
-    }
-  }
-  std::span<const std::uint32_t> of(std::size_t number) const {
-    return {rows.data() + begin[number], begin[number + 1] - begin[number]};
-  }
-};
+RowsOfPlanes rows_of_planes(std::size_t planes, const std::vector<std::int32_t>& plane) {
+  return {planes, plane.size(), [&](std::size_t i) { return plane[i]; }};
+}
 
 }  // namespace
 
 ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
                          const FlightModel& model) {
   require_length("poses", poses.pose.size(), shots.size());
-  require_length("rotation_angle", shots.rotation_angle.size(),
-                 static_cast<std::size_t>(model.train.prisms()));
-  require_length("corrections", static_cast<std::size_t>(model.corrections.cols()),
-                 model.knots.size());
+  require_length("rotation_angle", shots.rotation_angle.size(), model.train.prisms());
+  require_length("corrections", model.corrections.cols(), model.knots.size());
   ShotPoints points(shots.size());
   const double clock_step = model.clock_offset - poses.clock_offset;
   const Eigen::Matrix3d mount = model.nominal * model.boresight;
   const auto work = [&](const TrajectoryKnots::Interval& interval, std::size_t begin,
                         std::size_t end) {
-    const std::size_t n = end - begin;
-    std::array<std::vector<double>, 6> columns;
-    for (auto& column : columns) column.resize(n);
-    std::vector<std::span<const double>> angles;
-    for (const auto& column : shots.rotation_angle) angles.emplace_back(column.data() + begin, n);
-    DirectionColumns out;
-    out.x = columns[0];
-    out.y = columns[1];
-    out.z = columns[2];
-    out.origin_x = columns[3];
-    out.origin_y = columns[4];
-    out.origin_z = columns[5];
-    out.geometry = model.geometry;
-    const auto beam = shots.beam.empty()
-                          ? std::span<const std::uint8_t>()
-                          : std::span<const std::uint8_t>(shots.beam.data() + begin, n);
-    observe_batch(model.train, angles, out, beam);
+    const Rays rays(model.train, model.geometry, shots.rotation_angle, shots.beam, {begin, end});
     const auto knot = static_cast<Index>(interval.knot);
     const Eigen::Matrix<double, 6, 1> before = model.corrections.col(knot),
                                       change = model.corrections.col(knot + 1) - before;
     const double per_ns = 1 / static_cast<double>(interval.end_ns - interval.begin_ns);
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = 0; i < rays.size(); ++i) {
       const std::size_t shot = begin + i;
       const ShotPose& pose = poses.pose[shot];
       const Eigen::Matrix<double, 6, 1> correction =
@@ -230,19 +195,16 @@ ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
                                                                          pose.angular_velocity[2]);
       const Eigen::Quaterniond attitude(pose.attitude[0], pose.attitude[1], pose.attitude[2],
                                         pose.attitude[3]);
-      const Vector3d origin(columns[3][i], columns[4][i], columns[5][i]);
-      const Vector3d beam_direction(columns[0][i], columns[1][i], columns[2][i]);
-      const Vector3d arm =
-          attitude * (model.lever_arm +
-                      mount * (origin + (shots.range[shot] - model.range_offset) * beam_direction));
+      const Vector3d seen = eigen(rays.point(i, shots.range[shot] - model.range_offset));
+      const Vector3d arm = attitude * (model.lever_arm + mount * seen);
       const Vector3d across = turn.cross(arm);
       const Vector3d point = Vector3d(pose.position[0], pose.position[1], pose.position[2]) +
                              correction.head<3>() + clock_step * velocity + arm + across +
                              0.5 * turn.cross(across);
       const bool sound = point.allFinite() && point.cwiseAbs().maxCoeff() < kFarthest;
       for (std::size_t k = 0; k < 3; ++k) {
-        points[shot][k] = sound ? static_cast<float>(point[static_cast<Index>(k)])
-                                : std::numeric_limits<float>::quiet_NaN();
+        points[shot][k] =
+            sound ? static_cast<float>(point[k]) : std::numeric_limits<float>::quiet_NaN();
       }
     }
   };
@@ -269,12 +231,12 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
     for (std::size_t i = begin; i < end; ++i) {
       if (std::isfinite(points[i][0])) own.push_back(key_of(points[i], options));
     }
-    std::sort(own.begin(), own.end());
+    std::ranges::sort(own);
     own.erase(std::unique(own.begin(), own.end()), own.end());
   });
   std::vector<std::uint64_t> keys;
   for (const auto& own : found) keys.insert(keys.end(), own.begin(), own.end());
-  std::sort(keys.begin(), keys.end());
+  std::ranges::sort(keys);
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   const CellNumbers numbers(std::move(keys));
   GroundCells cells;
@@ -286,7 +248,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
       }
     }
   });
-  const SortedRows rows(numbers.size(), cells.plane, kNoPlane);
+  const RowsOfPlanes rows = rows_of_planes(numbers.size(), cells.plane);
   std::vector<Outcome> outcome(numbers.size());
   parallel::for_each(numbers.size(), [&](std::size_t cell) {
     const auto own = rows.of(cell);
@@ -308,7 +270,7 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
   for_each_block(points.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       if (cells.plane[i] != kNoPlane) {
-        cells.plane[i] = number[static_cast<std::size_t>(cells.plane[i])];
+        cells.plane[i] = number[cells.plane[i]];
       }
     }
   });
@@ -333,7 +295,7 @@ std::vector<std::int32_t> add_circles(const ShotPoints& points,
       }
     }
   });
-  const SortedRows rows(circles.size(), circle_of, kNoPlane);
+  const RowsOfPlanes rows = rows_of_planes(circles.size(), circle_of);
   std::vector<std::int32_t> planes(circles.size(), kNoPlane);
   for (std::size_t c = 0; c < circles.size(); ++c) {
     const auto own = rows.of(c);
@@ -355,7 +317,7 @@ std::vector<StripInCell> strips_in_cells(const ShotPoints& points,
   require_length("strip", strip.size(), points.size());
   require_length("planes of the shots", plane.size(), points.size());
   require_threshold("gate", gate);
-  const SortedRows rows(planes.size(), plane, kNoPlane);
+  const RowsOfPlanes rows = rows_of_planes(planes.size(), plane);
   std::vector<std::vector<StripInCell>> seen(planes.size());
   parallel::for_each(planes.size(), [&](std::size_t p) {
     const auto own = rows.of(p);
@@ -395,7 +357,7 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
   for (std::size_t i = 0; i < seen.size(); ++i) {
     for (std::size_t j = i + 1; j < seen.size() && seen[j].plane == seen[i].plane; ++j) {
       const auto first = seen[i].strip, second = seen[j].strip;
-      auto at = std::find_if(sums.begin(), sums.end(), [&](const Sums& own) {
+      auto at = std::ranges::find_if(sums, [&](const Sums& own) {
         return own.pair.first == first && own.pair.second == second;
       });
       if (at == sums.end()) {
@@ -439,14 +401,14 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
     }
     pairs.push_back(own.pair);
   }
-  std::sort(pairs.begin(), pairs.end(), [](const StripPair& a, const StripPair& b) {
+  std::ranges::sort(pairs, [](const StripPair& a, const StripPair& b) {
     return std::pair(a.first, a.second) < std::pair(b.first, b.second);
   });
   return pairs;
 }
 
 const StripPair* find_pair(const std::vector<StripPair>& pairs, const StripPair& like) {
-  const auto at = std::find_if(pairs.begin(), pairs.end(), [&](const StripPair& pair) {
+  const auto at = std::ranges::find_if(pairs, [&](const StripPair& pair) {
     return pair.first == like.first && pair.second == like.second;
   });
   return at == pairs.end() ? nullptr : &*at;

@@ -20,13 +20,13 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
   std::erase_if(own, [&](const FreeParameter& parameter) {
     return is_material(parameter.places.front(), sensor.prisms());
   });
-  const auto believed = static_cast<Index>(belief.held.size());
-  const Index count = believed + static_cast<Index>(own.size());
+  const Index believed = belief.held.size();
+  const Index count = believed + std::ssize(own);
   Held held;
   Eigen::MatrixXd& train = held.quantities.train;
-  train = Eigen::MatrixXd::Zero(static_cast<Index>(problem.train.parameters().size()), count);
+  train = Eigen::MatrixXd::Zero(problem.train.parameters().size(), count);
   for (Index h = 0; h < believed; ++h) {
-    const FreeParameter& parameter = belief.held[static_cast<std::size_t>(h)];
+    const FreeParameter& parameter = belief.held[h];
     held.names.push_back(parameter.name);
     held.moves_optics.push_back(is_material(parameter.places.front(), sensor.prisms()));
     for (const int at : parameter.places) {
@@ -34,12 +34,12 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
     }
     for (std::size_t j = 0; j < belief.free.size(); ++j) {
       for (const int at : belief.free[j].places) {
-        if (in_both(at)) train(at, h) += belief.held_changes(static_cast<Index>(j), h);
+        if (in_both(at)) train(at, h) += belief.held_changes(j, h);
       }
     }
   }
   for (Index h = believed; h < count; ++h) {
-    const FreeParameter& parameter = own[static_cast<std::size_t>(h - believed)];
+    const FreeParameter& parameter = own[h - believed];
     held.names.push_back(parameter.name);
     held.moves_optics.push_back(true);
     for (const int at : parameter.places) train(at, h) = parameter.prior_sigma;
@@ -54,7 +54,7 @@ Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarPr
       if (list != &own && !in_both(parameter.places.front())) continue;
       Eigen::RowVectorXd row = train.row(parameter.places.front());
       for (Index h = 0; h < count; ++h) {
-        if (!held.moves_optics[static_cast<std::size_t>(h)]) row[h] = 0;
+        if (!held.moves_optics[h]) row[h] = 0;
       }
       if (!row.isZero(0.0)) held.moved.push_back({parameter.name, row});
     }
@@ -73,7 +73,7 @@ HeldMovement movement_of(const Held& held, const PlanarProblem& problem,
   movement.rotation_angles /= static_cast<double>(held.quantities.rotation_angles.size());
   for (std::size_t j = 0; j < problem.free.size(); ++j) {
     for (const int at : problem.free[j].places) {
-      movement.train.row(at) = changes.row(static_cast<Index>(j));
+      movement.train.row(at) = changes.row(j);
     }
   }
   return movement;

@@ -48,8 +48,7 @@ FlightDatum datum_of(const FlightEvidence& e, const MatrixXd& movement) {
     ranges.push_back(shots.range[row]);
   }
   HeldMovement bundle;
-  bundle.train =
-      MatrixXd::Zero(static_cast<Index>(e.model.train.parameters().size()), movement.cols());
+  bundle.train = MatrixXd::Zero(e.model.train.parameters().size(), movement.cols());
   bundle.rotation_angles = MatrixXd::Zero(e.model.train.prisms(), movement.cols());
   bundle.turn = movement.topRows<3>();
   for (std::size_t j = 0; j < e.model.free.size(); ++j) {
@@ -77,16 +76,15 @@ std::vector<NotTold> not_told_of(const FlightEvidence& e, const MatrixXd& all) {
   std::vector<Index> adjusted;
   std::vector<estimation::FreeParameter> unknowns;
   for (Index i = 0; i < globals; ++i) {
-    if (e.priors.held[static_cast<std::size_t>(i)]) continue;
+    if (e.priors.held[i]) continue;
     adjusted.push_back(i);
-    unknowns.push_back({names[static_cast<std::size_t>(i)], {}, e.prior_sigma[i]});
+    unknowns.push_back({names[i], {}, e.prior_sigma[i]});
   }
-  const auto count = static_cast<Index>(adjusted.size());
+  const Index count = adjusted.size();
   MatrixXd covariance(count, count), prior(count, count);
   for (Index i = 0; i < count; ++i) {
     for (Index j = 0; j < count; ++j) {
-      const Index row = adjusted[static_cast<std::size_t>(i)],
-                  column = adjusted[static_cast<std::size_t>(j)];
+      const Index row = adjusted[i], column = adjusted[j];
       covariance(i, j) = all(row, column);
       prior(i, j) = e.priors.information(row, column);
     }
@@ -122,12 +120,11 @@ std::vector<NotTold> not_told_of(const FlightEvidence& e, const MatrixXd& all) {
     const double kept = std::sqrt(variance) / sigma_before;
     if (kept < kKeptSigma) continue;
     for (Index i = 0; i < 3; ++i) {
-      if (e.priors.held[static_cast<std::size_t>(i)]) continue;
+      if (e.priors.held[i]) continue;
       const double correlation = all(i, globals + c) / std::sqrt(all(i, i) * variance);
       if (std::abs(correlation) < kTiedCorrelation) continue;
-      not_told.push_back({fmt::format("{} against the {} of the trajectory",
-                                      names[static_cast<std::size_t>(i)], kMeans[c - 3]),
-                          kept});
+      not_told.push_back(
+          {fmt::format("{} against the {} of the trajectory", names[i], kMeans[c - 3]), kept});
     }
   }
   return not_told;
@@ -156,7 +153,7 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
   movement.leftCols(globals) = root_of(all.topLeftCorner(globals, globals));
   Index column = 0, of_considered = globals;
   for (Index i = 0; i < globals; ++i) {
-    if (!e.priors.held[static_cast<std::size_t>(i)]) continue;
+    if (!e.priors.held[i]) continue;
     if (i >= globals - considered) {
       movement.col(of_considered) = e.prior_sigma[i] * changes.col(column).tail(globals);
       movement(i, of_considered++) = e.prior_sigma[i];
@@ -174,23 +171,22 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
   const std::vector<std::string> names = unknown_names(e.model);
   const VectorXd values = unknown_values(e.model);
   for (Index i = 0; i < globals; ++i) {
-    const auto at = static_cast<std::size_t>(i);
     FlightUnknown& own = result.unknowns.emplace_back();
-    own.name = names[at];
+    own.name = names[i];
     own.start = e.priors.mean[i];
     own.value = values[i];
     own.sigma = std::sqrt(result.covariance(i, i));
     own.prior_sigma = e.prior_sigma[i];
-    own.held = e.priors.held[at];
+    own.held = e.priors.held[i];
     if (own.held) continue;
     own.prior_share = std::min(1.0, std::pow(own.sigma / own.prior_sigma, 2));
     for (Index j = 0; j < globals; ++j) {
-      if (j == i || e.priors.held[static_cast<std::size_t>(j)]) continue;
+      if (j == i || e.priors.held[j]) continue;
       const double correlation =
           result.covariance(i, j) / std::sqrt(result.covariance(i, i) * result.covariance(j, j));
       if (std::abs(correlation) > std::abs(own.twin_correlation)) {
         own.twin_correlation = correlation;
-        own.twin = names[static_cast<std::size_t>(j)];
+        own.twin = names[j];
       }
     }
   }

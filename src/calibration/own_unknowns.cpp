@@ -15,8 +15,7 @@ namespace {
 /// How many of a wall's places are unknowns of the whole: they come first.
 Index unknowns_among(const std::vector<Index>& places, Index unknowns) {
   Index count = 0;
-  while (count < static_cast<Index>(places.size()) &&
-         places[static_cast<std::size_t>(count)] < unknowns) {
+  while (count < std::ssize(places) && places[count] < unknowns) {
     ++count;
   }
   return count;
@@ -44,9 +43,9 @@ WithoutOwn without_own(const MatrixXd& system, Index own, double damping) {
 
 void add_at(const std::vector<Index>& places, const MatrixXd& part, MatrixXd& whole) {
   for (Index j = 0; j < part.cols(); ++j) {
-    const Index column = places[static_cast<std::size_t>(j)];
+    const Index column = places[j];
     for (Index i = 0; i < part.rows(); ++i) {
-      whole(places[static_cast<std::size_t>(i)], column) += part(i, j);
+      whole(places[i], column) += part(i, j);
     }
   }
 }
@@ -74,8 +73,8 @@ OwnSolution own_solution(const WithoutOwn& wall, const std::vector<Index>& place
   OwnSolution solution;
   solution.step = wall.from_rest.rightCols(1);
   solution.response = MatrixXd::Zero(own, shared.response.cols());
-  for (Index j = 0; j < static_cast<Index>(places.size()) - 1; ++j) {
-    const Index place = places[static_cast<std::size_t>(j)];
+  for (Index j = 0; j < std::ssize(places) - 1; ++j) {
+    const Index place = places[j];
     if (j < known) {
       solution.step -= wall.from_rest.col(j) * shared.step[place];
       solution.response -= wall.from_rest.col(j) * shared.response.row(place);

@@ -65,7 +65,7 @@ class View {
       derivatives_.push_back(prepare_derivatives<double, N>(parameters, order));
     }
     const auto positions = face_positions(p.train.face_order(), p.geometry);
-    std::copy(positions.begin(), positions.end(), face_position_.begin());
+    std::ranges::copy(positions, face_position_.begin());
   }
 
   Cloud cloud() const {
@@ -84,7 +84,7 @@ class View {
   }
 
   Sums sums(const Cloud& cloud) const {
-    const auto free = static_cast<Index>(p_.free.size()), size = free + 3;
+    const auto free = std::ssize(p_.free), size = free + 3;
     const auto [t1, t2] = tangents_of(cloud.plane.normal);
     std::vector<Sums> parts(blocks());
     parallel::for_each(blocks(), [&, t1 = t1, t2 = t2](std::size_t block) {
@@ -99,7 +99,7 @@ class View {
                           std::array<Vector3<double>, 1>{shots_.range[i] * cloud.plane.normal});
         for (Index j = 0; j < free; ++j) {
           row[j] = 0;
-          for (const int place : p_.free[static_cast<std::size_t>(j)].places) {
+          for (const int place : p_.free[j].places) {
             row[j] += derivative_by(gradient[0], place, static_cast<int>(emitter));
           }
         }
@@ -141,7 +141,7 @@ class View {
 PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
                                const Progress& progress) {
   if (problem.views.empty()) throw EstimationError("no wall to calibrate on");
-  const auto free = static_cast<Index>(problem.free.size());
+  const Index free = problem.free.size();
   // Every view is a wall of its own in the sensor's frame.
   std::vector<Wall> walls;
   for (WallView& view : problem.views) {
@@ -190,7 +190,7 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
     const Eigen::VectorXd step = solver.solve(gradient);
     if (!step.allFinite()) break;
     for (Index j = 0; j < free; ++j) {
-      for (const int place : problem.free[static_cast<std::size_t>(j)].places) {
+      for (const int place : problem.free[j].places) {
         problem.train.set_place(place, problem.train[place] + step[j]);
       }
     }
@@ -200,8 +200,7 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
   solution.noise_covariance = solution.covariance;
   solution.parameters.resize(free);
   for (Index j = 0; j < free; ++j) {
-    solution.parameters[j] =
-        problem.train[problem.free[static_cast<std::size_t>(j)].places.front()];
+    solution.parameters[j] = problem.train[problem.free[j].places.front()];
   }
   solution.chi2.clear();
   for (std::size_t v = 0; v < problem.views.size(); ++v) {

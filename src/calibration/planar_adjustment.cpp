@@ -64,7 +64,7 @@ struct Step {
 
 void move(PlanarProblem& p, const Unknowns& at, const Step& step) {
   for (Index j = 0; j < at.free(); ++j) {
-    for (const int place : p.free[static_cast<std::size_t>(j)].places) {
+    for (const int place : p.free[j].places) {
       p.train.set_place(place, p.train[place] + step.shared[j]);
     }
   }
@@ -198,7 +198,7 @@ void check(const PlanarProblem& p) {
     throw InvalidArgument(fmt::format("{} is {} x {}, expected {} x {}", what, matrix.rows(),
                                       matrix.cols(), rows, columns));
   };
-  const auto considered = static_cast<Index>(p.considered.size());
+  const Index considered = p.considered.size();
   if (considered > 0) {
     expect("considered_covariance", p.considered_covariance, considered, considered);
   }
@@ -235,9 +235,9 @@ void check(const PlanarProblem& p) {
 
 /// Whether any wall has a shape to be found.
 bool has_shape(const PlanarProblem& p) {
-  return !p.shape.parameters.empty() &&
-         std::any_of(p.views.begin(), p.views.end(),
-                     [](const WallView& view) { return !view.cell_begin.empty(); });
+  return !p.shape.parameters.empty() && std::ranges::any_of(p.views, [](const WallView& view) {
+    return !view.cell_begin.empty();
+  });
 }
 
 /// Cells that hold a shot of the view.
@@ -282,8 +282,7 @@ void take_redundancy(const PlanarSystem& system, const Eigen::MatrixXd& covarian
     for (std::size_t j = 0; j < view.at.size(); ++j) {
       for (std::size_t i = 0; i < view.at.size(); ++i) {
         if (view.at[i] >= covariance.rows() || view.at[j] >= covariance.rows()) continue;
-        taken += covariance(view.at[i], view.at[j]) *
-                 view.normal(static_cast<Index>(i), static_cast<Index>(j));
+        taken += covariance(view.at[i], view.at[j]) * view.normal(i, j);
       }
     }
     redundancy[v] -= taken;
@@ -315,8 +314,7 @@ void fill_numbers(const PlanarProblem& p, const Unknowns& at, const Eigen::Matri
     add(at.range_term(i), p.range_terms[i].name, p.range_terms[i].value);
   }
   add(at.range_offset(), "range_offset_m", p.range_offset);
-  solution.number_values =
-      Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Index>(values.size()));
+  solution.number_values = Eigen::Map<const Eigen::VectorXd>(values.data(), values.size());
   solution.number_covariance = covariance.block(at.free(), at.free(), at.numbers(), at.numbers());
   solution.number_cross_covariance = covariance.block(at.free(), 0, at.numbers(), at.free());
 }
@@ -352,10 +350,7 @@ Uncertainty uncertainty_of(const PlanarProblem& problem, const PlanarSystem& sys
                            PlanarSolution& solution) {
   const FlatSolution flat = solve_flat(system.problem, kLeastDamping);
   if (!flat.positive) return no_information(problem, system);
-  std::vector<std::vector<std::size_t>> views(problem.walls.size());
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    views[problem.views[v].wall].push_back(v);
-  }
+  const std::vector<std::vector<std::size_t>> views = views_of_walls(problem);
   Uncertainty result{flat.shared.normal, flat.shared.covariance, flat.shared.response, {}, true};
   for (std::size_t w = 0; w < flat.walls.size(); ++w) {
     const WallSums& wall = system.problem.walls[w];
@@ -385,7 +380,7 @@ void fill_uncertainty(const PlanarProblem& problem, const Unknowns& at,
   solution.information = eliminated(normal, free);
   solution.noise_covariance = uncertainty.covariance.topLeftCorner(free, free);
   // Errors of the considered quantities shift the solution by -N^-1 J^T W K.
-  const auto believed = static_cast<Index>(problem.considered.size());
+  const Index believed = problem.considered.size();
   solution.considered = response_of(uncertainty.response.leftCols(believed), at);
   const Eigen::MatrixXd considered = considered_covariance(problem);
   const auto of_considered = [&](const Eigen::MatrixXd& response) -> Eigen::MatrixXd {
@@ -459,9 +454,9 @@ std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& f
 }
 
 Eigen::MatrixXd prior_information(const PlanarProblem& problem) {
-  Eigen::VectorXd information = Eigen::VectorXd::Zero(static_cast<Index>(problem.free.size()));
+  Eigen::VectorXd information = Eigen::VectorXd::Zero(problem.free.size());
   for (std::size_t j = 0; j < problem.prior_sigma.size(); ++j) {
-    information[static_cast<Index>(j)] = 1.0 / (problem.prior_sigma[j] * problem.prior_sigma[j]);
+    information[j] = 1.0 / (problem.prior_sigma[j] * problem.prior_sigma[j]);
   }
   return information.asDiagonal();
 }
@@ -569,7 +564,7 @@ PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options,
 }
 
 Index PlanarSolution::number(std::string_view name) const {
-  const auto found = std::find(numbers.begin(), numbers.end(), name);
+  const auto found = std::ranges::find(numbers, name);
   return found == numbers.end() ? -1 : found - numbers.begin();
 }
 
@@ -582,7 +577,7 @@ SolutionResponse held_response(const PlanarProblem& solved, const HeldQuantities
                                InstructionSet set) {
   check(solved);
   const auto expect = [](const char* what, Index found, Index expected) {
-    require_length(what, static_cast<std::size_t>(found), static_cast<std::size_t>(expected));
+    require_length(what, found, expected);
   };
   expect("places of the held quantities", held.train.rows(),
          static_cast<Index>(solved.train.parameters().size()));

@@ -27,7 +27,7 @@ class WallLayout {
              std::size_t wall, const std::vector<std::size_t>& recordings)
       : own_(at.own(wall)), first_of_recording_(p.stations.size(), -1) {
     const auto add = [this](Index first, Index count) {
-      const Index local = own_ + static_cast<Index>(places_.size());
+      const Index local = own_ + std::ssize(places_);
       for (Index i = 0; i < count; ++i) places_.push_back(first + i);
       return local;
     };
@@ -39,7 +39,7 @@ class WallLayout {
     }
     rotation_.assign(p.stations.size(), -1);
     for (std::size_t i = 0; i < recordings.size(); ++i) rotation_[recordings[i]] = turns[i];
-    const auto believed = static_cast<Index>(p.considered.size());
+    const Index believed = p.considered.size();
     believed_ = add(at.shared(), believed);
     if (!p.mean_angle_covariance.empty()) {
       for (const std::size_t recording : recordings) {
@@ -54,7 +54,7 @@ class WallLayout {
 
   const std::vector<Index>& places() const { return places_; }
   Index own() const { return own_; }
-  Index size() const { return own_ + static_cast<Index>(places_.size()); }
+  Index size() const { return own_ + std::ssize(places_); }
   /// Of an unknown that all walls share: a parameter or a number.
   Index shared(Index unknown) const { return own_ + unknown; }
   /// Negative where it is held.
@@ -84,11 +84,11 @@ class ChainBuilder {
   /// A column of the wall. @return its place in the chain
   Index add(Index at) {
     chain_.at.push_back(at);
-    return static_cast<Index>(chain_.at.size()) - 1;
+    return std::ssize(chain_.at) - 1;
   }
   void set(Index row, Index column, double value) { entries_.push_back({row, column, value}); }
   Chain take() {
-    chain_.to = Eigen::MatrixXd::Zero(rows_, static_cast<Index>(chain_.at.size()));
+    chain_.to = Eigen::MatrixXd::Zero(rows_, chain_.at.size());
     for (const Entry& entry : entries_) chain_.to(entry.row, entry.column) = entry.value;
     return std::move(chain_);
   }
@@ -110,7 +110,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
   ChainBuilder chain(columns.size());
   for (Index j = 0; j < at.free(); ++j) {
     const Index own = chain.add(layout.shared(j));
-    for (const int place : p.free[static_cast<std::size_t>(j)].places) {
+    for (const int place : p.free[j].places) {
       chain.set(places.column(place), own, 1.0);
     }
   }
@@ -141,9 +141,9 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
     }
   }
   chain.set(columns.distance(), chain.add(at.distance(view)), 1.0);
-  for (Index j = 0; j < static_cast<Index>(p.considered.size()); ++j) {
+  for (Index j = 0; j < std::ssize(p.considered); ++j) {
     const Index own = chain.add(layout.believed() + j);
-    for (const int place : p.considered[static_cast<std::size_t>(j)].places) {
+    for (const int place : p.considered[j].places) {
       // The other error parameters that the sensor believes in only act through the angles.
       if (is_held_material(place, p)) chain.set(places.column(place), own, 1.0);
     }
@@ -178,14 +178,14 @@ double add_cells(const PlanarProblem& p, std::size_t view, const PlaneColumns& c
   const auto [u1, u2] = tangents_of(p.walls[seen.wall].normal);
   const Eigen::Vector3d& position = p.stations[seen.recording].position;
   const double stand_u = eigen(u1).dot(position), stand_v = eigen(u2).dot(position);
-  const auto cells = static_cast<Index>(grid.cells.size());
+  const Index cells = grid.cells.size();
   // A shot's row by the wall's height, and that times its place against the middle of its cell:
   // u - middle = -side n1 / d + (stand - middle).
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows = equations.cells;
   double within = equations.cost;
   for (Index cell = 0; cell < cells; ++cell) {
-    const double off_u = stand_u - grid.middle_u(static_cast<std::size_t>(cell));
-    const double off_v = stand_v - grid.middle_v(static_cast<std::size_t>(cell));
+    const double off_u = stand_u - grid.middle_u(cell);
+    const double off_v = stand_v - grid.middle_v(cell);
     auto d = rows.row(3 * cell), du = rows.row(3 * cell + 1), dv = rows.row(3 * cell + 2);
     const double all = d[columns.distance()];
     if (!(all > 0)) continue;
@@ -201,11 +201,11 @@ double add_cells(const PlanarProblem& p, std::size_t view, const PlaneColumns& c
           -row[columns.normal(0)] + seen.side * off_u * by_height,
           -row[columns.normal(1)] + seen.side * off_v * by_height;
     }
-    sums.weight[static_cast<std::size_t>(cell)] += weight;
+    sums.weight[cell] += weight;
   }
   const Eigen::MatrixXd own = algebra::product(rows.leftCols(columns.size()), chain.to);
   for (std::size_t j = 0; j < chain.at.size(); ++j) {
-    sums.columns.col(chain.at[j]) += own.col(static_cast<Index>(j));
+    sums.columns.col(chain.at[j]) += own.col(j);
   }
   sums.columns.rightCols(1) += rows.rightCols(1);
   return within;
@@ -222,12 +222,11 @@ ViewSystem add_view(const PlanarProblem& p, std::size_t view, const PlaneColumns
   const Eigen::VectorXd gradient = algebra::transposed_times(chain.to, equations.gradient);
   const Index residual = sums.system.cols() - 1;
   for (std::size_t j = 0; j < chain.at.size(); ++j) {
-    const auto column = static_cast<Index>(j);
     for (std::size_t i = 0; i < chain.at.size(); ++i) {
-      sums.system(chain.at[i], chain.at[j]) += own.normal(static_cast<Index>(i), column);
+      sums.system(chain.at[i], chain.at[j]) += own.normal(i, j);
     }
-    sums.system(chain.at[j], residual) += gradient[column];
-    sums.system(residual, chain.at[j]) += gradient[column];
+    sums.system(chain.at[j], residual) += gradient[j];
+    sums.system(residual, chain.at[j]) += gradient[j];
   }
   sums.system(residual, residual) += equations.cost;
   own.cost = equations.cost;
@@ -251,7 +250,7 @@ void add_priors(const PlanarProblem& p, const Unknowns& at, Eigen::MatrixXd& sys
   for (std::size_t j = 0; j < p.prior_sigma.size(); ++j) {
     if (!std::isfinite(p.prior_sigma[j])) continue;
     const int place = p.free[j].places.front();
-    tie(static_cast<Index>(j), p.prior_sigma[j], p.train[place] - p.prior[place], system);
+    tie(j, p.prior_sigma[j], p.train[place] - p.prior[place], system);
   }
   if (at.range_offset() >= 0) tie(at.range_offset(), p.range_offset_sigma, p.range_offset, system);
   for (std::size_t i = 0; i < p.sizes.size(); ++i) {
@@ -271,17 +270,10 @@ void add_priors(const PlanarProblem& p, const Unknowns& at, Eigen::MatrixXd& sys
   }
 }
 
-/// Rows of the views of every wall [walls].
-std::vector<std::vector<std::size_t>> views_of_walls(const PlanarProblem& p) {
-  std::vector<std::vector<std::size_t>> views(p.walls.size());
-  for (std::size_t v = 0; v < p.views.size(); ++v) views[p.views[v].wall].push_back(v);
-  return views;
-}
-
 }  // namespace
 
 Unknowns::Unknowns(const PlanarProblem& p)
-    : free_(static_cast<Index>(p.free.size())),
+    : free_(p.free.size()),
       rotation_(p.stations.size(), -1),
       own_(p.walls.size(), 0),
       normal_(p.walls.size(), -1),
@@ -319,29 +311,32 @@ Places::Places(const PlanarProblem& p, const HeldQuantities& held) {
   }
 }
 
-Index Places::column(int place) const {
-  return std::find(all_.begin(), all_.end(), place) - all_.begin();
-}
+Index Places::column(int place) const { return std::ranges::find(all_, place) - all_.begin(); }
 
 void Places::add(int place) {
-  if (std::find(all_.begin(), all_.end(), place) == all_.end()) all_.push_back(place);
+  if (std::ranges::find(all_, place) == all_.end()) all_.push_back(place);
 }
 
 Index considered_size(const PlanarProblem& p) {
-  return static_cast<Index>(p.considered.size()) +
-         static_cast<Index>(p.mean_angle_covariance.size()) * p.train.prisms();
+  return std::ssize(p.considered) + std::ssize(p.mean_angle_covariance) * p.train.prisms();
 }
 
 Eigen::MatrixXd considered_covariance(const PlanarProblem& p) {
   const Index size = considered_size(p);
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
-  Index at = static_cast<Index>(p.considered.size());
+  Index at = std::ssize(p.considered);
   if (at > 0) covariance.topLeftCorner(at, at) = p.considered_covariance;
   for (const Eigen::MatrixXd& own : p.mean_angle_covariance) {
     covariance.block(at, at, own.rows(), own.cols()) = own;
     at += own.rows();
   }
   return covariance;
+}
+
+std::vector<std::vector<std::size_t>> views_of_walls(const PlanarProblem& p) {
+  std::vector<std::vector<std::size_t>> views(p.walls.size());
+  for (std::size_t v = 0; v < p.views.size(); ++v) views[p.views[v].wall].push_back(v);
+  return views;
 }
 
 Eigen::Vector2d misfit_of(const Wall& wall) {
@@ -368,7 +363,7 @@ PlanarSystem build_system(const PlanarProblem& p, const HeldQuantities& held, co
   for (std::size_t w = 0; w < p.walls.size(); ++w) {
     std::vector<std::size_t> recordings;
     for (const std::size_t view : views[w]) recordings.push_back(p.views[view].recording);
-    std::sort(recordings.begin(), recordings.end());
+    std::ranges::sort(recordings);
     recordings.erase(std::unique(recordings.begin(), recordings.end()), recordings.end());
     const WallLayout layout(p, held, at, w, recordings);
     WallSums& sums = problem.walls.emplace_back();
@@ -378,7 +373,7 @@ PlanarSystem build_system(const PlanarProblem& p, const HeldQuantities& held, co
     if (cells == WallCells::summed && !p.walls[w].grid.empty()) {
       sums.grid = p.walls[w].grid;
       sums.weight.assign(sums.grid.cells.size(), Eigen::Matrix3d::Zero());
-      sums.columns.setZero(3 * static_cast<Index>(sums.grid.cells.size()), layout.size());
+      sums.columns.setZero(3 * std::ssize(sums.grid.cells), layout.size());
     }
     for (const std::size_t view : views[w]) {
       PlaneView plane = plane_view(p, view);

@@ -57,6 +57,9 @@ class Places {
 Eigen::Index considered_size(const PlanarProblem& problem);
 Eigen::MatrixXd considered_covariance(const PlanarProblem& problem);
 
+/// Rows of the views of every wall [walls].
+std::vector<std::vector<std::size_t>> views_of_walls(const PlanarProblem& problem);
+
 /// Adjusted less stated normal, in the tangents of the adjusted one, rad.
 Eigen::Vector2d misfit_of(const Wall& wall);
 /// Adjusted after stated rotation, scene frame, rad.

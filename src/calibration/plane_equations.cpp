@@ -21,7 +21,7 @@ constexpr std::size_t kChunkShots = 8192;
 void check(const RangedShots& shots, const PlaneView& view, const ResidualColumns& columns) {
   const std::span<const std::uint32_t> cell_begin = view.cell_begin;
   if (!cell_begin.empty() && (cell_begin.front() != 0 || cell_begin.back() != shots.size() ||
-                              !std::is_sorted(cell_begin.begin(), cell_begin.end()))) {
+                              !std::ranges::is_sorted(cell_begin))) {
     throw InvalidArgument("cell_begin does not divide the shots");
   }
   require_shots(shots, view.train);
@@ -138,7 +138,7 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
   std::vector<std::size_t> lost(chunks);
   PlaneEquations equations;
   if (!cell_begin.empty()) {
-    equations.cells.setZero(3 * (static_cast<Eigen::Index>(cell_begin.size()) - 1), size + 1);
+    equations.cells.setZero(3 * (std::ssize(cell_begin) - 1), size + 1);
     all.cell_begin = cell_begin.data();
     all.cell_products = equations.cells.data();
   }

@@ -101,7 +101,7 @@ struct Constants {
 
 /// The columns of one block of shots. Behind the last shot of a call follow some that are lost.
 template <int N>
-class Block {
+class ShotBlock {
  public:
   static constexpr std::size_t kPairs = N * (N + 1) / 2;
 
@@ -172,7 +172,7 @@ class Walks {
   /// @param first  shot of the call's columns
   /// @return lanes that are lost
   [[gnu::flatten]] std::size_t fill_rows(const PlaneArguments& a, Constants<N>& c,
-                                         const Block<N>& block, std::size_t first,
+                                         const ShotBlock<N>& block, std::size_t first,
                                          Products<N>& products, BlockResiduals& residuals) {
     const std::size_t groups = block.groups();
     for (std::size_t g = 0; g < groups; ++g) {
@@ -228,7 +228,7 @@ class Walks {
 
   /// One group of shots, a lane each: writes its row.
   /// @return lanes that are lost
-  std::size_t fill_row(const PlaneArguments& a, const Constants<N>& c, const Block<N>& block,
+  std::size_t fill_row(const PlaneArguments& a, const Constants<N>& c, const ShotBlock<N>& block,
                        std::size_t group, Batch* row, BlockResiduals& residuals) const {
     const Batch zero(0.0), one(1.0);
     const Meeting& m = meeting_[group];
@@ -326,7 +326,7 @@ std::size_t accumulate_shots(const PlaneArguments& a) {
       static_cast<std::size_t>(a.place_count + a.size_count + a.term_count) + N + 5;
   Products<N> products(columns);
   std::size_t cell = a.first_cell;
-  Block<N> block;
+  ShotBlock<N> block;
   BlockResiduals residuals;
   Walks<N> walks;
   std::size_t lost = 0;

@@ -94,7 +94,7 @@ class Labeller {
         labels[i] = static_cast<int>(k);
       }
       for (std::size_t k = 0; k < planes && labels[i] >= 0; ++k) {
-        const Plane& own = planes_[static_cast<std::size_t>(labels[i])];
+        const Plane& own = planes_[labels[i]];
         at_edge_[i] |= there(k, cell) && doubtful(own, planes_[k], points_.beams[i]);
       }
     }
@@ -121,7 +121,7 @@ class Labeller {
       for (const Plane& plane : planes_) fits.emplace_back(plane, points_.noise);
       for (std::size_t i = 0; i < points_.beams.size(); ++i) {
         if (label_[i] < 0 || at_edge_[i]) continue;
-        fits[static_cast<std::size_t>(label_[i])].add(points_.beams[i]);
+        fits[label_[i]].add(points_.beams[i]);
       }
       for (std::size_t k = 0; k < planes_.size(); ++k) {
         planes_[k] = fits[k].step().value_or(planes_[k]);
@@ -132,14 +132,12 @@ class Labeller {
   std::vector<std::vector<std::size_t>> members() const {
     std::vector<std::vector<std::size_t>> rows(planes_.size());
     for (std::size_t i = 0; i < points_.beams.size(); ++i) {
-      if (label_[i] >= 0) rows[static_cast<std::size_t>(label_[i])].push_back(i);
+      if (label_[i] >= 0) rows[label_[i]].push_back(i);
     }
     return rows;
   }
 
-  void remove(std::size_t plane) {
-    planes_.erase(planes_.begin() + static_cast<std::ptrdiff_t>(plane));
-  }
+  void remove(std::size_t plane) { planes_.erase(planes_.begin() + plane); }
 
   /// Removes the smallest plane that is none after all. @return whether there was one
   bool drop_one() {

@@ -89,7 +89,7 @@ void take_shots(const estimation::Estimate& estimate, RangedRecording& recording
     const std::size_t number = begin / kBlockShots;
     const SoundShots block = std::move(blocks[number]);
     const auto put = [at = first[number]](const auto& from, auto& to) {
-      std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(at));
+      std::ranges::copy(from, to.begin() + at);
     };
     for_each_column(put, block.shots, shots);
     put(block.time_ns, recording.time_ns);
@@ -100,11 +100,10 @@ void take_shots(const estimation::Estimate& estimate, RangedRecording& recording
 
 void RangedShots::resize(int prisms, std::size_t shots) {
   require_between("number of prisms", prisms, 1, kMaxPrisms);
-  const auto n = static_cast<std::size_t>(prisms);
-  rotation_angle.resize(n);
-  angle_covariance.resize(n * (n + 1) / 2);
+  rotation_angle.resize(prisms);
+  angle_covariance.resize(prisms * (prisms + 1) / 2);
   // At once: of long columns, most of the time goes into memory that is touched for the first time.
-  const std::size_t angles = n, covariances = angle_covariance.size();
+  const std::size_t angles = prisms, covariances = angle_covariance.size();
   parallel::for_each(angles + covariances + 2, [&](std::size_t i) {
     if (i < angles) {
       rotation_angle[i].resize(shots);
@@ -127,8 +126,7 @@ RangedShots columns_like(const RangedShots& shots, std::size_t size) {
 }
 
 RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows) {
-  if (!rows.empty())
-    require_place("row", *std::max_element(rows.begin(), rows.end()), shots.size());
+  if (!rows.empty()) require_place("row", *std::ranges::max_element(rows), shots.size());
   RangedShots result = columns_like(shots, rows.size());
   for_each_block(rows.size(), [&](std::size_t begin, std::size_t end) {
     const auto take = [&](const auto& from, auto& to) {

@@ -118,13 +118,13 @@ class Search {
   /// RANSAC. Triples are drawn from everywhere, from about six and from about two degrees in turn:
   /// the near ones find small planes, whose points far ones hardly ever hit thrice.
   std::optional<Candidate> largest_plane(const std::vector<std::size_t>& rest) {
-    const std::vector<std::size_t> scored(
-        rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(std::min(kScored, rest.size())));
+    const std::vector<std::size_t> scored(rest.begin(),
+                                          rest.begin() + (std::min(kScored, rest.size())));
     const std::array<int, 3> reach{0, cells_in(kFartherTriple), cells_in(kNearTriple)};
     std::optional<Candidate> best;
     int trials = kMostTrials, polished_ones = 0;
     for (int trial = 0; trial < trials; ++trial) {
-      const int near = reach[static_cast<std::size_t>(trial % 3)];
+      const int near = reach[trial % 3];
       const std::size_t a = rest[random_below(rest.size())];
       const std::size_t b = near > 0 ? neighbour(a, near, rest) : rest[random_below(rest.size())];
       const std::size_t c = near > 0 ? neighbour(a, near, rest) : rest[random_below(rest.size())];

@@ -63,11 +63,11 @@ Segmentation segment_planes(std::span<const Vector3<double>> points,
   }
   std::vector<std::size_t> counts(planes, 0), order(planes);
   for (int label : found.label) {
-    if (label >= 0) ++counts[static_cast<std::size_t>(label)];
+    if (label >= 0) ++counts[label];
   }
   for (std::size_t k = 0; k < planes; ++k) order[k] = k;
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return counts[a] > counts[b]; });
+  std::ranges::stable_sort(order,
+                           [&](std::size_t a, std::size_t b) { return counts[a] > counts[b]; });
   std::vector<int> place(planes);
   for (std::size_t k = 0; k < planes; ++k) {
     place[order[k]] = static_cast<int>(k);
@@ -76,7 +76,7 @@ Segmentation segment_planes(std::span<const Vector3<double>> points,
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const int label = found.label[i];
-    if (label >= 0) result.label[rows[i]] = place[static_cast<std::size_t>(label)];
+    if (label >= 0) result.label[rows[i]] = place[label];
   }
   return result;
 }

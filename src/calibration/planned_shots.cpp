@@ -8,14 +8,16 @@
 #include <span>
 #include <utility>
 
+#include "risley/calibration/rays.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
-#include "risley/optics/batch.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/trajectories/interpolation.hpp"
+
+#include "calibration/eigen_vectors.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -38,10 +40,9 @@ void fire(const PlannedFlight& planned, std::uint64_t first, std::uint64_t last,
   const sensors::Sensor& sensor = planned.sensor;
   const RandomStream choice(seed, kChoice);
   fired = {};
-  const std::vector<double> start =
-      sensor.sequence && !sensor.sequence->rotation_angle.empty()
-          ? sensor.sequence->rotation_angle
-          : std::vector<double>(static_cast<std::size_t>(sensor.prisms()), 0.0);
+  const std::vector<double> start = sensor.sequence && !sensor.sequence->rotation_angle.empty()
+                                        ? sensor.sequence->rotation_angle
+                                        : std::vector<double>(sensor.prisms(), 0.0);
   fired.shots.rotation_angle.resize(start.size());
   const auto emitters = static_cast<std::uint64_t>(sensor.train.emitters());
   const auto clock_ns =
@@ -65,19 +66,8 @@ std::vector<double> ranges_of(const PlannedFlight& planned, const scenes::Terrai
                               const trajectories::Interpolation& poses, const FiredShots& fired,
                               std::uint64_t seed, PlannedPiece& piece) {
   const std::size_t n = fired.number.size();
-  std::array<std::vector<double>, 6> beams;
-  for (auto& column : beams) column.resize(n);
-  DirectionColumns columns;
-  columns.x = beams[0];
-  columns.y = beams[1];
-  columns.z = beams[2];
-  columns.origin_x = beams[3];
-  columns.origin_y = beams[4];
-  columns.origin_z = beams[5];
-  columns.geometry = planned.sensor.geometry;
-  const std::vector<std::span<const double>> angles(fired.shots.rotation_angle.begin(),
-                                                    fired.shots.rotation_angle.end());
-  observe_batch(planned.sensor.train, angles, columns, fired.shots.beam);
+  const Rays rays(planned.sensor.train, planned.sensor.geometry, fired.shots.rotation_angle,
+                  fired.shots.beam, {0, n});
   const Eigen::Matrix3d turn = trajectories::body_from_sensor(planned.mount);
   const Eigen::Vector3d lever = trajectories::lever_arm(planned.mount);
   const RandomStream penetration(seed, kPenetration);
@@ -88,18 +78,16 @@ std::vector<double> ranges_of(const PlannedFlight& planned, const scenes::Terrai
   parallel::for_each((n + kTaskShots - 1) / kTaskShots, [&](std::size_t task) {
     auto cursor = poses.cursor();
     for (std::size_t i = task * kTaskShots; i < std::min(n, (task + 1) * kTaskShots); ++i) {
-      if (std::isnan(beams[0][i])) continue;
+      if (std::isnan(rays.direction(i).x)) continue;
       const auto pose = cursor.at(fired.time_ns[i]);
       if (!pose) continue;
       const Eigen::Matrix3d attitude = pose->attitude.toRotationMatrix();
       const Eigen::Vector3d start =
-          pose->position +
-          attitude * (lever + turn * Eigen::Vector3d(beams[3][i], beams[4][i], beams[5][i]));
-      const Eigen::Vector3d direction =
-          (attitude * (turn * Eigen::Vector3d(beams[0][i], beams[1][i], beams[2][i]))).normalized();
-      const auto hit = terrain.nearest_hit(
-          {start.x(), start.y(), start.z()}, {direction.x(), direction.y(), direction.z()},
-          planned.sensor.range_maximum, penetration.uniform(fired.number[i]));
+          pose->position + attitude * (lever + turn * eigen(rays.origin(i)));
+      const Eigen::Vector3d direction = (attitude * (turn * eigen(rays.direction(i)))).normalized();
+      const auto hit =
+          terrain.nearest_hit(plain(start), plain(direction), planned.sensor.range_maximum,
+                              penetration.uniform(fired.number[i]));
       if (!hit || hit->range < planned.sensor.range_minimum ||
           hit->range > planned.sensor.range_maximum) {
         continue;
@@ -129,8 +117,7 @@ void for_each_planned_piece(const PlannedFlight& planned, const trajectories::Fl
   const sensors::Sensor& sensor = planned.sensor;
   trajectories::require_mount(planned.mount);
   require_at_least("prisms of the sensor", sensor.prisms(), 1);
-  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(),
-                 static_cast<std::size_t>(sensor.prisms()));
+  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), sensor.prisms());
   require_above("shot rate of the sensor", sensor.shot_rate, 0, "Hz");
   if (options.rate) {
     require_above("rate", *options.rate, 0, "Hz");

@@ -45,7 +45,7 @@ double largest_score(const ProcessCheck& check, Index step) {
 
 ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& corrections,
                            const FlightPriors& priors, const FlightSystem::Band& band) {
-  const auto count = static_cast<Index>(knots.size());
+  const Index count = knots.size();
   ProcessCheck check;
   check.score = Eigen::MatrixXd::Zero(kCorrections, std::max<Index>(count - 1, 0));
   check.told = check.jump = check.score;
@@ -53,16 +53,15 @@ ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& 
   for (int c = 0; c < kCorrections; ++c) {
     const KnotSteps steps = knot_steps(knots, priors.process, c, priors.breaks);
     for (Index k = 0; k < count; ++k) {
-      const auto i = static_cast<std::size_t>(k);
       const Index at = kCorrections * k + c;
       double off = corrections(c, k), variance = band.diagonal[at];
       if (k > 0) {
-        const double decay = steps.decay[i];
+        const double decay = steps.decay[k];
         off -= decay * corrections(c, k - 1);
         variance +=
             decay * (decay * band.diagonal[at - kCorrections] - 2 * band.next[at - kCorrections]);
       }
-      const double before = steps.sigma[i] * steps.sigma[i];
+      const double before = steps.sigma[k] * steps.sigma[k];
       const double told = std::clamp(1 - variance / before, 0.0, 1.0);
       check.chi2[c] += off * off / before;
       check.expected[c] += told;
@@ -80,17 +79,15 @@ std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessChe
   for (Index k = 0; k < check.score.cols(); ++k) {
     if (largest_score(check, k) > kJumpSigmas) steps.push_back(k);
   }
-  std::sort(steps.begin(), steps.end(),
-            [&](Index a, Index b) { return largest_score(check, a) > largest_score(check, b); });
+  std::ranges::sort(
+      steps, [&](Index a, Index b) { return largest_score(check, a) > largest_score(check, b); });
   std::vector<std::size_t> jumps;
   for (const Index k : steps) {
-    const auto knot = static_cast<std::size_t>(k);
-    const bool far = std::all_of(jumps.begin(), jumps.end(), [&](std::size_t other) {
-      return seconds_apart(knots, other, knot) > kJumpsApart;
-    });
-    if (far) jumps.push_back(knot);
+    const bool far = std::ranges::all_of(
+        jumps, [&](std::size_t other) { return seconds_apart(knots, other, k) > kJumpsApart; });
+    if (far) jumps.push_back(k);
   }
-  std::sort(jumps.begin(), jumps.end());
+  std::ranges::sort(jumps);
   return jumps;
 }
 
@@ -99,9 +96,8 @@ Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck
   const std::vector<std::size_t> jumps = jumps_of(knots, check);
   Eigen::VectorXd chi2 = Eigen::VectorXd::Zero(kCorrections), expected = chi2;
   for (Index k = 0; k < check.score.cols(); ++k) {
-    const auto step = static_cast<std::size_t>(k);
-    if (std::any_of(jumps.begin(), jumps.end(), [&](std::size_t jump) {
-          return seconds_apart(knots, jump, step) <= kJumpsApart;
+    if (std::ranges::any_of(jumps, [&](std::size_t jump) {
+          return seconds_apart(knots, jump, k) <= kJumpsApart;
         })) {
       continue;
     }

@@ -115,8 +115,7 @@ std::vector<SizePrior> size_priors(const sensors::Sensor& sensor) {
 PrismGeometry one_size_each(const PrismGeometry& geometry, int prisms) {
   const auto expanded = [](const std::vector<double>& values, int count) {
     if (values.size() > 1) return values;
-    return std::vector<double>(static_cast<std::size_t>(count),
-                               values.empty() ? 0.0 : values.front());
+    return std::vector<double>(count, values.empty() ? 0.0 : values.front());
   };
   return {expanded(geometry.thickness, prisms), expanded(geometry.spacing, prisms - 1)};
 }

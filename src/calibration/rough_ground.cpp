@@ -69,7 +69,7 @@ std::optional<RoughGround> rough_ground(const FlightShots& shots, const ShotPose
   std::vector<CellSums> cells(model.planes.size());
   for (const auto& piece : pieces) {
     for (const PatchResidual& own : piece) {
-      CellSums& cell = cells[static_cast<std::size_t>(own.plane)];
+      CellSums& cell = cells[own.plane];
       cell.residual[own.patch] += own.residual;
       cell.squares[own.patch] += own.residual * own.residual;
       ++cell.count[own.patch];

@@ -118,7 +118,7 @@ std::vector<Pose> candidates(const Planes& own, const Planes& reference) {
       }
     }
   }
-  std::stable_sort(found.begin(), found.end(), [](const Pose& x, const Pose& y) {
+  std::ranges::stable_sort(found, [](const Pose& x, const Pose& y) {
     return x.points != y.points ? x.points > y.points : x.position.norm() < y.position.norm();
   });
   return found;

@@ -85,7 +85,7 @@ Labels label_shots(const PlanarProblem& problem, std::size_t recording, const Ra
       if (!edge && best <= kGate) {
         labels.view[i] = closest;
       } else {
-        ++near[static_cast<std::size_t>(closest)];
+        ++near[closest];
       }
     }
     const std::scoped_lock lock(counting);
@@ -101,7 +101,7 @@ void hand_out(const RangedShots& shots, const std::vector<int>& view, std::size_
     auto& rows = rows_of_blocks[begin / kBlockShots];
     rows.resize(problem.views.size());
     for (std::size_t i = begin; i < end; ++i) {
-      if (view[i] >= 0) rows[static_cast<std::size_t>(view[i])].push_back(i);
+      if (view[i] >= 0) rows[view[i]].push_back(i);
     }
   });
   parallel::for_each(problem.views.size(), [&](std::size_t v) {

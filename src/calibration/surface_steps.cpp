@@ -16,6 +16,8 @@
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 
+#include "calibration/sorted_rows.hpp"
+
 namespace risley::calibration {
 namespace {
 
@@ -102,10 +104,9 @@ class SmoothSurface {
   }
 
   void fit(std::vector<Cell>& cells, std::size_t terms) {
-    const auto size = static_cast<Eigen::Index>(terms);
     for (int round = 0; round < kMostWeightRounds; ++round) {
-      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
-      Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
+      Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(terms, terms);
+      Eigen::VectorXd right = Eigen::VectorXd::Zero(terms);
       for (const Cell& cell : cells) {
         const double part = cell.z / (kTukey * spread_);
         // The square root of Tukey's weight over the variance.
@@ -113,9 +114,9 @@ class SmoothSurface {
         const auto row = terms_of(cell.x, cell.y);
         for (std::size_t i = 0; i < terms; ++i) {
           const double weighted = root * root * row[i];
-          right[static_cast<Eigen::Index>(i)] += weighted * cell.centre;
+          right[i] += weighted * cell.centre;
           for (std::size_t j = 0; j < terms; ++j) {
-            normal(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += weighted * row[j];
+            normal(i, j) += weighted * row[j];
           }
         }
       }
@@ -123,7 +124,7 @@ class SmoothSurface {
       const Eigen::VectorXd solution = algebra::times(algebra::pseudo_inverse(normal), right);
       double change = 0;
       for (std::size_t j = 0; j < terms; ++j) {
-        const double next = solution[static_cast<Eigen::Index>(j)];
+        const double next = solution[j];
         change = std::max(change, std::abs(next - coefficients_[j]));
         coefficients_[j] = next;
       }
@@ -169,17 +170,15 @@ class Grid {
     }
     columns_ = 1 + static_cast<int>((right - left_) / kSurfaceCell);
     rows_ = 1 + static_cast<int>((top - bottom_) / kSurfaceCell);
-    std::vector<std::size_t> begin(static_cast<std::size_t>(columns_ * rows_) + 1, 0), cell_of;
+    std::vector<int> cell_of(size, -1);
     for (std::size_t i : rows) {
       const int column = static_cast<int>((x_of(i) - left_) / kSurfaceCell);
       const int row = static_cast<int>((residuals.zenith[i] - bottom_) / kSurfaceCell);
-      cell_of.push_back(static_cast<std::size_t>(row * columns_ + column));
-      ++begin[cell_of.back() + 1];
+      cell_of[i] = row * columns_ + column;
     }
-    for (std::size_t c = 0; c + 1 < begin.size(); ++c) begin[c + 1] += begin[c];
-    order_.resize(rows.size());
-    std::vector<std::size_t> next = begin;
-    for (std::size_t k = 0; k < rows.size(); ++k) order_[next[cell_of[k]]++] = rows[k];
+    SortedRows sorted(columns_ * rows_, size, [&](std::size_t i) { return cell_of[i]; });
+    order_ = std::move(sorted.rows);
+    const std::vector<std::size_t>& begin = sorted.begin;
     place_.assign(begin.size() - 1, -1);
     for (std::size_t c = 0; c + 1 < begin.size(); ++c) {
       if (begin[c + 1] == begin[c]) continue;
@@ -208,7 +207,7 @@ class Grid {
     for (int row = std::max(0, cell.row - 1); row <= std::min(rows_ - 1, cell.row + 1); ++row) {
       for (int column = std::max(0, cell.column - 1);
            column <= std::min(columns_ - 1, cell.column + 1); ++column) {
-        const int at = place_[static_cast<std::size_t>(row * columns_ + column)];
+        const int at = place_[row * columns_ + column];
         if (at >= 0 && (row != cell.row || column != cell.column)) {
           found.push_back(static_cast<std::size_t>(at));
         }
@@ -288,7 +287,7 @@ class StepSearch {
         steps.push_back(std::move(step));
       }
     }
-    std::stable_sort(steps.begin(), steps.end(), [](const StepRegion& a, const StepRegion& b) {
+    std::ranges::stable_sort(steps, [](const StepRegion& a, const StepRegion& b) {
       return a.solid_angle > b.solid_angle;
     });
     return steps;
@@ -369,7 +368,7 @@ class StepSearch {
         step.rows.push_back(i);
       }
     }
-    std::sort(step.rows.begin(), step.rows.end());
+    std::ranges::sort(step.rows);
     step.points = step.rows.size();
   }
 
@@ -401,7 +400,7 @@ SurfaceReport inspect_surface(const SurfaceResiduals& residuals) {
   for (const Cell& cell : grid.cells) {
     const auto around = grid.around(cell);
     // Cells beside a step hold some of its rows, too few to move their median.
-    const bool step = cell.region >= 0 || std::any_of(around.begin(), around.end(), [&](auto c) {
+    const bool step = cell.region >= 0 || std::ranges::any_of(around, [&](auto c) {
                         return grid.cells[c].region >= 0;
                       });
     if (!cell.full || step) continue;

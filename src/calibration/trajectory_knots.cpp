@@ -41,8 +41,8 @@ struct KnotPlace {
 /// @param begin, end  knots of the strip
 KnotPlace place_among(const TrajectoryKnots& knots, std::size_t begin, std::size_t end,
                       std::int64_t time_ns) {
-  const auto first = knots.time_ns.begin() + static_cast<std::ptrdiff_t>(begin);
-  const auto last = knots.time_ns.begin() + static_cast<std::ptrdiff_t>(end);
+  const auto first = knots.time_ns.begin() + begin;
+  const auto last = knots.time_ns.begin() + end;
   const auto behind = std::upper_bound(first + 1, last - 1, time_ns);
   KnotPlace place;
   place.knot = static_cast<std::size_t>(behind - knots.time_ns.begin()) - 1;
@@ -52,9 +52,9 @@ KnotPlace place_among(const TrajectoryKnots& knots, std::size_t begin, std::size
 }
 
 void require_columns_of(const TrajectoryKnots& knots, const Eigen::MatrixXd& columns) {
-  require_at_least("knots", static_cast<long long>(knots.size()), 1);
-  require_length("rows of the corrections", static_cast<std::size_t>(columns.rows()), kCorrections);
-  require_length("corrections", static_cast<std::size_t>(columns.cols()), knots.size());
+  require_at_least("knots", knots.size(), 1);
+  require_length("rows of the corrections", columns.rows(), kCorrections);
+  require_length("corrections", columns.cols(), knots.size());
 }
 
 /// The knots before and behind a time.
@@ -66,8 +66,7 @@ struct Neighbours {
   Neighbours(const TrajectoryKnots& all, std::int64_t at)
       : knots(all),
         time_ns(at),
-        next(static_cast<std::size_t>(std::upper_bound(all.time_ns.begin(), all.time_ns.end(), at) -
-                                      all.time_ns.begin())) {}
+        next(std::ranges::upper_bound(all.time_ns, at) - all.time_ns.begin()) {}
 
   bool has_before() const { return next > 0; }
   bool has_behind() const { return next < knots.size(); }
@@ -82,8 +81,7 @@ struct Neighbours {
   }
   Eigen::Matrix<double, kCorrections, 1> between(const Eigen::MatrixXd& columns) const {
     const double weight = since_before() / (since_before() + until_behind());
-    const auto at = static_cast<Index>(next);
-    return (1 - weight) * columns.col(at - 1) + weight * columns.col(at);
+    return (1 - weight) * columns.col(next - 1) + weight * columns.col(next);
   }
 };
 
@@ -94,7 +92,7 @@ trajectories::PoseError error_of(int correction) {
   constexpr PoseError kErrors[kCorrections] = {PoseError::east,       PoseError::north,
                                                PoseError::up,         PoseError::tilt_east,
                                                PoseError::tilt_north, PoseError::heading};
-  require_place("correction", static_cast<std::size_t>(correction), kCorrections);
+  require_place("correction", correction, kCorrections);
   return kErrors[correction];
 }
 
@@ -140,10 +138,9 @@ TrajectoryKnots make_knots(const FlightShots& shots, double spacing) {
 
 Eigen::MatrixXd resampled(const TrajectoryKnots& from, const Eigen::MatrixXd& corrections,
                           const TrajectoryKnots& to) {
-  require_length("rows of the corrections", static_cast<std::size_t>(corrections.rows()),
-                 kCorrections);
-  require_length("corrections", static_cast<std::size_t>(corrections.cols()), from.size());
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(kCorrections, static_cast<Index>(to.size()));
+  require_length("rows of the corrections", corrections.rows(), kCorrections);
+  require_length("corrections", corrections.cols(), from.size());
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(kCorrections, to.size());
   for (std::size_t k = 0; k < to.size(); ++k) {
     const auto range = std::equal_range(from.strip.begin(), from.strip.end(), to.strip[k]);
     const auto begin = static_cast<std::size_t>(range.first - from.strip.begin());
@@ -151,7 +148,7 @@ Eigen::MatrixXd resampled(const TrajectoryKnots& from, const Eigen::MatrixXd& co
     if (begin == end) continue;
     const KnotPlace place = place_among(from, begin, end, to.time_ns[k]);
     const auto knot = static_cast<Index>(place.knot);
-    result.col(static_cast<Index>(k)) =
+    result.col(k) =
         (1 - place.weight) * corrections.col(knot) + place.weight * corrections.col(knot + 1);
   }
   return result;
@@ -177,7 +174,7 @@ KnotSteps knot_steps(const TrajectoryKnots& knots, const trajectories::ErrorProc
   for (const ProcessBreak& one : breaks) {
     require_place("knot before a break", one.knot + 1, knots.size());
     double& sigma = steps.sigma[one.knot + 1];
-    sigma = std::hypot(sigma, one.sigma[static_cast<std::size_t>(correction)]);
+    sigma = std::hypot(sigma, one.sigma[correction]);
   }
   return steps;
 }
@@ -236,7 +233,7 @@ Eigen::Matrix<double, kCorrections, 1> correction_at(const TrajectoryKnots& knot
     double before = 0, left = 0, after = 0, right = 0;
     const double time = correlation_time(process, c);
     const auto in_sigmas = [&](std::size_t knot) {
-      return corrections(c, static_cast<Index>(knot)) / sigma_at(process, c, knots.time_ns[knot]);
+      return corrections(c, knot) / sigma_at(process, c, knots.time_ns[knot]);
     };
     if (near.has_before()) {
       before = std::exp(-near.since_before() / time);
@@ -264,8 +261,7 @@ Eigen::Matrix<double, kCorrections, 1> correction_sigma_at(
     double variance = 1;  // in squared sigmas of the process
     const auto add = [&](std::size_t knot, double apart) {
       const double kept = std::exp(-2 * apart / correlation_time(process, c));
-      const double own =
-          knot_sigma(c, static_cast<Index>(knot)) / sigma_at(process, c, knots.time_ns[knot]);
+      const double own = knot_sigma(c, knot) / sigma_at(process, c, knots.time_ns[knot]);
       variance = std::min(variance, 1 - kept * (1 - own * own));
     };
     if (near.has_before()) add(near.next - 1, near.since_before());

@@ -69,7 +69,7 @@ constexpr const char* kBetterScan =
     "degrees; or give what is known of walls and poses (option planes, option stations)";
 
 CalibrationVerdict undecided_words(const Calibration& c) {
-  if (std::any_of(c.prior_tests.begin(), c.prior_tests.end(), contradicts)) {
+  if (std::ranges::any_of(c.prior_tests, contradicts)) {
     return {
         CalibrationCode::undecided, c.reason,
         "check the normals and poses that were stated, or leave them out (option planes, option "
@@ -137,8 +137,8 @@ std::string reason_of_ranges(const Calibration& c, const std::vector<RangedRecor
   // Sound units scatter by a third of their specification at least; centimetres for millimetres,
   // metres for feet are further off.
   constexpr double kMostOff = 3.0;
-  const auto assumed = std::find_if(recordings.begin(), recordings.end(),
-                                    [](const RangedRecording& one) { return one.unit_assumed; });
+  const auto assumed =
+      std::ranges::find_if(recordings, [](const RangedRecording& one) { return one.unit_assumed; });
   if (assumed == recordings.end()) return "";
   if (c.sigma0 <= kMostOff && c.sigma0 * kMostOff >= 1.0) return "";
   return fmt::format(
@@ -151,7 +151,7 @@ CalibrationVerdict verdict_of(const Calibration& c) {
   if (!c.converged) return undecided_words(c);
   Eigen::VectorXd change = c.parameters;
   for (Eigen::Index i = 0; i < change.size(); ++i) {
-    change[i] -= c.believed.get(c.free[static_cast<std::size_t>(i)].name);
+    change[i] -= c.believed.get(c.free[i].name);
   }
   const auto freedom = static_cast<double>(change.size());
   Eigen::MatrixXd covariance = c.covariance;
@@ -234,7 +234,7 @@ PointingError pointing_error_of(const FlightCalibration& c) {
     const int row = FlightUnknowns::parameter(static_cast<int>(j));
     rows.push_back(row);
     for (const int place : c.model.free[j].places) {
-      given.set_place(place, c.unknowns[static_cast<std::size_t>(row)].start);
+      given.set_place(place, c.unknowns[row].start);
     }
   }
   return BeamBundle(train, c.model.free, angles, emitters)
@@ -269,10 +269,10 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
     for (std::size_t i = from; i < c.unknowns.size(); ++i) {
       if (!c.unknowns[i].held) rows.push_back(static_cast<Eigen::Index>(i));
     }
-    Eigen::VectorXd change(static_cast<Eigen::Index>(rows.size()));
+    Eigen::VectorXd change(rows.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const FlightUnknown& own = c.unknowns[static_cast<std::size_t>(rows[i])];
-      change[static_cast<Eigen::Index>(i)] = own.value - own.start;
+      const FlightUnknown& own = c.unknowns[rows[i]];
+      change[i] = own.value - own.start;
     }
     const double chi2 =
         rows.empty() ? 0.0
@@ -282,8 +282,7 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
   const auto significant = [](const std::pair<double, double>& test) {
     return test.first > significant_chi2(std::max(1.0, test.second));
   };
-  const auto all = significance(0),
-             prisms = significance(static_cast<std::size_t>(FlightUnknowns{}.size()));
+  const auto all = significance(0), prisms = significance(FlightUnknowns{}.size());
   const std::string strips =
       fmt::format("strips were {:.3g} mm apart with what was stated and are {:.3g} mm apart now",
                   1e3 * c.rms_before, 1e3 * c.rms_after);

@@ -22,7 +22,7 @@ std::vector<SurfaceReport> inspect_views(const PlanarProblem& problem,
   // The largest first: one thread would be left alone with it.
   std::vector<std::size_t> order(reports.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
     return problem.views[a].shots->size() > problem.views[b].shots->size();
   });
   parallel::for_each(order.size(), [&](std::size_t i) {

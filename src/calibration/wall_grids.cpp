@@ -12,7 +12,9 @@
 #include "risley/parallel/parallel.hpp"
 
 #include "calibration/eigen_vectors.hpp"
+#include "calibration/planar_system.hpp"
 #include "calibration/shot_blocks.hpp"
+#include "calibration/sorted_rows.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -118,17 +120,11 @@ void lay_grid(PlanarProblem& problem, std::size_t wall, const std::vector<std::s
   }
   for (std::size_t i = 0; i < views.size(); ++i) {
     WallView& view = problem.views[views[i]];
-    view.cell_begin.assign(grid.cells.size() + 1, 0);
-    for (const std::uint32_t own : cell[i]) {
-      if (own != none) ++view.cell_begin[row[own] + 1];
-    }
-    std::partial_sum(view.cell_begin.begin(), view.cell_begin.end(), view.cell_begin.begin());
-    std::vector<std::uint32_t> next(view.cell_begin.begin(), view.cell_begin.end() - 1);
-    std::vector<std::size_t> order(view.cell_begin.back());
-    for (std::size_t shot = 0; shot < cell[i].size(); ++shot) {
-      if (cell[i][shot] != none) order[next[row[cell[i][shot]]]++] = shot;
-    }
-    view.shots = std::make_shared<const RangedShots>(rows_of(*view.shots, order));
+    const SortedRows sorted(grid.cells.size(), cell[i].size(), [&](std::size_t shot) {
+      return cell[i][shot] == none ? grid.cells.size() : row[cell[i][shot]];
+    });
+    view.cell_begin.assign(sorted.begin.begin(), sorted.begin.end());
+    view.shots = std::make_shared<const RangedShots>(rows_of(*view.shots, sorted.rows));
   }
   problem.walls[wall].grid = std::move(grid);
 }
@@ -138,8 +134,8 @@ void lay_grid(PlanarProblem& problem, std::size_t wall, const std::vector<std::s
 void find_positions(PlanarProblem& problem) {
   constexpr double kDistanceSigma = 0.002, kPositionSigma = 0.3;  // m
   if (!problem.stations_known || problem.stations.size() < 2) return;
-  const auto stations = static_cast<Eigen::Index>(problem.stations.size());
-  const auto walls = static_cast<Eigen::Index>(problem.walls.size());
+  const Eigen::Index stations = problem.stations.size();
+  const Eigen::Index walls = problem.walls.size();
   const Eigen::Index size = 3 * stations + walls;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
@@ -148,7 +144,7 @@ void find_positions(PlanarProblem& problem) {
     right += row * value / (sigma * sigma);
   };
   for (Eigen::Index s = 0; s < stations; ++s) {
-    const StationPose& station = problem.stations[static_cast<std::size_t>(s)];
+    const StationPose& station = problem.stations[s];
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       // The first one is the scene's origin but for what was stated.
       add(Eigen::VectorXd::Unit(size, 3 * s + axis), station.position[axis],
@@ -157,14 +153,13 @@ void find_positions(PlanarProblem& problem) {
   }
   for (const WallView& view : problem.views) {
     Eigen::VectorXd row = Eigen::VectorXd::Zero(size);
-    row.segment<3>(3 * static_cast<Eigen::Index>(view.recording)) =
-        -eigen(problem.walls[view.wall].normal);
+    row.segment<3>(3 * view.recording) = -eigen(problem.walls[view.wall].normal);
     row[3 * stations + static_cast<Eigen::Index>(view.wall)] = 1;
     add(row, view.side * view.distance, kDistanceSigma);
   }
   const Eigen::VectorXd found = algebra::SymmetricSolver(normal).solve(right);
   for (Eigen::Index s = 0; s < stations; ++s) {
-    problem.stations[static_cast<std::size_t>(s)].position = found.segment<3>(3 * s);
+    problem.stations[s].position = found.segment<3>(3 * s);
   }
 }
 
@@ -172,10 +167,7 @@ void find_positions(PlanarProblem& problem) {
 
 void lay_grids(PlanarProblem& problem) {
   find_positions(problem);
-  std::vector<std::vector<std::size_t>> views(problem.walls.size());
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    views[problem.views[v].wall].push_back(v);
-  }
+  const std::vector<std::vector<std::size_t>> views = views_of_walls(problem);
   parallel::for_each(views.size(), [&](std::size_t wall) {
     if (!views[wall].empty()) lay_grid(problem, wall, views[wall]);
   });

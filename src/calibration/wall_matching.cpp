@@ -156,7 +156,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
         if (own == nullptr) own = &plane;
         const auto& others = seen_by[plane.wall];
         shared = shared || result.walls[plane.wall].normal_sigma >= 0 ||
-                 std::any_of(others.begin(), others.end(), [r](std::size_t o) { return o != r; });
+                 std::ranges::any_of(others, [r](std::size_t o) { return o != r; });
       }
       if (own == nullptr || shared) continue;
       const Plane mine = in_scene(own->plane, poses[r]);

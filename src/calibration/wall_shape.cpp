@@ -78,7 +78,7 @@ class Precision {
     for (int i = 0; i <= kPower; ++i) {
       const double part = factor * binomial * std::pow(diagonal, kPower - i);
       binomial = binomial * (kPower - i) / (i + 1);
-      const Eigen::SparseMatrix<double>& power = powers_[static_cast<std::size_t>(i)];
+      const Eigen::SparseMatrix<double>& power = powers_[i];
       for (Index column = 0; column < power.outerSize(); ++column) {
         for (Eigen::SparseMatrix<double>::InnerIterator entry(power, column); entry; ++entry) {
           if (entry.row() >= column) matrix.at(entry.row(), column) += part * entry.value();
@@ -140,11 +140,11 @@ std::pair<WallEquations, double> without_white_part(const WallSums& sums, double
   const NodeOrder order(grid);
   WallEquations equations{BandMatrix(grid.nodes(), order.band()),
                           BandMatrix::Rows::Zero(grid.nodes(), sums.columns.cols())};
-  const auto cells = static_cast<Index>(grid.cells.size());
+  const Index cells = grid.cells.size();
   MatrixXd taken(cells, sums.columns.cols());
   double log_determinant = 0;
   for (Index cell = 0; cell < cells; ++cell) {
-    Eigen::Matrix3d weight = sums.weight[static_cast<std::size_t>(cell)];
+    Eigen::Matrix3d weight = sums.weight[cell];
     auto rows = sums.columns.middleRows<3>(3 * cell).eval();
     const double all = weight(0, 0), variance = white * white;
     const double factor = variance / (1.0 + variance * all);
@@ -154,7 +154,7 @@ std::pair<WallEquations, double> without_white_part(const WallSums& sums, double
     rows -= (factor * first) * rows.row(0).eval();
     weight -= factor * first * first.transpose();
     // Heights of the four corners to height and slopes in the middle.
-    const std::uint32_t number = grid.cells[static_cast<std::size_t>(cell)];
+    const std::uint32_t number = grid.cells[cell];
     const Index u = number % grid.row(), v = number / grid.row();
     const double slope = 0.5 / grid.spacing;
     const std::array<Index, 4> corner{order.node(u, v), order.node(u + 1, v), order.node(u, v + 1),
@@ -203,8 +203,8 @@ class ShapeSearch {
   }
 
   ShapeSolution run() {
-    std::vector<std::size_t> next{static_cast<std::size_t>(
-        std::max_element(prior_.weight.begin(), prior_.weight.end()) - prior_.weight.begin())};
+    std::vector<std::size_t> next{
+        static_cast<std::size_t>(std::ranges::max_element(prior_.weight) - prior_.weight.begin())};
     while (!next.empty()) {
       try_all(next);
       forget_hopeless();
@@ -413,7 +413,7 @@ class ShapeSearch {
     const WithoutOwn& part = likeliest.walls[wall];
     Eigen::VectorXd off = own.step;
     for (std::size_t j = 0; j < sums.places.size() && sums.places[j] < problem_.unknowns; ++j) {
-      off += part.from_rest.col(static_cast<Index>(j)) * solution.step[sums.places[j]];
+      off += part.from_rest.col(j) * solution.step[sums.places[j]];
     }
     solution.promised += off.dot(part.normal * off);
   }
@@ -460,16 +460,14 @@ class ShapeSearch {
 void require_wall(const WallSums& wall, Index columns) {
   const auto size = static_cast<std::size_t>(wall.own) + wall.places.size();
   for (const Index place : wall.places) {
-    require_place("column of a wall", static_cast<std::size_t>(place),
-                  static_cast<std::size_t>(columns));
+    require_place("column of a wall", place, columns);
   }
-  require_length("rows of a wall", static_cast<std::size_t>(wall.system.rows()), size);
-  require_length("columns of a wall", static_cast<std::size_t>(wall.system.cols()), size);
+  require_length("rows of a wall", wall.system.rows(), size);
+  require_length("columns of a wall", wall.system.cols(), size);
   if (wall.grid.empty()) return;
   require_length("cells", wall.weight.size(), wall.grid.cells.size());
-  require_length("rows of cells", static_cast<std::size_t>(wall.columns.rows()),
-                 3 * wall.grid.cells.size());
-  require_length("columns of cells", static_cast<std::size_t>(wall.columns.cols()), size);
+  require_length("rows of cells", wall.columns.rows(), 3 * wall.grid.cells.size());
+  require_length("columns of cells", wall.columns.cols(), size);
 }
 
 }  // namespace
@@ -499,11 +497,10 @@ ShapePrior building_walls() {
 
 ShapeSolution solve_with_shape(const ShapeProblem& problem, const ShapePrior& prior) {
   const Index columns = problem.system.cols();
-  require_length("rows of the system", static_cast<std::size_t>(problem.system.rows()),
-                 static_cast<std::size_t>(columns));
+  require_length("rows of the system", problem.system.rows(), columns);
   require_between("unknowns", static_cast<double>(problem.unknowns), 1,
                   static_cast<double>(columns - 1));
-  require_at_least("number of parameters", static_cast<long long>(prior.parameters.size()), 1);
+  require_at_least("number of parameters", prior.parameters.size(), 1);
   require_length("weights of the shape", prior.weight.size(), prior.parameters.size());
   for (const WallSums& wall : problem.walls) require_wall(wall, columns);
   return ShapeSearch(problem, prior).run();

@@ -17,21 +17,38 @@
 namespace risley::cloud {
 namespace {
 
-/// A writer of any format that gets points as the cloud's header announces them.
+/// A writer of any format that gets points as the cloud's header announces them, and nothing more
+/// once it has failed or was closed.
 class CheckedWriter final : public CloudWriter {
  public:
-  CheckedWriter(std::unique_ptr<CloudWriter> writer, CloudHeader header)
-      : writer_(std::move(writer)), header_(std::move(header)) {}
+  CheckedWriter(std::unique_ptr<CloudWriter> writer, std::string path, CloudHeader header)
+      : writer_(std::move(writer)), path_(std::move(path)), header_(std::move(header)) {}
 
   void write(const Points& points) override {
     require_columns(points, header_);
+    require_sound();
+    sound_ = false;  // unless all goes well
     writer_->write(points);
+    sound_ = true;
   }
-  void close() override { writer_->close(); }
+  void close() override {
+    if (closed_) return;
+    require_sound();
+    sound_ = false;
+    writer_->close();
+    closed_ = true;
+  }
 
  private:
+  void require_sound() const {
+    if (sound_) return;
+    throw FileError(path_, {}, "is incomplete: points given before could not be written");
+  }
+
   std::unique_ptr<CloudWriter> writer_;
+  std::string path_;
   CloudHeader header_;
+  bool sound_ = true, closed_ = false;
 };
 
 }  // namespace
@@ -71,9 +88,9 @@ std::unique_ptr<CloudWriter> create_cloud(const std::string& path, const CloudHe
   require_between("number of prisms", header.prisms, 1, kMaxPrisms);
   const CloudFormat& found = find_cloud_format(path, options.format);
   const auto& formats = all_cloud_formats();
-  const auto it = std::find_if(formats.begin(), formats.end(),
-                               [&found](const auto* format) { return format->name == found.name; });
-  return std::make_unique<CheckedWriter>((*it)->create(path, header, options), header);
+  const auto it = std::ranges::find_if(
+      formats, [&found](const auto* format) { return format->name == found.name; });
+  return std::make_unique<CheckedWriter>((*it)->create(path, header, options), path, header);
 }
 
 }  // namespace risley::cloud

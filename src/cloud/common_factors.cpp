@@ -37,8 +37,7 @@ Eigen::MatrixXd lower_factor(const Eigen::MatrixXd& c) {
 
 bool has_any(const sensors::RangeErrors& errors) {
   return errors.near != 0 || errors.incidence != 0 || errors.per_decade != 0 ||
-         std::any_of(errors.emitter.begin(), errors.emitter.end(),
-                     [](double error) { return error != 0; });
+         std::ranges::any_of(errors.emitter, [](double error) { return error != 0; });
 }
 
 }  // namespace
@@ -52,22 +51,22 @@ void Factors::add(const algebra::NamedCovariance& uncertain, bool moves_beam, bo
   const Eigen::MatrixXd factor = lower_factor(uncertain.matrix);
   const auto& of_mount = trajectories::mount_names();
   for (Index j = 0; j < factor.cols(); ++j) {
-    CommonFactor common = nothing(uncertain.names[static_cast<std::size_t>(j)]);
+    CommonFactor common = nothing(uncertain.names[j]);
     for (Index i = j; i < factor.rows(); ++i) {
-      const std::string& name = uncertain.names[static_cast<std::size_t>(i)];
+      const std::string& name = uncertain.names[i];
       if (double* number = range_number(name, common)) {
         *number = factor(i, j);
         continue;
       }
-      const auto size = std::find_if(model_.sizes.begin(), model_.sizes.end(),
-                                     [&](const PrismSize& one) { return one.name == name; });
+      const auto size = std::ranges::find_if(
+          model_.sizes, [&](const PrismSize& one) { return one.name == name; });
       if (size != model_.sizes.end()) {
         common.weights[size_row(size - model_.sizes.begin())] += factor(i, j);
         continue;
       }
-      const auto own = std::find(of_mount.begin(), of_mount.end(), name);
+      const auto own = std::ranges::find(of_mount, name);
       if (own != of_mount.end()) {
-        common.mount[static_cast<std::size_t>(own - of_mount.begin())] = factor(i, j);
+        common.mount[own - of_mount.begin()] = factor(i, j);
         continue;
       }
       const ParameterInfo parameter = find_parameter(name, model_.train.shape());
@@ -94,13 +93,13 @@ void Factors::add_angles(const algebra::NamedCovariance& uncertain) {
 void Factors::add_geometry(const sensors::Sensor& sensor) {
   const auto& names = sensor.covariance_names;
   const auto is_joint = [&names](const std::string& name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
+    return std::ranges::find(names, name) != names.end();
   };
   for (std::size_t i = 0; i < model_.sizes.size(); ++i) {
     const PrismSize& size = model_.sizes[i];
     if (is_joint(size.name)) continue;
     CommonFactor common = nothing(size.name);
-    common.weights[size_row(static_cast<Index>(i))] = sensors::prism_size_sigma(sensor, size);
+    common.weights[size_row(i)] = sensors::prism_size_sigma(sensor, size);
     keep(std::move(common));
   }
   for (const sensors::RangeValue& value : range_values_) {
@@ -116,13 +115,13 @@ void Factors::finish() {
   std::vector<Index> rows;
   std::vector<int> places;
   for (const int place : model_.places) {
-    const bool used = std::any_of(model_.factors.begin(), model_.factors.end(),
-                                  [place](const auto& f) { return f.weights[place] != 0; });
+    const bool used = std::ranges::any_of(model_.factors,
+                                          [place](const auto& f) { return f.weights[place] != 0; });
     if (!used) continue;
     rows.push_back(place);
     places.push_back(place);
   }
-  const Index others = prisms() + static_cast<Index>(model_.sizes.size());
+  const Index others = prisms() + std::ssize(model_.sizes);
   for (Index i = 0; i < others; ++i) rows.push_back(all_places() + i);
   for (CommonFactor& factor : model_.factors) {
     factor.weights = Eigen::VectorXd(factor.weights(rows));
@@ -132,16 +131,15 @@ void Factors::finish() {
 
 CommonFactor Factors::nothing(std::string name) const {
   return {std::move(name),
-          Eigen::VectorXd::Zero(all_places() + prisms() + static_cast<Index>(model_.sizes.size())),
+          Eigen::VectorXd::Zero(all_places() + prisms() + std::ssize(model_.sizes)),
           0.0,
           {},
           {}};
 }
 
 double* Factors::range_number(std::string_view name, CommonFactor& common) const {
-  const auto found =
-      std::find_if(range_values_.begin(), range_values_.end(),
-                   [name](const sensors::RangeValue& value) { return value.name == name; });
+  const auto found = std::ranges::find_if(
+      range_values_, [name](const sensors::RangeValue& value) { return value.name == name; });
   if (found == range_values_.end()) return nullptr;
   sensors::RangeErrors& errors = common.range_errors;
   const std::array<double*, 4> shared{&common.range_offset, &errors.near, &errors.incidence,
@@ -156,15 +154,14 @@ void Factors::move_angles(const std::string& name, double value, CommonFactor& c
   for (std::size_t j = 0; j < belief_.free.size(); ++j) {
     if (belief_.free[j].name != name) continue;
     for (int k = 0; k < prisms(); ++k) {
-      common.weights[all_places() + k] +=
-          belief_.angle_sensitivity(k, static_cast<Index>(j)) * value;
+      common.weights[all_places() + k] += belief_.angle_sensitivity(k, j) * value;
     }
   }
 }
 
 void Factors::keep(CommonFactor common) {
-  const bool moves_mount = std::any_of(common.mount.begin(), common.mount.end(),
-                                       [](double weight) { return weight != 0; });
+  const bool moves_mount =
+      std::ranges::any_of(common.mount, [](double weight) { return weight != 0; });
   const bool moves_range = common.range_offset != 0 || has_any(common.range_errors);
   if (!moves_range && common.weights.isZero(0.0) && !moves_mount) return;
   model_.factors.push_back(std::move(common));

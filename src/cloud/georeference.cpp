@@ -174,8 +174,7 @@ void Georeference::announce(CloudHeader& header) const {
                     s.map->has_height_system() ? "of its height system" : "above the ellipsoid");
     header.frame.axes = {"easting", "northing", "height"};
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      header.frame.offset[axis] =
-          kOffsetStep * std::round(tangent.value()[static_cast<Index>(axis)] / kOffsetStep);
+      header.frame.offset[axis] = kOffsetStep * std::round(tangent.value()[axis] / kOffsetStep);
     }
   } else {
     header.frame.text = "of the trajectory: X east, Y north, Z up where it says so";
@@ -186,7 +185,7 @@ void Georeference::announce(CloudHeader& header) const {
   if (!s.errors || !header.has_covariance) return;
   TrajectoryErrors& errors = header.trajectory.emplace();
   const auto copy = [](const trajectories::PoseErrorVector& from, std::array<double, 6>& to) {
-    std::copy(from.begin(), from.end(), to.begin());
+    std::ranges::copy(from, to.begin());
   };
   copy(s.errors->correlation_times(), errors.correlation_time);
   copy(s.errors->white(), errors.white);
@@ -195,7 +194,7 @@ void Georeference::announce(CloudHeader& header) const {
   const Matrix3d axes = s.map_from_ned(tangent, trajectory.position[middle]);
   for (std::size_t k = 0; k < 3; ++k) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      errors.axes_from_ned[k][axis] = axes(static_cast<Index>(axis), static_cast<Index>(k));
+      errors.axes_from_ned[k][axis] = axes(axis, k);
     }
   }
   std::int64_t next = trajectory.time_ns.front();
@@ -236,8 +235,7 @@ void Georeference::apply(Points& points, const SensorPoses& poses, InstructionSe
   }
   RISLEY_KERNEL_COPIES(place_points).at(set)(put);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    middle[static_cast<Index>(axis)] =
-        std::accumulate(place[axis], place[axis] + n, 0.0) / static_cast<double>(n);
+    middle[axis] = std::accumulate(place[axis], place[axis] + n, 0.0) / static_cast<double>(n);
   }
   const auto place_of = [&](std::size_t i) {
     return Vector3d(local + Vector3d(place[0][i], place[1][i], place[2][i]));

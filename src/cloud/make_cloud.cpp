@@ -14,18 +14,15 @@
 #include <Eigen/Core>
 #include <fmt/format.h>
 
-#include "risley/cloud/surface_normals.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/parallel/parallel.hpp"
-#include "risley/sensors/range_values.hpp"
 #include "risley/trajectories/clock.hpp"
 
-#include "cloud/georeference_kernel.hpp"
 #include "cloud/keep_rows.hpp"
 #include "cloud/piece_overlap.hpp"
-#include "cloud/pose_columns.hpp"
+#include "cloud/shot_surfaces.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -42,43 +39,18 @@ constexpr std::size_t kBeliefShots = std::size_t{1} << 18;
 constexpr std::size_t kPieceRows = std::size_t{1} << 18;
 /// The same where no rotation angles are needed: a surface's worth.
 constexpr std::size_t kReportedRows = std::size_t{1} << 16;
-/// Surfaces are taken to stand still for so long: docs/theory/cloud.md
-constexpr std::int64_t kSurfaceNs = 1'000'000'000;
-/// The same for a moving sensor, whose shots are put together as if it stood still.
-constexpr std::int64_t kMovingSurfaceNs = 200'000'000;
-constexpr std::size_t kMovingSurfaceShots = 4000;
-/// Shots of it that tell a surface: on the 1160 cells of a Mid-40's field of view, a circle of 38.4
-/// degrees, 14 each and 120 in a block of nine.
-constexpr std::size_t kSurfaceShots = 16000;
 /// Rows that one task works on: the sixty columns of a moving sensor are 1 MB.
 constexpr std::size_t kBlockRows = 2048;
 /// Directions beyond are damaged records: the rotors' motion is found without them, too.
 const double kOutlierChi2 = estimation::BatchMapOptions{}.outlier_chi2;
-/// For telling surfaces: the step in which these sensors give ranges, m.
-constexpr double kLeastRangeNoise = 1e-3;
-
-/// Steps that find a true range by a reported one: each leaves some hundredths of what is wrong.
-constexpr int kRangeSteps = 4;
-
-double square(double x) { return x * x; }
-
-/// Shots in polar coordinates, rad and m.
-struct PolarShots {
-  std::vector<double> azimuth, zenith, range;
-
-  void resize(std::size_t shots) {
-    for (auto* column : {&azimuth, &zenith, &range}) column->resize(shots);
-  }
-};
 
 /// Some rows of a piece on their way to the file.
-struct Block {
+struct RowBlock {
   std::vector<std::size_t> rows;
   std::vector<std::uint8_t> returns;  ///< of each row's shot
   PointedShots shots;
   Points points;
   SensorPoses poses;  ///< of the rows, of a moving sensor
-  PolarShots stood;   ///< these, as if the sensor stood
   std::uint64_t outliers = 0, without_rotation_angle = 0, without_pose = 0;
   double azimuth_squares = 0, zenith_squares = 0;
 };
@@ -98,17 +70,16 @@ struct Piece {
   std::optional<std::string> failure;     ///< why there are none
 };
 
-class Work {
+class CloudMaker {
  public:
-  Work(recordings::Reader& reader, const sensors::Sensor& calibration, const std::string& path,
-       const CloudOptions& options, const Progress& progress)
+  CloudMaker(recordings::Reader& reader, const sensors::Sensor& calibration,
+             const std::string& path, const CloudOptions& options, const Progress& progress)
       : reader_(reader),
         calibration_(calibration),
         path_(path),
         options_(options),
         progress_(progress),
-        rotors_(needs_rotation_angles(calibration, options.pointing)),
-        plain_ranges_(calibration.range_errors == sensors::RangeErrors{}) {}
+        rotors_(needs_rotation_angles(calibration, options.pointing)) {}
 
   CloudSummary run() {
     check_sensor();
@@ -270,7 +241,8 @@ class Work {
           "are longer for each tenth of the intensity",
           1e3 * calibration_.range_errors.per_decade));
     }
-    expect_distortion(0);
+    surfaces_ = std::make_unique<ShotSurfaces>(calibration_, model_.angle_noise, has_intensity_,
+                                               georeference_.get());
     const recordings::Device& device = reader_.header().devices.front();
     if (device.extrinsic_enabled) {
       summary_.warnings.emplace_back(
@@ -295,17 +267,6 @@ class Work {
     writer_ = create_cloud(path_, header_, options_.writer);
   }
 
-  /// Surfaces are told from directions as the sensor reports them.
-  /// @param distortion  of these against each other, rms, rad
-  void expect_distortion(double distortion) {
-    const double range = std::sqrt(calibration_.range_variance(0, 0, 255) +
-                                   square(calibration_.range_resolution) / 12.0);
-    const double direction = square(model_.angle_noise) + square(distortion) +
-                             square(calibration_.angle_resolution) / 12.0;
-    normals_ =
-        std::make_unique<SurfaceNormals>(std::max(range, kLeastRangeNoise), std::sqrt(direction));
-  }
-
   /// Turns the piece into points.
   void emit() {
     if (piece_->failure) {
@@ -314,8 +275,7 @@ class Work {
     }
     if (rotors_ && piece_->end > piece_->done && !repointing_known_) find_repointing();
     for (std::size_t begin = piece_->done; begin < piece_->end;) {
-      const std::size_t surface_end = end_of_surface(begin, piece_->end);
-      find_surfaces(begin, surface_end);
+      const std::size_t surface_end = surfaces_->find(piece_->rows, begin, piece_->end);
       write_rows(begin, surface_end);
       begin = surface_end;
     }
@@ -324,144 +284,17 @@ class Work {
   /// Counts the rows of a piece without rotation angles.
   void leave_out() {
     for (std::size_t row = piece_->done; row < piece_->end; ++row) {
-      ++(has_return(row) ? summary_.without_rotation_angle : summary_.no_return);
+      ++(has_return(piece_->rows, row) ? summary_.without_rotation_angle : summary_.no_return);
     }
     summary_.warnings.push_back(fmt::format("no points from observations {} to {}: {}",
                                             piece_->first_row + piece_->done,
                                             piece_->first_row + piece_->end - 1, *piece_->failure));
   }
 
-  bool has_return(std::size_t row) const {
-    return piece_->rows.valid[row] != 0 && piece_->rows.range[row] > 0;
-  }
-
-  std::size_t end_of_surface(std::size_t begin, std::size_t end) const {
-    std::size_t row = begin;
-    const std::int64_t first = piece_->rows.time_ns[begin];
-    const std::int64_t longest = georeference_ ? kMovingSurfaceNs : kSurfaceNs;
-    while (row < end && std::llabs(piece_->rows.time_ns[row] - first) < longest) ++row;
-    return row;
-  }
-
-  /// A range without the range errors that need no surface to be known, but with the offset.
-  double range_with_offset(std::size_t row) const {
-    const double reported = piece_->rows.range[row];
-    if (plain_ranges_) return reported;
-    const double intensity =
-        has_intensity_ ? static_cast<double>(piece_->rows.intensity[row]) : sensors::kWalkIntensity;
-    double range = reported - calibration_.range_offset;
-    for (int step = 0; step < kRangeSteps; ++step) {
-      range = reported -
-              sensors::range_error(calibration_, range, 0, intensity, piece_->rows.beam[row]);
-    }
-    return range + calibration_.range_offset;
-  }
-
-  void find_surfaces(std::size_t begin, std::size_t end) {
-    normals_->clear();
-    const std::size_t most = georeference_ ? kMovingSurfaceShots : kSurfaceShots;
-    const std::size_t stride = std::max<std::size_t>(1, (end - begin) / most);
-    std::vector<std::size_t> rows;
-    for (std::size_t row = begin; row < end; row += stride) {
-      if (has_return(row)) rows.push_back(row);
-    }
-    if (georeference_) {
-      add_moving(piece_->rows.time_ns[begin] +
-                     (piece_->rows.time_ns[end - 1] - piece_->rows.time_ns[begin]) / 2,
-                 rows);
-    } else {
-      for (const std::size_t row : rows) {
-        normals_->add(piece_->rows.azimuth[row], piece_->rows.zenith[row],
-                      range_with_offset(row) - calibration_.range_offset);
-      }
-    }
-    normals_->fit();
-  }
-
-  std::vector<std::int64_t> times_of(const std::vector<std::size_t>& rows) const {
-    std::vector<std::int64_t> times(rows.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) times[i] = piece_->rows.time_ns[rows[i]];
-    return times;
-  }
-
-  /// Adds rows to the surfaces as if the sensor stood where it was at a time, if it is known.
-  void add_moving(std::int64_t middle_ns, const std::vector<std::size_t>& rows) {
-    std::vector<std::size_t> known;
-    georeference_->find_poses({&middle_ns, 1}, surface_pose_, known);
-    if (known.empty()) return;
-    SensorPoses poses;
-    georeference_->find_poses(times_of(rows), poses, known);
-    PolarShots shots, stood;
-    for (const std::size_t i : known) {
-      shots.azimuth.push_back(piece_->rows.azimuth[rows[i]]);
-      shots.zenith.push_back(piece_->rows.zenith[rows[i]]);
-      shots.range.push_back(range_with_offset(rows[i]));
-    }
-    stand_still(poses, shots.azimuth, shots.zenith, shots.range, stood);
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      normals_->add(stood.azimuth[i], stood.zenith[i], stood.range[i]);
-    }
-  }
-
-  /// Shots of a moving sensor as they would have been from where the sensor is in the middle of a
-  /// surface's time. @param range  as range_with_offset() says
-  void stand_still(const SensorPoses& poses, const std::vector<double>& azimuth,
-                   const std::vector<double>& zenith, const std::vector<double>& range,
-                   PolarShots& stood) const {
-    const std::size_t n = poses.size();
-    stood.resize(n);
-    if (n == 0) return;
-    StandArguments a;
-    a.poses = pose_columns(poses);
-    a.shots = n;
-    a.azimuth = azimuth.data();
-    a.zenith = zenith.data();
-    a.range = range.data();
-    a.range_offset = calibration_.range_offset;
-    for (std::size_t k = 0; k < 9; ++k) a.turn[k] = surface_pose_.turn[k].front();
-    for (std::size_t k = 0; k < 3; ++k) a.reference[k] = surface_pose_.reference[k].front();
-    a.stood_azimuth = stood.azimuth.data();
-    a.stood_zenith = stood.zenith.data();
-    a.stood_range = stood.range.data();
-    RISLEY_KERNEL_COPIES(stand_shots).at(best_instruction_set())(a);
-  }
-
-  /// The normals of the surfaces that the shots of a block met, sensor frame.
-  void find_normals(Block& block) const {
-    PointedShots& shots = block.shots;
-    const std::size_t n = shots.size();
-    std::vector<double> range(n);
-    for (std::size_t i = 0; i < n; ++i) range[i] = range_with_offset(block.rows[i]);
-    const auto set = [&shots](std::size_t i, const Vector3<double>& normal) {
-      shots.surface_normal[0][i] = normal.x;
-      shots.surface_normal[1][i] = normal.y;
-      shots.surface_normal[2][i] = normal.z;
-    };
-    if (surface_pose_.size() == 0) {
-      const double nowhere = std::nan("");
-      for (std::size_t i = 0; i < n; ++i) {
-        set(i, normals_->normal(georeference_ ? nowhere : shots.azimuth[i], shots.zenith[i],
-                                range[i] - calibration_.range_offset));
-      }
-      return;
-    }
-    if (n == 0) return;
-    stand_still(block.poses, shots.azimuth, shots.zenith, range, block.stood);
-    for (std::size_t i = 0; i < n; ++i) {
-      set(i, normals_->normal(block.stood.azimuth[i], block.stood.zenith[i], block.stood.range[i]));
-    }
-    TurnArguments a;
-    a.poses = pose_columns(block.poses);
-    a.shots = n;
-    for (std::size_t k = 0; k < 9; ++k) a.turn[k] = surface_pose_.turn[k].front();
-    for (std::size_t axis = 0; axis < 3; ++axis) a.vector[axis] = shots.surface_normal[axis].data();
-    RISLEY_KERNEL_COPIES(turn_vectors).at(best_instruction_set())(a);
-  }
-
   /// Looks up where the sensor is at every row of a block, and takes out rows that have no pose.
-  void find_poses(Block& block) const {
+  void find_poses(RowBlock& block) const {
     std::vector<std::size_t> known;
-    georeference_->find_poses(times_of(block.rows), block.poses, known);
+    georeference_->find_poses(times_of(piece_->rows, block.rows), block.poses, known);
     block.without_pose = block.rows.size() - known.size();
     if (block.without_pose == 0) return;
     keep_rows(block.rows, known);
@@ -487,7 +320,7 @@ class Work {
   }
 
   /// Takes up to kBlockRows rows that have a return. @return where the next block begins
-  std::size_t choose_rows(std::size_t begin, std::size_t end, Block& block) {
+  std::size_t choose_rows(std::size_t begin, std::size_t end, RowBlock& block) {
     block.rows.clear();
     block.returns.clear();
     std::size_t row = begin;
@@ -496,14 +329,14 @@ class Work {
       while (shot_end < end && same_shot(piece_->rows, row, shot_end)) ++shot_end;
       std::size_t returns = 0, last = 0;
       for (std::size_t i = row; i < shot_end; ++i) {
-        if (!has_return(i)) continue;
+        if (!has_return(piece_->rows, i)) continue;
         ++returns;
         last = std::max<std::size_t>(last, piece_->rows.return_number[i]);
       }
       // Alike in all rows of a shot, and no less than any of their numbers.
       const auto number_of_returns = static_cast<std::uint8_t>(std::max(returns, last));
       for (std::size_t i = row; i < shot_end; ++i) {
-        if (!has_return(i)) {
+        if (!has_return(piece_->rows, i)) {
           ++summary_.no_return;
           continue;
         }
@@ -515,7 +348,7 @@ class Work {
     return row;
   }
 
-  void compute(Block& block) const {
+  void compute(RowBlock& block) const {
     block.without_pose = 0;
     if (georeference_) find_poses(block);
     const std::size_t n = block.rows.size();
@@ -531,11 +364,11 @@ class Work {
     const bool whole = n > 0 && block.rows.back() - block.rows.front() + 1 == n;
     const auto take = [&](const auto& from, auto& to, const auto& change) {
       if (whole) {
-        const auto first = from.begin() + static_cast<std::ptrdiff_t>(block.rows.front());
-        std::transform(first, first + static_cast<std::ptrdiff_t>(n), to.begin(), change);
+        const auto first = from.begin() + block.rows.front();
+        std::transform(first, first + n, to.begin(), change);
       } else {
-        std::transform(block.rows.begin(), block.rows.end(), to.begin(),
-                       [&](std::size_t row) { return change(from[row]); });
+        std::ranges::transform(block.rows, to.begin(),
+                               [&](std::size_t row) { return change(from[row]); });
       }
     };
     const auto same = [](auto value) { return value; };
@@ -557,7 +390,7 @@ class Work {
     take(piece_->rows.azimuth_resolution, shots.azimuth_rounding, variance);
     take(piece_->rows.zenith_resolution, shots.zenith_rounding, variance);
     take(piece_->rows.range_resolution, shots.range_rounding, variance);
-    find_normals(block);
+    surfaces_->find_normals(piece_->rows, block.rows, block.poses, block.shots);
     compute_points(model_, header_, shots, points, block.poses);
     block.outliers = block.without_rotation_angle = 0;
     block.azimuth_squares = block.zenith_squares = 0;
@@ -566,7 +399,7 @@ class Work {
   }
 
   /// Takes out of a block what has no point.
-  void keep_sound(Block& block) const {
+  void keep_sound(RowBlock& block) const {
     Points& points = block.points;
     const double noise = square(model_.angle_noise);
     const double limit = kOutlierChi2 * belief_->residual_variance_factor;
@@ -630,7 +463,7 @@ class Work {
     }
   }
 
-  void write(const Block& block) {
+  void write(const RowBlock& block) {
     writer_->write(block.points);
     if (distribution_) count_on_ground(block.points);
     if (sampler_) sampler_->add(block.points);
@@ -671,7 +504,7 @@ class Work {
     if (count == 0) return;
     summary_.repointing_rms = std::sqrt(squares / count);
     const double shared = moment.dot(normal.ldlt().solve(moment));
-    expect_distortion(std::sqrt(std::max(squares - shared, 0.0) / count));
+    surfaces_->expect_distortion(std::sqrt(std::max(squares - shared, 0.0) / count));
     repointing_known_ = true;
   }
 
@@ -711,18 +544,16 @@ class Work {
   CloudSummary summary_;
   std::optional<SensorBelief> belief_;
   PointingModel model_;
-  bool rotors_;        ///< points depend on the rotation angles
-  bool plain_ranges_;  ///< they have no errors but the offset
+  bool rotors_;  ///< points depend on the rotation angles
   bool has_intensity_ = true;
-  std::unique_ptr<SurfaceNormals> normals_;
   std::unique_ptr<Georeference> georeference_;  ///< of a moving sensor
-  SensorPoses surface_pose_;  ///< in the middle of a surface's time, where it is known
+  std::unique_ptr<ShotSurfaces> surfaces_;
   std::int64_t first_time_ns_ = 0, last_time_ns_ = 0;  ///< of the recording
   std::optional<PointDistribution> distribution_;
   std::optional<PointSampler> sampler_;
   CloudHeader header_;
   std::unique_ptr<CloudWriter> writer_;
-  std::vector<Block> blocks_;
+  std::vector<RowBlock> blocks_;
   std::unique_ptr<Piece> piece_;  ///< that is being written
   Observations spare_;            ///< memory of the one before, for the one after
   bool repointing_known_ = false;
@@ -739,7 +570,7 @@ CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calib
   }
   if (options.rate) require_above("rate", *options.rate, 0, "Hz");
   if (options.angle_noise) require_above("angle noise", *options.angle_noise, 0, "rad");
-  return Work(reader, calibration, path, options, progress).run();
+  return CloudMaker(reader, calibration, path, options, progress).run();
 }
 
 }  // namespace risley::cloud

@@ -90,6 +90,13 @@ std::optional<AreaOfUse> area_of(PJ_CONTEXT* context, const PJ* crs) {
                    radians_from_degrees(east), radians_from_degrees(north)};
 }
 
+Vector3d transformed(PJ* operation, PJ_DIRECTION direction, const Vector3d& place_m) {
+  proj_errno_reset(operation);
+  const PJ_COORD to =
+      proj_trans(operation, direction, proj_coord(place_m.x(), place_m.y(), place_m.z(), HUGE_VAL));
+  return {to.xyz.x, to.xyz.y, to.xyz.z};
+}
+
 }  // namespace
 
 double AreaOfUse::beyond(double latitude, double longitude) const {
@@ -112,7 +119,7 @@ Vector3d MapTangent::map(const Vector3d& point) const {
   const Vector3d d = point - center_;
   Vector3d bent;
   for (Eigen::Index k = 0; k < 3; ++k) {
-    bent[k] = d.dot(half_hessian_[static_cast<std::size_t>(k)] * d);
+    bent[k] = d.dot(half_hessian_[k] * d);
   }
   return value_ + (jacobian_ * d + bent);
 }
@@ -227,11 +234,7 @@ MapProjection& MapProjection::operator=(MapProjection&&) noexcept = default;
 Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
   const std::lock_guard lock(state_->mutex);
   PJ* operation = state_->operation.get();
-  proj_errno_reset(operation);
-  const PJ_COORD to =
-      proj_trans(operation, PJ_FWD,
-                 proj_coord(geocentric_m.x(), geocentric_m.y(), geocentric_m.z(), HUGE_VAL));
-  Vector3d mapped(to.xyz.x, to.xyz.y, to.xyz.z);
+  const Vector3d mapped = transformed(operation, PJ_FWD, geocentric_m);
   if (!mapped.allFinite()) {
     throw InvalidArgument(
         fmt::format("{} is not defined at the place x = {:.3f}, y = {:.3f}, z = {:.3f} m "
@@ -246,11 +249,7 @@ Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
 
 Vector3d MapProjection::unproject(const Vector3d& on_map_m) const {
   const std::lock_guard lock(state_->mutex);
-  PJ* operation = state_->operation.get();
-  proj_errno_reset(operation);
-  const PJ_COORD from =
-      proj_trans(operation, PJ_INV, proj_coord(on_map_m.x(), on_map_m.y(), on_map_m.z(), HUGE_VAL));
-  Vector3d place(from.xyz.x, from.xyz.y, from.xyz.z);
+  const Vector3d place = transformed(state_->operation.get(), PJ_INV, on_map_m);
   if (!place.allFinite()) {
     throw InvalidArgument(fmt::format("{} has no place with the coordinates {:.3f}, {:.3f}, {:.3f}",
                                       state_->name, on_map_m.x(), on_map_m.y(), on_map_m.z()));
@@ -265,22 +264,20 @@ MapTangent MapProjection::tangent(const Vector3d& geocentric_m) const {
   std::array<Matrix3d, 3> hessian;
   const auto axis = [](Eigen::Index k) { return Vector3d(kStep * Vector3d::Unit(k)); };
   for (Eigen::Index i = 0; i < 3; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    ahead[k] = project(geocentric_m + axis(i));
-    behind[k] = project(geocentric_m - axis(i));
-    jacobian.col(i) = (ahead[k] - behind[k]) / (2 * kStep);
-    const Vector3d second = (ahead[k] - 2 * at + behind[k]) / (kStep * kStep);
-    for (Eigen::Index m = 0; m < 3; ++m) hessian[static_cast<std::size_t>(m)](i, i) = second[m];
+    ahead[i] = project(geocentric_m + axis(i));
+    behind[i] = project(geocentric_m - axis(i));
+    jacobian.col(i) = (ahead[i] - behind[i]) / (2 * kStep);
+    const Vector3d second = (ahead[i] - 2 * at + behind[i]) / (kStep * kStep);
+    for (Eigen::Index m = 0; m < 3; ++m) hessian[m](i, i) = second[m];
   }
   for (Eigen::Index i = 0; i < 3; ++i) {
     for (Eigen::Index j = i + 1; j < 3; ++j) {
-      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
       const Vector3d mixed =
-          (project(geocentric_m + axis(i) + axis(j)) - ahead[a] - ahead[b] + 2 * at - behind[a] -
-           behind[b] + project(geocentric_m - axis(i) - axis(j))) /
+          (project(geocentric_m + axis(i) + axis(j)) - ahead[i] - ahead[j] + 2 * at - behind[i] -
+           behind[j] + project(geocentric_m - axis(i) - axis(j))) /
           (2 * kStep * kStep);
       for (Eigen::Index m = 0; m < 3; ++m) {
-        Matrix3d& h = hessian[static_cast<std::size_t>(m)];
+        Matrix3d& h = hessian[m];
         h(i, j) = h(j, i) = mixed[m];
       }
     }

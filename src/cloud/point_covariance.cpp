@@ -34,7 +34,7 @@ MovedPoint moved_point(const Points& points, const TrajectoryErrors& errors, std
         "time_ns of point {} = {}, allowed {} to {}, the times of the trajectory's places", row,
         result.time_ns, times.front(), times.back()));
   }
-  const auto later = std::upper_bound(times.begin(), times.end(), result.time_ns);
+  const auto later = std::ranges::upper_bound(times, result.time_ns);
   const auto after = std::min(static_cast<std::size_t>(later - times.begin()), times.size() - 1);
   const std::size_t before = after == 0 ? 0 : after - 1;
   const double span = static_cast<double>(times[after] - times[before]);
@@ -42,17 +42,15 @@ MovedPoint moved_point(const Points& points, const TrajectoryErrors& errors, std
   const auto between = [part](double a, double b) { return a + part * (b - a); };
   Vector3d arm(points.x[row], points.y[row], points.z[row]);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    arm[static_cast<Index>(axis)] -=
-        between(errors.position[before][axis], errors.position[after][axis]);
+    arm[axis] -= between(errors.position[before][axis], errors.position[after][axis]);
   }
   for (std::size_t k = 0; k < 6; ++k) {
     const auto& of = errors.axes_from_ned[k % 3];
     Vector3d axis(of[0], of[1], of[2]);
     if (k == 2) axis = -axis;  // up
-    const auto at = static_cast<Index>(k);
     const Vector3d moved = k < 3 ? axis : Vector3d(axis.cross(arm));
-    result.faded.col(at) = between(errors.sigma[before][k], errors.sigma[after][k]) * moved;
-    result.white.col(at) = errors.white[k] * moved;
+    result.faded.col(k) = between(errors.sigma[before][k], errors.sigma[after][k]) * moved;
+    result.white.col(k) = errors.white[k] * moved;
   }
   if (errors.sample_interval > 0) {
     result.sample = static_cast<std::int64_t>(
@@ -66,7 +64,7 @@ MovedPoint moved_point(const Points& points, const TrajectoryErrors& errors, std
 
 Eigen::MatrixXd joint_covariance(const Points& points, const TrajectoryErrors& errors,
                                  std::span<const std::size_t> rows) {
-  require_at_least("places of the trajectory", static_cast<long long>(errors.time_ns.size()), 1);
+  require_at_least("places of the trajectory", errors.time_ns.size(), 1);
   require_length("position", errors.position.size(), errors.time_ns.size());
   require_length("sigma", errors.sigma.size(), errors.time_ns.size());
   for (const auto& column : points.own_covariance) {
@@ -78,33 +76,31 @@ Eigen::MatrixXd joint_covariance(const Points& points, const TrajectoryErrors& e
     require_place("row", row, points.size());
     moved.push_back(moved_point(points, errors, row));
   }
-  const auto n = static_cast<Index>(rows.size());
+  const Index n = rows.size();
   Eigen::MatrixXd joint(3 * n, 3 * n);
   for (Index i = 0; i < n; ++i) {
-    const auto a = static_cast<std::size_t>(i);
     for (Index j = i; j < n; ++j) {
-      const auto b = static_cast<std::size_t>(j);
       const double apart =
-          1e-9 * std::abs(static_cast<double>(moved[a].time_ns - moved[b].time_ns));
+          1e-9 * std::abs(static_cast<double>(moved[i].time_ns - moved[j].time_ns));
       Eigen::Matrix<double, 6, 1> faded;
       for (std::size_t k = 0; k < 6; ++k) {
-        faded[static_cast<Index>(k)] = std::exp(-apart / errors.correlation_time[k]);
+        faded[k] = std::exp(-apart / errors.correlation_time[k]);
       }
-      Matrix3d block = moved[a].faded * faded.asDiagonal() * moved[b].faded.transpose();
-      if (moved[a].sample == moved[b].sample) {
-        block += moved[a].white * moved[b].white.transpose();
+      Matrix3d block = moved[i].faded * faded.asDiagonal() * moved[j].faded.transpose();
+      if (moved[i].sample == moved[j].sample) {
+        block += moved[i].white * moved[j].white.transpose();
       }
       for (const auto& factor : points.loading) {
-        const Vector3d f(factor[0][rows[a]], factor[1][rows[a]], factor[2][rows[a]]);
-        const Vector3d g(factor[0][rows[b]], factor[1][rows[b]], factor[2][rows[b]]);
+        const Vector3d f(factor[0][rows[i]], factor[1][rows[i]], factor[2][rows[i]]);
+        const Vector3d g(factor[0][rows[j]], factor[1][rows[j]], factor[2][rows[j]]);
         block += f * g.transpose();
       }
-      if (rows[a] == rows[b]) {
+      if (rows[i] == rows[j]) {
         const auto& own = points.own_covariance;
         Matrix3d c;
-        c << own[kXX][rows[a]], own[kXY][rows[a]], own[kXZ][rows[a]],  //
-            own[kXY][rows[a]], own[kYY][rows[a]], own[kYZ][rows[a]],   //
-            own[kXZ][rows[a]], own[kYZ][rows[a]], own[kZZ][rows[a]];
+        c << own[kXX][rows[i]], own[kXY][rows[i]], own[kXZ][rows[i]],  //
+            own[kXY][rows[i]], own[kYY][rows[i]], own[kYZ][rows[i]],   //
+            own[kXZ][rows[i]], own[kYZ][rows[i]], own[kZZ][rows[i]];
         block += c;
       }
       joint.block<3, 3>(3 * i, 3 * j) = block;

@@ -12,138 +12,29 @@
 
 #include <fmt/format.h>
 
-#include "risley/core/angle.hpp"
-#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/parallel/parallel.hpp"
-#include "risley/sensors/scan_pattern.hpp"
+
+#include "cloud/ground_tiles.hpp"
 
 namespace risley::cloud {
 namespace {
 
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
-constexpr double kFarthestPoint = 1e8;  // from the map's origin, m
-constexpr double kWidestFlight = 1e6;   // m
-/// A scan has reached its whole field of view after so many seconds; so many of its shots tell.
-constexpr double kFieldAfter = 30, kFieldShots = 300'000;
-constexpr double kLowestBeam = 0.17364817766693033;              // sine of 10 degrees
+constexpr double kFarthestPoint = 1e8;                           // from the map's origin, m
+constexpr double kWidestFlight = 1e6;                            // m
 constexpr double kHistogramBin = 0.05, kWidestHistogram = 5000;  // m
 constexpr double kMiddleStripe = 1;                              // m
 constexpr double kPlaceStripe = 0.02, kProfileStripe = 0.02, kProfileReach = 1.4;  // of R
 constexpr double kRim = 0.05;  // of the field of view
 constexpr double kVariationWithin = 0.9, kCirclesWithin = 0.97, kSpacingWithin = 0.95;
 constexpr std::array<double, 2> kThirds{0.3, 0.7};  // of R
-/// Cells of the counts, in squares of so many.
-constexpr std::int32_t kTileCells = 16;
-constexpr std::size_t kMostTiles = 100'000;
 /// Radius of the empty circle in pixels. As many pixels have their centre within it as its area
 /// has, but for 0.6 %: 253 of 254.5.
 constexpr std::int32_t kRadiusPixels = 9;
-constexpr std::int32_t kTilePixels = 64;
 constexpr std::int32_t kBlockPixels = 1024, kHaloPixels = 16 * kRadiusPixels;
-
-std::int32_t cell_number(double value, double cell) {
-  return static_cast<std::int32_t>(std::floor(value / cell));
-}
-
-/// Floor of a division, for numbers of tiles.
-constexpr std::int32_t divided(std::int32_t value, std::int32_t by) {
-  return value >= 0 ? value / by : -((by - 1 - value) / by);
-}
-
-/// Squares of ground, each with its data, made when they are asked for the first time.
-template <class Tile>
-class TileMap {
- public:
-  Tile* find(std::int32_t column, std::int32_t row) const {
-    const std::uint64_t key = key_of(column, row);
-    if (key == last_key_) return last_;
-    const auto at = tiles_.find(key);
-    return at == tiles_.end() ? nullptr : at->second.get();
-  }
-  /// nullptr where there would be more than `most`.
-  Tile* open(std::int32_t column, std::int32_t row, std::size_t most) {
-    const std::uint64_t key = key_of(column, row);
-    if (key == last_key_) return last_;
-    auto at = tiles_.find(key);
-    if (at == tiles_.end()) {
-      if (tiles_.size() >= most) return nullptr;
-      at = tiles_.emplace(key, std::make_unique<Tile>()).first;
-    }
-    last_key_ = key;
-    last_ = at->second.get();
-    return last_;
-  }
-  template <class Visit>
-  void for_each(Visit visit) const {
-    for (const auto& [key, tile] : tiles_) {
-      visit(static_cast<std::int32_t>(key & 0xffffffffU), static_cast<std::int32_t>(key >> 32U),
-            *tile);
-    }
-  }
-  void clear() {
-    tiles_.clear();
-    last_ = nullptr;
-    last_key_ = kNoKey;
-  }
-
- private:
-  /// Farther out than any point.
-  static constexpr std::uint64_t kNoKey = 0x8000000080000000U;
-  static std::uint64_t key_of(std::int32_t column, std::int32_t row) {
-    return std::uint64_t{static_cast<std::uint32_t>(row)} << 32U |
-           static_cast<std::uint32_t>(column);
-  }
-  std::unordered_map<std::uint64_t, std::unique_ptr<Tile>> tiles_;
-  Tile* last_ = nullptr;
-  std::uint64_t last_key_ = kNoKey;
-};
-
-template <class Cell>
-using CellTile = std::array<Cell, std::size_t{kTileCells} * kTileCells>;
-
-template <class Cell>
-Cell* cell_at(const TileMap<CellTile<Cell>>& tiles, std::int32_t column, std::int32_t row) {
-  const std::int32_t i = divided(column, kTileCells), j = divided(row, kTileCells);
-  CellTile<Cell>* tile = tiles.find(i, j);
-  if (tile == nullptr) return nullptr;
-  return &(*tile)[static_cast<std::size_t>((row - j * kTileCells) * kTileCells + column -
-                                           i * kTileCells)];
-}
-
-template <class Cell>
-Cell& opened_cell(TileMap<CellTile<Cell>>& tiles, std::int32_t column, std::int32_t row,
-                  double cell) {
-  const std::int32_t i = divided(column, kTileCells), j = divided(row, kTileCells);
-  CellTile<Cell>* tile = tiles.open(i, j, kMostTiles);
-  if (tile == nullptr) {
-    throw InvalidArgument(fmt::format(
-        "points lie on more than {:.3g} km^2 of ground, which is too much for cells of {:g} m: "
-        "count in larger ones",
-        1e-6 * static_cast<double>(kMostTiles) * std::pow(kTileCells * cell, 2), cell));
-  }
-  return (*tile)[static_cast<std::size_t>((row - j * kTileCells) * kTileCells + column -
-                                          i * kTileCells)];
-}
-
-/// Which pixels hold a point, row by row.
-using PixelTile = std::array<std::uint64_t, kTilePixels>;
-
-void mark(PixelTile& tile, std::int32_t column, std::int32_t row) {
-  tile[static_cast<std::size_t>(row - divided(row, kTilePixels) * kTilePixels)] |=
-      std::uint64_t{1} << static_cast<unsigned>(column -
-                                                divided(column, kTilePixels) * kTilePixels);
-}
-
-bool is_marked(const TileMap<PixelTile>& tiles, std::int32_t column, std::int32_t row) {
-  const PixelTile* tile = tiles.find(divided(column, kTilePixels), divided(row, kTilePixels));
-  if (tile == nullptr) return false;
-  return ((*tile)[static_cast<std::size_t>(row - divided(row, kTilePixels) * kTilePixels)] >>
-              static_cast<unsigned>(column - divided(column, kTilePixels) * kTilePixels) &
-          1U) != 0;
-}
 
 /// A rectangle along a strip's line.
 struct Stretch {
@@ -256,8 +147,7 @@ EmptyCircles circles_of_block(const TileMap<PixelTile>& pixels, std::int32_t blo
       for (std::int32_t y = 0; y < kTilePixels; ++y) {
         const std::int32_t row = j * kTilePixels + y - first_row;
         if (row < 0 || row >= kWide) continue;
-        for (std::uint64_t bits = (*tile)[static_cast<std::size_t>(y)]; bits != 0;
-             bits &= bits - 1) {
+        for (std::uint64_t bits = (*tile)[y]; bits != 0; bits &= bits - 1) {
           const std::int32_t column = i * kTilePixels + std::countr_zero(bits) - first_column;
           if (column < 0 || column >= kWide) continue;
           up[static_cast<std::size_t>(row) * kStride + static_cast<std::size_t>(column)] = 0;
@@ -304,46 +194,10 @@ void require_options(const PointDistributionOptions& options) {
 
 }  // namespace
 
-SwathReach swath_reach(const sensors::Sensor& sensor, const trajectories::Mount& mount) {
-  trajectories::require_mount(mount);
-  require_at_least("prisms of the sensor", sensor.prisms(), 1);
-  const Eigen::Matrix3d turn = trajectories::body_from_sensor(mount);
-  sensors::ScanPatternOptions options;
-  if (!sensor.sequence) {
-    options.rotation_angle.assign(static_cast<std::size_t>(sensor.prisms()), 0.0);
-  }
-  options.every = static_cast<std::uint64_t>(
-      std::max(1.0, std::floor(kFieldAfter * sensor.shot_rate / kFieldShots)));
-  const sensors::ScanPattern pattern = sensors::scan_pattern(
-      sensor, 0, static_cast<std::size_t>(std::min(kFieldShots, kFieldAfter * sensor.shot_rate)),
-      options);
-  constexpr double kNothing = -std::numeric_limits<double>::infinity();
-  SwathReach reach{kNothing, kNothing, kNothing, kNothing};
-  for (std::size_t i = 0; i < pattern.size(); ++i) {
-    if (std::isnan(pattern.azimuth[i])) continue;
-    const Vector3<double> d =
-        direction_from_angles(SphericalAngles<double>{pattern.azimuth[i], pattern.zenith[i]});
-    const Eigen::Vector3d beam = turn * Eigen::Vector3d(d.x, d.y, d.z);
-    if (beam.z() < kLowestBeam) {
-      throw InvalidArgument(fmt::format(
-          "a beam of the sensor points {:.1f} degrees below the horizon of a level platform, at "
-          "least 10 are needed: do the sensor's axes in the mount say which way it looks?",
-          degrees_from_radians(std::asin(std::clamp(beam.z(), -1.0, 1.0)))));
-    }
-    const double ahead = beam.x() / beam.z(), right = beam.y() / beam.z();
-    reach.ahead = std::max(reach.ahead, ahead);
-    reach.behind = std::max(reach.behind, -ahead);
-    reach.right = std::max(reach.right, right);
-    reach.left = std::max(reach.left, -right);
-  }
-  if (!(reach.ahead > kNothing)) throw EstimationError("no beam passes through the prisms");
-  return reach;
-}
-
-class PointDistribution::Work {
+class PointDistribution::Counts {
  public:
-  Work(std::vector<StripLine> lines, const SwathReach& reach,
-       const PointDistributionOptions& options)
+  Counts(std::vector<StripLine> lines, const SwathReach& reach,
+         const PointDistributionOptions& options)
       : lines_(std::move(lines)), reach_(reach), options_(options) {
     require_options(options_);
     require_finite("left reach", reach_.left);
@@ -561,7 +415,7 @@ class PointDistribution::Work {
     own.dense_width = 0;
     for (const int side : {-1, 1}) {
       for (int i = side < 0 ? -1 : 0; i >= -stripes && i < stripes; i += side) {
-        if (!(profile.density[static_cast<std::size_t>(i + stripes)] >= 0.5 * own.density)) break;
+        if (!(profile.density[i + stripes] >= 0.5 * own.density)) break;
         own.dense_width += profile.stripe;
       }
     }
@@ -595,7 +449,7 @@ class PointDistribution::Work {
     pixels_.for_each([&](std::int32_t i, std::int32_t j, const PixelTile& tile) {
       for (std::int32_t y = 0; y < kTilePixels; ++y) {
         const std::int32_t row = cell_number((j * kTilePixels + y + 0.5) * pixel_, edge);
-        for (std::uint64_t bits = tile[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
+        for (std::uint64_t bits = tile[y]; bits != 0; bits &= bits - 1) {
           const std::int32_t column =
               cell_number((i * kTilePixels + std::countr_zero(bits) + 0.5) * pixel_, edge);
           mark(*seen.open(divided(column, kTilePixels), divided(row, kTilePixels), all), column,
@@ -678,7 +532,7 @@ class PointDistribution::Work {
     std::size_t known = 0;
     const auto counts = [](const GroundCell& cell) { return cell.points > 0 || cell.in_swath > 0; };
     ground_.for_each([&](std::int32_t, std::int32_t, const CellTile<GroundCell>& tile) {
-      known += static_cast<std::size_t>(std::count_if(tile.begin(), tile.end(), counts));
+      known += static_cast<std::size_t>(std::ranges::count_if(tile, counts));
     });
     // Squares at the rim are not full, so that there may be a few more than were asked for.
     for (std::int32_t merged = std::max(
@@ -711,10 +565,9 @@ class PointDistribution::Work {
       }
       break;
     }
-    std::sort(result.map.begin(), result.map.end(),
-              [](const DensitySquare& a, const DensitySquare& b) {
-                return std::pair(a.y, a.x) < std::pair(b.y, b.x);
-              });
+    std::ranges::sort(result.map, [](const DensitySquare& a, const DensitySquare& b) {
+      return std::pair(a.y, a.x) < std::pair(b.y, b.x);
+    });
   }
 
   std::vector<StripLine> lines_;
@@ -746,7 +599,7 @@ class PointDistribution::Work {
 
 PointDistribution::PointDistribution(std::vector<StripLine> lines, const SwathReach& reach,
                                      const PointDistributionOptions& options)
-    : work_(std::make_unique<Work>(std::move(lines), reach, options)) {}
+    : counts_(std::make_unique<Counts>(std::move(lines), reach, options)) {}
 PointDistribution::~PointDistribution() = default;
 PointDistribution::PointDistribution(PointDistribution&&) noexcept = default;
 PointDistribution& PointDistribution::operator=(PointDistribution&&) noexcept = default;
@@ -754,11 +607,11 @@ PointDistribution& PointDistribution::operator=(PointDistribution&&) noexcept = 
 void PointDistribution::add(std::span<const double> x, std::span<const double> y,
                             std::span<const double> z, std::span<const std::uint16_t> strip,
                             const Progress& progress) {
-  work_->add(x, y, z, strip, progress);
+  counts_->add(x, y, z, strip, progress);
 }
 
 PointDistributionSummary PointDistribution::summary(std::size_t most_squares) {
-  return work_->summary(most_squares);
+  return counts_->summary(most_squares);
 }
 
 }  // namespace risley::cloud

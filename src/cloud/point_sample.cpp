@@ -26,13 +26,12 @@ RangeClass class_of(const PointSample& sample, std::span<const std::size_t> rows
                     double to) {
   RangeClass result{from, to, rows.size(), 0, 0, 0};
   std::vector<double> sigma(rows.size());
-  std::transform(rows.begin(), rows.end(), sigma.begin(),
-                 [&](std::size_t row) { return sample.total_sigma[row]; });
+  std::ranges::transform(rows, sigma.begin(),
+                         [&](std::size_t row) { return sample.total_sigma[row]; });
   result.median_sigma = quantile(sigma, 0.5);
   result.high_sigma = quantile(sigma, kHighShare);
-  const auto known = std::count_if(rows.begin(), rows.end(), [&](std::size_t row) {
-    return std::isfinite(sample.incidence[row]);
-  });
+  const auto known = std::ranges::count_if(
+      rows, [&](std::size_t row) { return std::isfinite(sample.incidence[row]); });
   result.known_incidence = static_cast<double>(known) / static_cast<double>(rows.size());
   return result;
 }

@@ -22,8 +22,7 @@ void require_range_errors(const sensors::RangeErrors& errors, int emitters) {
   require_finite("near of range_errors", errors.near, "m");
   require_finite("incidence of range_errors", errors.incidence, "1");
   require_finite("per_decade of range_errors", errors.per_decade, "m");
-  require_length_or_none("emitter of range_errors", errors.emitter.size(),
-                         static_cast<std::size_t>(emitters));
+  require_length_or_none("emitter of range_errors", errors.emitter.size(), emitters);
   for (const double error : errors.emitter) require_finite("emitter of range_errors", error, "m");
 }
 
@@ -43,12 +42,12 @@ void require_model(const PointingModel& model) {
   require_range_errors(model.range_errors, model.train.emitters());
   const auto all_places = static_cast<std::size_t>(parameter_count(model.train.shape()));
   for (const int place : model.places) {
-    require_place("place", static_cast<std::size_t>(place), all_places);
+    require_place("place", place, all_places);
   }
   const std::size_t rows =
       model.places.size() + static_cast<std::size_t>(model.train.prisms()) + model.sizes.size();
   for (const CommonFactor& factor : model.factors) {
-    require_length("weights of a factor", static_cast<std::size_t>(factor.weights.size()), rows);
+    require_length("weights of a factor", factor.weights.size(), rows);
     require_range_errors(factor.range_errors, model.train.emitters());
   }
 }
@@ -62,9 +61,8 @@ void require_shots(const PointingModel& model, const CloudHeader& header,
   }
   const std::size_t n = shots.size();
   if (header.has_rotation_angles) {
-    const auto rotors = static_cast<std::size_t>(prisms);
-    require_length("rotation_angle", shots.rotation_angle.size(), rotors);
-    require_length("angle_covariance", shots.angle_covariance.size(), rotors * (rotors + 1) / 2);
+    require_length("rotation_angle", shots.rotation_angle.size(), prisms);
+    require_length("angle_covariance", shots.angle_covariance.size(), prisms * (prisms + 1) / 2);
     for (const auto& column : shots.rotation_angle) {
       require_length("rotation_angle of a prism", column.size(), n);
     }
@@ -99,41 +97,6 @@ struct Faces {
   }
 };
 
-/// Calls function(from column, to column) for every column of shots.
-template <class Function>
-void for_each_column(const PointedShots& from, PointedShots& to, const Function& function) {
-  for (std::size_t k = 0; k < from.rotation_angle.size(); ++k) {
-    function(from.rotation_angle[k], to.rotation_angle[k]);
-  }
-  for (std::size_t k = 0; k < from.angle_covariance.size(); ++k) {
-    function(from.angle_covariance[k], to.angle_covariance[k]);
-  }
-  for (std::size_t k = 0; k < 3; ++k) function(from.surface_normal[k], to.surface_normal[k]);
-  for (const auto column :
-       {&PointedShots::azimuth, &PointedShots::zenith, &PointedShots::azimuth_rounding,
-        &PointedShots::zenith_rounding, &PointedShots::range_rounding, &PointedShots::range,
-        &PointedShots::intensity}) {
-    function(from.*column, to.*column);
-  }
-  function(from.beam, to.beam);
-}
-
-/// The same for the columns of points that the kernel fills.
-template <class Function>
-void for_each_computed_column(const Points& from, Points& to, const Function& function) {
-  for (const auto column : {&Points::x, &Points::y, &Points::z, &Points::range, &Points::incidence,
-                            &Points::azimuth_residual, &Points::zenith_residual}) {
-    function(from.*column, to.*column);
-  }
-  for (std::size_t k = 0; k < kCovarianceTerms; ++k) {
-    function(from.covariance[k], to.covariance[k]);
-    function(from.own_covariance[k], to.own_covariance[k]);
-  }
-  for (std::size_t k = 0; k < from.loading.size(); ++k) {
-    for (std::size_t i = 0; i < 3; ++i) function(from.loading[k][i], to.loading[k][i]);
-  }
-}
-
 /// Those numbers of rows that are not zero.
 struct SparseRows {
   std::vector<int> begin{0}, column;
@@ -160,47 +123,48 @@ std::vector<double> range_row(const sensors::RangeErrors& errors) {
   return row;
 }
 
-/// Pointers to the columns of some shots and points.
-class Columns {
+/// Pointers to the columns of shots and points, from one row on.
+class ColumnPointers {
  public:
-  Columns(const CloudHeader& header, const PointedShots& shots, const SensorPoses& poses,
-          Points& points, PointArguments& a) {
-    for (const auto& column : shots.rotation_angle) angle_.push_back(column.data());
-    for (const auto& column : shots.angle_covariance) covariance_.push_back(column.data());
-    for (std::size_t i = 0; i < 3; ++i) normal_[i] = shots.surface_normal[i].data();
+  ColumnPointers(const CloudHeader& header, const PointedShots& shots, const SensorPoses& poses,
+                 Points& points, std::size_t first, PointArguments& a) {
+    const auto at = [first](auto& column) { return column.data() + first; };
+    for (const auto& column : shots.rotation_angle) angle_.push_back(at(column));
+    for (const auto& column : shots.angle_covariance) covariance_.push_back(at(column));
+    for (std::size_t i = 0; i < 3; ++i) normal_[i] = at(shots.surface_normal[i]);
     if (header.has_rotation_angles) a.rotation_angle = angle_.data();
     a.angle_covariance = covariance_.data();
     a.surface_normal = normal_.data();
-    a.azimuth = shots.azimuth.data();
-    a.zenith = shots.zenith.data();
-    a.azimuth_variance = shots.azimuth_rounding.data();
-    a.zenith_variance = shots.zenith_rounding.data();
-    a.range = shots.range.data();
-    a.rounding_variance = shots.range_rounding.data();
-    a.intensity = shots.intensity.data();
-    a.beam = shots.beam.data();
-    for (std::size_t i = 0; i < 3; ++i) {
-      a.velocity[i] = poses.velocity[i].data();
-      a.rate[i] = poses.rate[i].data();
+    a.azimuth = at(shots.azimuth);
+    a.zenith = at(shots.zenith);
+    a.azimuth_variance = at(shots.azimuth_rounding);
+    a.zenith_variance = at(shots.zenith_rounding);
+    a.range = at(shots.range);
+    a.rounding_variance = at(shots.range_rounding);
+    a.intensity = at(shots.intensity);
+    if (!shots.beam.empty()) a.beam = at(shots.beam);
+    for (std::size_t i = 0; i < 3 && poses.size() > 0; ++i) {
+      a.velocity[i] = at(poses.velocity[i]);
+      a.rate[i] = at(poses.rate[i]);
     }
-    a.point[0] = points.x.data();
-    a.point[1] = points.y.data();
-    a.point[2] = points.z.data();
+    a.point[0] = at(points.x);
+    a.point[1] = at(points.y);
+    a.point[2] = at(points.z);
     if (header.has_covariance) {
       for (std::size_t i = 0; i < kCovarianceTerms; ++i) {
-        a.covariance[i] = points.covariance[i].data();
-        if (header.has_own_covariance) a.own_covariance[i] = points.own_covariance[i].data();
+        a.covariance[i] = at(points.covariance[i]);
+        if (header.has_own_covariance) a.own_covariance[i] = at(points.own_covariance[i]);
       }
     }
-    a.corrected_range = points.range.data();
-    a.incidence = points.incidence.data();
+    a.corrected_range = at(points.range);
+    a.incidence = at(points.incidence);
     if (header.has_rotation_angles) {
-      a.azimuth_residual = points.azimuth_residual.data();
-      a.zenith_residual = points.zenith_residual.data();
+      a.azimuth_residual = at(points.azimuth_residual);
+      a.zenith_residual = at(points.zenith_residual);
     }
     if (header.factors.empty()) return;
     for (auto& factor : points.loading) {
-      for (auto& column : factor) loading_.push_back(column.data());
+      for (auto& column : factor) loading_.push_back(at(column));
     }
     a.loading = loading_.data();
   }
@@ -211,13 +175,28 @@ class Columns {
   std::vector<double*> loading_;
 };
 
+/// Of fewer shots than a group has: filled up.
+void compute_few_points(const PointingModel& model, const CloudHeader& header, PointedShots shots,
+                        Points& points, SensorPoses poses, InstructionSet set) {
+  const auto resize = [&](std::size_t rows) {
+    visit_computed_columns(points, header, [rows](auto& column, const char*, bool there) {
+      if (there) column.resize(rows);
+    });
+  };
+  const std::size_t count = shots.size();
+  shots.resize(model.train.prisms(), kPointPadding);
+  if (model.moves) poses.resize(kPointPadding);
+  resize(kPointPadding);
+  compute_points(model, header, shots, points, poses, set);
+  resize(count);
+}
+
 }  // namespace
 
 void PointedShots::resize(int prisms, std::size_t shots) {
   require_between("number of prisms", prisms, 1, kMaxPrisms);
-  const auto n = static_cast<std::size_t>(prisms);
-  rotation_angle.resize(n);
-  angle_covariance.resize(n * (n + 1) / 2);
+  rotation_angle.resize(prisms);
+  angle_covariance.resize(prisms * (prisms + 1) / 2);
   for (auto* columns : {&rotation_angle, &angle_covariance}) {
     for (auto& column : *columns) column.resize(shots);
   }
@@ -236,6 +215,10 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   require_shots(model, header, shots);
   require_poses(poses, model.moves ? shots.size() : 0);
   require_computed_columns(points, header, shots.size());
+  if (shots.size() > 0 && shots.size() < kPointPadding) {
+    compute_few_points(model, header, shots, points, poses, set);
+    return;
+  }
   const Faces faces(model);
   const int prisms = model.train.prisms();
   const auto& kernel = RISLEY_KERNEL_COPIES(compute_points).at(set);
@@ -270,7 +253,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     of_range.add(range_row(factor.range_errors));
   }
   std::vector<double> range_emitter = model.range_errors.emitter;
-  range_emitter.resize(static_cast<std::size_t>(a.emitters), 0.0);
+  range_emitter.resize(a.emitters, 0.0);
   a.range_errors = model.range_errors != sensors::RangeErrors{} || !of_range.column.empty();
   a.range_near = model.range_errors.near;
   a.range_incidence = model.range_errors.incidence;
@@ -295,37 +278,14 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   }
 
   const std::size_t whole = shots.size() / kPointPadding * kPointPadding;
-  {
-    const Columns columns(header, shots, poses, points, a);
-    a.shots = whole;
+  const auto compute = [&](std::size_t first, std::size_t count) {
+    const ColumnPointers columns(header, shots, poses, points, first, a);
+    a.shots = count;
     kernel(a);
-  }
-  if (whole < shots.size()) {  // the last group, filled up
-    const std::size_t rest = shots.size() - whole;
-    PointedShots last_shots;
-    last_shots.resize(prisms, kPointPadding);
-    Points last_points;
-    header.resize(last_points, kPointPadding);
-    const auto copy = [](const auto& from, std::size_t first, std::size_t count, auto& to,
-                         std::size_t at) {
-      if (from.empty()) return;
-      std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first), count,
-                  to.begin() + static_cast<std::ptrdiff_t>(at));
-    };
-    for_each_column(shots, last_shots,
-                    [&](const auto& from, auto& to) { copy(from, whole, rest, to, 0); });
-    SensorPoses last_poses;
-    last_poses.resize(kPointPadding);
-    for (std::size_t k = 0; k < 3; ++k) {
-      copy(poses.velocity[k], whole, rest, last_poses.velocity[k], 0);
-      copy(poses.rate[k], whole, rest, last_poses.rate[k], 0);
-    }
-    const Columns columns(header, last_shots, last_poses, last_points, a);
-    a.shots = kPointPadding;
-    kernel(a);
-    for_each_computed_column(last_points, points,
-                             [&](const auto& from, auto& to) { copy(from, 0, rest, to, whole); });
-  }
+  };
+  compute(0, whole);
+  // The last group takes some rows once more.
+  if (whole < shots.size()) compute(shots.size() - kPointPadding, kPointPadding);
   for (std::size_t k = 0; k < points.rotation_angle.size(); ++k) {
     for (std::size_t i = 0; i < shots.size(); ++i) {
       points.rotation_angle[k][i] = wrap_to_two_pi(shots.rotation_angle[k][i]);  // NaN stays

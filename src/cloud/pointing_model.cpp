@@ -53,10 +53,10 @@ NamedCovariance believed(const SensorBelief& belief) {
 NamedCovariance assumed(const sensors::Sensor& sensor,
                         const std::vector<estimation::FreeParameter>& parameters) {
   NamedCovariance result;
-  const auto count = static_cast<Index>(parameters.size());
+  const Index count = parameters.size();
   result.matrix = Eigen::MatrixXd::Zero(count, count);
   for (Index j = 0; j < count; ++j) {
-    result.names.push_back(parameters[static_cast<std::size_t>(j)].name);
+    result.names.push_back(parameters[j].name);
     const sensors::Knowledge* known = sensor.find_knowledge(result.names.back());
     if (known != nullptr) result.matrix(j, j) = known->sigma * known->sigma;
   }
@@ -75,13 +75,12 @@ NamedCovariance assumed(const sensors::Sensor& sensor, const SensorBelief& belie
 void require_belief(const SensorBelief& belief) {
   const std::size_t free = belief.free.size();
   const auto length = [](const char* name, Index size, std::size_t expected) {
-    require_length(name, static_cast<std::size_t>(size), expected);
+    require_length(name, size, expected);
   };
   length("rows of the belief's covariance", belief.covariance.rows(), free);
   length("columns of the belief's covariance", belief.covariance.cols(), free);
   if (free > 0) {
-    length("rows of angle_sensitivity", belief.angle_sensitivity.rows(),
-           static_cast<std::size_t>(belief.sensor.prisms()));
+    length("rows of angle_sensitivity", belief.angle_sensitivity.rows(), belief.sensor.prisms());
     length("columns of angle_sensitivity", belief.angle_sensitivity.cols(), free);
   }
   require_not_below("angle noise", belief.angle_noise, 0, "rad");
@@ -94,11 +93,11 @@ sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
                                          const SensorBelief& belief) {
   using sensors::CalibrationReference;
   if (calibration.reference != CalibrationReference::none) return calibration.reference;
-  const auto n = static_cast<Index>(belief.free.size());
+  const Index n = belief.free.size();
   if (n == 0) return CalibrationReference::directions;
   Eigen::VectorXd off(n);
   for (Index j = 0; j < n; ++j) {
-    const int place = belief.free[static_cast<std::size_t>(j)].places.front();
+    const int place = belief.free[j].places.front();
     off[j] = belief.sensor.train[place] - calibration.train[place];
   }
   const Eigen::MatrixXd covariance = belief.covariance + assumed(calibration, belief.free).matrix;
@@ -109,10 +108,9 @@ sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
 /// Whether a mount was found together with parameters of its sensor.
 bool is_of_a_calibration(const trajectories::Mount& mount) {
   const auto& own = trajectories::mount_names();
-  return std::any_of(mount.covariance.names.begin(), mount.covariance.names.end(),
-                     [&](const std::string& name) {
-                       return std::find(own.begin(), own.end(), name) == own.end();
-                     });
+  return std::ranges::any_of(mount.covariance.names, [&](const std::string& name) {
+    return std::ranges::find(own, name) == own.end();
+  });
 }
 
 }  // namespace

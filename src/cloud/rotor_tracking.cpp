@@ -35,7 +35,7 @@ double knot_interval(const std::vector<estimation::RotorProcess>& process) {
   double longest = estimation::kKnotInterval;
   for (const double times : {2.0, 3.0, 5.0}) {
     const double interval = times * estimation::kKnotInterval;
-    const bool smooth = std::all_of(process.begin(), process.end(), [interval](const auto& rotor) {
+    const bool smooth = std::ranges::all_of(process, [interval](const auto& rotor) {
       return step_covariance(rotor, interval / 2).angle_angle < kParabola * kParabola;
     });
     if (smooth) longest = interval;
@@ -51,12 +51,12 @@ void choose_parameters(const sensors::Sensor& calibration, estimation::EstimateO
       estimation::default_free_names(calibration.shape(), estimation::one_glass(calibration.train));
   const auto& names = calibration.covariance_names;
   for (const std::string& name : defaults) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) options.fixed.push_back(name);
+    if (std::ranges::find(names, name) == names.end()) options.fixed.push_back(name);
   }
   for (const std::string& name : names) {
     if (name == "range_offset_m" || sensors::find_prism_size(name, calibration.prisms())) continue;
     if (find_parameter(name, calibration.shape()).kind != ParameterKind::train) continue;
-    if (std::find(defaults.begin(), defaults.end(), name) == defaults.end()) {
+    if (std::ranges::find(defaults, name) == defaults.end()) {
       options.additional.push_back(name);
     }
   }
@@ -64,15 +64,15 @@ void choose_parameters(const sensors::Sensor& calibration, estimation::EstimateO
 
 /// A calibration against directions must describe those of the recording.
 void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sensor& calibration) {
-  const auto n = static_cast<Index>(estimate.free.size());
+  const Index n = estimate.free.size();
   if (n == 0) return;
   Eigen::VectorXd off(n);
   Eigen::MatrixXd covariance = estimate.covariance;
   std::vector<Index> rows;
   for (Index j = 0; j < n; ++j) {
-    const auto& free = estimate.free[static_cast<std::size_t>(j)];
+    const auto& free = estimate.free[j];
     const auto& names = calibration.covariance_names;
-    const auto at = std::find(names.begin(), names.end(), free.name);
+    const auto at = std::ranges::find(names, free.name);
     if (at == names.end()) return;
     rows.push_back(at - names.begin());
     off[j] = estimate.parameters[j] - calibration.train[free.places.front()];
@@ -80,8 +80,7 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
   covariance += Eigen::MatrixXd(calibration.covariance(rows, rows));
   const estimation::Disagreement apart = estimation::disagreement(off, covariance);
   if (apart.same_sensor()) return;
-  const ParameterInfo& info = find_parameter(
-      estimate.free[static_cast<std::size_t>(apart.worst)].name, calibration.shape());
+  const ParameterInfo& info = find_parameter(estimate.free[apart.worst].name, calibration.shape());
   throw EstimationError(fmt::format(
       "a calibration of another sensor: by the recording's directions {} is {:.4g} {} "
       "away from the "
@@ -146,8 +145,7 @@ SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
 RotorTracker::RotorTracker(const SensorBelief& belief, std::optional<double> rate)
     : belief_(belief), rate_(rate), knot_interval_(knot_interval(belief.rotor_process)) {
   if (rate) require_above("rate", *rate, 0, "Hz");
-  require_length("rotor_process", belief.rotor_process.size(),
-                 static_cast<std::size_t>(belief.sensor.prisms()));
+  require_length("rotor_process", belief.rotor_process.size(), belief.sensor.prisms());
   require_above("angle noise", belief.angle_noise, 0, "rad");
 }
 
@@ -211,7 +209,7 @@ void RotorTracker::angles(const recordings::Observations& piece, std::span<const
   std::vector<std::array<double, kTerms>> terms(covariance.size());
   std::size_t knot = 0;
   if (!rows.empty() && knots.size() > 0) {
-    const auto after = std::upper_bound(first_row_.begin(), first_row_.end(), rows.front());
+    const auto after = std::ranges::upper_bound(first_row_, rows.front());
     knot = static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - first_row_.begin() - 1, 0));
   }
   std::size_t prepared = static_cast<std::size_t>(-1);

@@ -81,9 +81,8 @@ bool SensorPath::Cell::set(std::int64_t time_ns) {
   }
   coefficients_ = values * powers.inverse();
   const std::vector<trajectories::FlownStrip>& strips = path_.strips_;
-  const auto behind = std::upper_bound(
-      strips.begin(), strips.end(), begin_ns_,
-      [](std::int64_t t, const trajectories::FlownStrip& strip) { return t < strip.begin_ns; });
+  const auto behind =
+      std::ranges::upper_bound(strips, begin_ns_, {}, &trajectories::FlownStrip::begin_ns);
   strip_ = 0;
   if (behind != strips.begin() && begin_ns_ <= std::prev(behind)->end_ns) {
     strip_ = static_cast<std::uint16_t>(behind - strips.begin());
@@ -98,10 +97,10 @@ void SensorPath::Cell::fill(const double* parts, std::size_t count, SensorPoses&
   a.part = parts;
   a.coefficients = coefficients_.data();
   for (std::size_t k = 0; k < 3; ++k) {
-    a.origin[k] = origin_[static_cast<Eigen::Index>(k)];
+    a.origin[k] = origin_[k];
     a.reference[k] = poses.reference[k].data() + first;
-    std::fill_n(poses.velocity[k].data() + first, count, velocity_[static_cast<Eigen::Index>(k)]);
-    std::fill_n(poses.rate[k].data() + first, count, rate_[static_cast<Eigen::Index>(k)]);
+    std::fill_n(poses.velocity[k].data() + first, count, velocity_[k]);
+    std::fill_n(poses.rate[k].data() + first, count, rate_[k]);
   }
   for (std::size_t k = 0; k < 9; ++k) a.turn[k] = poses.turn[k].data() + first;
   std::fill_n(poses.strip.data() + first, count, strip_);

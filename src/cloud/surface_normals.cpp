@@ -40,7 +40,7 @@ void SurfaceNormals::for_cells_around(std::size_t cell, int reach, Function&& fu
   const int row = static_cast<int>(cell) / kSide, column = static_cast<int>(cell) % kSide;
   for (int i = std::max(row - reach, 0); i <= std::min(row + reach, kSide - 1); ++i) {
     for (int j = std::max(column - reach, 0); j <= std::min(column + reach, kSide - 1); ++j) {
-      function(static_cast<std::size_t>(i * kSide + j));
+      function(i * kSide + j);
     }
   }
 }
@@ -102,7 +102,7 @@ void SurfaceNormals::add(double azimuth, double zenith, double range) {
 }
 
 void SurfaceNormals::fit() {
-  std::fill(surfaces_.begin(), surfaces_.end(), Surface{kNoPlane});
+  std::ranges::fill(surfaces_, Surface{kNoPlane});
   beside_.clear();
   for (const std::size_t cell : touched_) {
     Moments sum;

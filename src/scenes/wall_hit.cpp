@@ -208,7 +208,7 @@ std::optional<WallHit> meet_wall(const ScenePlane& wall, const Vector3<double>& 
         add(patch.center[1] + half * patch.size[1], from.vertical, along.vertical, false);
       }
     }
-    std::sort(crossings.begin(), crossings.begin() + static_cast<std::ptrdiff_t>(count),
+    std::sort(crossings.begin(), crossings.begin() + count,
               [](const Crossing& a, const Crossing& b) { return a.t < b.t; });
   }
 

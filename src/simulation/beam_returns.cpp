@@ -84,7 +84,7 @@ BeamReturn BeamReturns::of_footprint(const SceneBeam& beam) const {
     if (i == 0) found.true_range = hit->range;
     hits[count++] = *hit;
   }
-  const auto end = hits.begin() + static_cast<std::ptrdiff_t>(count);
+  const auto end = hits.begin() + count;
   std::stable_sort(hits.begin(), end,
                    [](const scenes::Hit& a, const scenes::Hit& b) { return a.range < b.range; });
   // The first pulse that the sensor detects. What it receives of a ray falls with the range

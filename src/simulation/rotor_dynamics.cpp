@@ -98,14 +98,12 @@ RotorMotion::RotorMotion(const RotorSettings& settings, int prism, double start_
   require_finite("angular_velocity", angular_velocity, "rad/s");
   require_at_least("last_time_ns", last_time_ns, 0);
   if (settings.oscillation_speed_std > 0.0) {
-    const auto at = static_cast<std::size_t>(prism);
-    require_at_least("values of oscillation_period",
-                     static_cast<long long>(settings.oscillation_period.size()), prism + 1);
-    require_above(fmt::format("oscillation_period[{}]", prism), settings.oscillation_period[at], 0,
-                  "s");
+    require_at_least("values of oscillation_period", settings.oscillation_period.size(), prism + 1);
+    require_above(fmt::format("oscillation_period[{}]", prism), settings.oscillation_period[prism],
+                  0, "s");
     amplitude_ = std::numbers::sqrt2 * settings.oscillation_speed_std;
-    frequency_ = kTwoPi / settings.oscillation_period[at];
-    phase_ = kTwoPi * RandomStream(seed, stream::kOscillationPhases).uniform(at);
+    frequency_ = kTwoPi / settings.oscillation_period[prism];
+    phase_ = kTwoPi * RandomStream(seed, stream::kOscillationPhases).uniform(prism);
   }
   if (acceleration_noise_ > 0.0) {
     const auto last = static_cast<std::uint64_t>(last_time_ns / kKnotInterval_ns);

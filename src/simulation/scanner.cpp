@@ -37,14 +37,13 @@ constexpr double kMostIntensity = 255.0;
 /// What a simulation needs of the true sensor.
 void require_sensor(const sensors::Sensor& sensor) {
   require_between("device_type", sensor.device_type, 0, 255);
-  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(),
-                 static_cast<std::size_t>(sensor.prisms()));
+  require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), sensor.prisms());
   face_positions(sensor.train.face_order(), sensor.geometry);  // refuses sizes that do not fit
   require_not_below("range_minimum", sensor.range_minimum, 0, "m");
   require_not_below("range_maximum", sensor.range_maximum, 0, "m");
   require_finite("range_offset", sensor.range_offset, "m");
   require_length_or_none("emitter of range_errors", sensor.range_errors.emitter.size(),
-                         static_cast<std::size_t>(sensor.train.emitters()));
+                         sensor.train.emitters());
   for (const sensors::RangeValue& value : sensors::range_values(sensor.train.emitters())) {
     require_finite(value.name, sensors::get_range_value(sensor, value.name), value.unit);
   }
@@ -83,8 +82,7 @@ SimulationSettings checked(SimulationSettings settings) {
     throw InvalidArgument(fmt::format("station \"{}\" needs a scene", settings.station));
   }
   if (settings.scene) {
-    require_at_least("surfaces of the scene", static_cast<long long>(settings.scene->surfaces()),
-                     1);
+    require_at_least("surfaces of the scene", settings.scene->surfaces(), 1);
   }
   if (settings.platform) first_clock_reading_ns(*settings.platform);  // refuses
   if (settings.platform && !settings.scene) {
@@ -145,9 +143,9 @@ std::span<double> part(std::vector<double>& column, std::size_t first, std::size
 
 }  // namespace
 
-class Scanner::Work {
+class Scanner::State {
  public:
-  explicit Work(SimulationSettings given)
+  explicit State(SimulationSettings given)
       : settings(checked(std::move(given))),
         header(make_header(settings)),
         shots(static_cast<std::uint64_t>(std::llround(settings.duration * *settings.rate))),
@@ -162,9 +160,8 @@ class Scanner::Work {
     }
     if (settings.platform) poses_.emplace(*settings.platform, *settings.scene, time_of(shots - 1));
     for (int i = 0; i < settings.truth.prisms(); ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      rotors_.emplace_back(*settings.rotor_settings, i, settings.start_angles[at],
-                           settings.truth.angular_velocity[at], time_of(shots - 1), settings.seed);
+      rotors_.emplace_back(*settings.rotor_settings, i, settings.start_angles[i],
+                           settings.truth.angular_velocity[i], time_of(shots - 1), settings.seed);
     }
   }
 
@@ -182,7 +179,7 @@ class Scanner::Work {
       });
     });
     const auto& valid = chunk.observations.valid;
-    no_return += static_cast<std::uint64_t>(std::count(valid.begin(), valid.end(), 0));
+    no_return += static_cast<std::uint64_t>(std::ranges::count(valid, 0));
     done += rows;
     return true;
   }
@@ -215,7 +212,7 @@ class Scanner::Work {
       const auto angle = part(truth.rotation_angle[prism], first, count);
       rotors_[prism].evaluate(times, angle, part(truth.angular_velocity[prism], first, count));
       wrapped[prism].resize(count);
-      std::transform(angle.begin(), angle.end(), wrapped[prism].begin(), wrap_to_two_pi);
+      std::ranges::transform(angle, wrapped[prism].begin(), wrap_to_two_pi);
       angles.emplace_back(wrapped[prism]);
     }
     std::vector<double> x, y, z, origin_x, origin_y, origin_z;
@@ -241,8 +238,8 @@ class Scanner::Work {
       reported.zenith = zenith;
       observe_batch(settings.reported->train, angles, reported, emitter);
     } else {
-      std::copy(beam.azimuth.begin(), beam.azimuth.end(), azimuth.begin());
-      std::copy(beam.zenith.begin(), beam.zenith.end(), zenith.begin());
+      std::ranges::copy(beam.azimuth, azimuth.begin());
+      std::ranges::copy(beam.zenith, zenith.begin());
     }
     for (std::size_t i = 0; i < count; ++i) {  // without a beam there is nothing to report
       if (std::isnan(beam.azimuth[i])) azimuth[i] = zenith[i] = kNaN;
@@ -326,20 +323,20 @@ class Scanner::Work {
 };
 
 Scanner::Scanner(SimulationSettings settings)
-    : work_(std::make_unique<Work>(std::move(settings))) {}
+    : state_(std::make_unique<State>(std::move(settings))) {}
 Scanner::~Scanner() = default;
 
-const SimulationSettings& Scanner::settings() const { return work_->settings; }
-const recordings::RecordingHeader& Scanner::header() const { return work_->header; }
-std::uint64_t Scanner::shots() const { return work_->shots; }
-std::uint64_t Scanner::shots_done() const { return work_->done; }
-std::uint64_t Scanner::no_return() const { return work_->no_return; }
-const std::vector<double>& Scanner::start_angles() const { return work_->settings.start_angles; }
+const SimulationSettings& Scanner::settings() const { return state_->settings; }
+const recordings::RecordingHeader& Scanner::header() const { return state_->header; }
+std::uint64_t Scanner::shots() const { return state_->shots; }
+std::uint64_t Scanner::shots_done() const { return state_->done; }
+std::uint64_t Scanner::no_return() const { return state_->no_return; }
+const std::vector<double>& Scanner::start_angles() const { return state_->settings.start_angles; }
 
 bool Scanner::read(recordings::Chunk& chunk, recordings::TruthColumns& truth,
                    std::size_t max_rows) {
-  require_at_least("max_rows", static_cast<long long>(max_rows), 1);
-  return work_->read(chunk, truth, max_rows);
+  require_at_least("max_rows", max_rows, 1);
+  return state_->read(chunk, truth, max_rows);
 }
 
 }  // namespace risley::simulation

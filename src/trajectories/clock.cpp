@@ -33,7 +33,7 @@ std::string seconds_words(std::int64_t time_ns) {
 }  // namespace
 
 std::optional<std::int64_t> shift_from_utc_ns(const Trajectory& trajectory, std::int64_t utc_ns) {
-  require_at_least("records of the trajectory", static_cast<long long>(trajectory.size()), 1);
+  require_at_least("records of the trajectory", trajectory.size(), 1);
   const std::int64_t gps = (leap_seconds(utc_ns) - kGpsEpoch) * kClockSecond;
   switch (trajectory.time_scale) {
     case TimeScale::unknown:
@@ -55,7 +55,7 @@ std::optional<std::int64_t> shift_from_utc_ns(const Trajectory& trajectory, std:
 }
 
 std::optional<std::int64_t> shift_to_utc_ns(const Trajectory& trajectory) {
-  require_at_least("records of the trajectory", static_cast<long long>(trajectory.size()), 1);
+  require_at_least("records of the trajectory", trajectory.size(), 1);
   std::int64_t to_gps = 0;  // GPS time since 1980, s
   switch (trajectory.time_scale) {
     case TimeScale::utc_unix:
@@ -80,7 +80,7 @@ std::optional<std::int64_t> shift_to_utc_ns(const Trajectory& trajectory) {
 }
 
 std::string interval_words(const Trajectory& trajectory) {
-  require_at_least("records of the trajectory", static_cast<long long>(trajectory.size()), 1);
+  require_at_least("records of the trajectory", trajectory.size(), 1);
   return fmt::format("from {} to {} ({})", seconds_words(trajectory.time_ns.front()),
                      seconds_words(trajectory.time_ns.back()), words_of(trajectory.time_scale));
 }

@@ -58,8 +58,7 @@ ErrorTerm read_error_term(const YamlMap& root, const ErrorName& name) {
 }
 
 bool has_white(const ErrorModel& model) {
-  return std::any_of(model.terms.begin(), model.terms.end(),
-                     [](const ErrorTerm& term) { return term.white > 0; });
+  return std::ranges::any_of(model.terms, [](const ErrorTerm& term) { return term.white > 0; });
 }
 
 }  // namespace
@@ -129,11 +128,10 @@ ErrorProcess::ErrorProcess(const ErrorModel& model, const Trajectory& trajectory
   PoseErrorVector stated = PoseErrorVector::Zero();
   std::string lacking;
   for (std::size_t i = 0; i < kPoseErrors; ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
     const ErrorTerm& term = model.terms[i];
-    correlation_times_[at] = term.correlation_time;
-    white_[at] = term.white;
-    stated[at] = term.sigma.value_or(0);
+    correlation_times_[i] = term.correlation_time;
+    white_[i] = term.white;
+    stated[i] = term.sigma.value_or(0);
     if (!term.sigma) {
       lacking += fmt::format("{}{}", lacking.empty() ? "" : ", ", kErrorNames[i].key);
     }
@@ -159,8 +157,7 @@ ErrorProcess::ErrorProcess(const ErrorModel& model, const Trajectory& trajectory
     told << accuracy.position, std::hypot(along * accuracy.roll, across * accuracy.pitch),
         std::hypot(across * accuracy.roll, along * accuracy.pitch), accuracy.heading;
     for (std::size_t i = 0; i < kPoseErrors; ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
-      if (model.terms[i].sigma) told[at] = stated[at];
+      if (model.terms[i].sigma) told[i] = stated[i];
     }
     sigmas_.push_back(told);
   }
@@ -178,7 +175,7 @@ ErrorProcess ErrorProcess::scaled(const PoseErrorVector& factors) const {
 PoseErrorVector ErrorProcess::sigmas(std::int64_t time_ns) const {
   if (time_ns_.empty() || time_ns <= time_ns_.front()) return sigmas_.front();
   if (time_ns >= time_ns_.back()) return sigmas_.back();
-  const auto later = std::upper_bound(time_ns_.begin(), time_ns_.end(), time_ns);
+  const auto later = std::ranges::upper_bound(time_ns_, time_ns);
   const auto row = static_cast<std::size_t>(later - time_ns_.begin()) - 1;
   const double share = static_cast<double>(time_ns - time_ns_[row]) /
                        static_cast<double>(time_ns_[row + 1] - time_ns_[row]);

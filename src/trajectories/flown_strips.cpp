@@ -112,10 +112,10 @@ std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
         reach_of({seconds.data(), begin + longest}, begin, least, options.widest_course);
     strips.push_back({seconds[begin].begin_ns, seconds[found.end - 1].begin_ns + kStripSecond,
                       wrap_to_two_pi(found.course), found.length});
-    std::fill_n(taken.begin() + static_cast<std::ptrdiff_t>(begin), longest, true);
+    std::fill_n(taken.begin() + begin, longest, true);
   }
-  std::sort(strips.begin(), strips.end(),
-            [](const FlownStrip& a, const FlownStrip& b) { return a.begin_ns < b.begin_ns; });
+  std::ranges::sort(
+      strips, [](const FlownStrip& a, const FlownStrip& b) { return a.begin_ns < b.begin_ns; });
   return strips;
 }
 

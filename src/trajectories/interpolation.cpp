@@ -125,7 +125,7 @@ std::optional<Pose> Interpolation::Cursor::at(std::int64_t time_ns) {
                          time_ns < times[row_ + 2];
     std::size_t row = row_ + 1;
     if (!is_next) {
-      const auto later = std::upper_bound(times.begin(), times.end(), time_ns);
+      const auto later = std::ranges::upper_bound(times, time_ns);
       row = static_cast<std::size_t>(later - times.begin()) - 1;
     }
     row = std::min(row, times.size() - 2);

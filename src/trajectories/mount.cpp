@@ -64,9 +64,9 @@ std::optional<std::array<std::string, 3>> axes_words(const Eigen::Matrix3d& nomi
   std::array<std::string, 3> words;
   for (int i = 0; i < 3; ++i) {
     for (const auto& [word, direction] : body_directions()) {
-      if (nominal.col(i) == direction) words[static_cast<std::size_t>(i)] = word;
+      if (nominal.col(i) == direction) words[i] = word;
     }
-    if (words[static_cast<std::size_t>(i)].empty()) return std::nullopt;
+    if (words[i].empty()) return std::nullopt;
   }
   return words;
 }
@@ -98,7 +98,7 @@ Eigen::Matrix3d read_axes(const YamlMap& map) {
   map.allow_only({"x", "y", "z", "source"});
   Eigen::Matrix3d nominal;
   for (int i = 0; i < 3; ++i) {
-    const std::string key(1, kAxisLetters[static_cast<std::size_t>(i)]);
+    const std::string key(1, kAxisLetters[i]);
     const std::string word = map.text(key);
     std::vector<std::string> known;
     bool found = false;
@@ -144,14 +144,14 @@ Eigen::Matrix3d read_matrix(const YamlMap& map) {
   }
   Eigen::Matrix3d nominal;
   for (int row = 0; row < 3; ++row) {
-    const io::YamlNode& numbers = entry.value.items[static_cast<std::size_t>(row)];
+    const io::YamlNode& numbers = entry.value.items[row];
     if (!is_three(numbers)) {
       fail_at(map.path(), numbers.line, field + ": expected a list of 3 rows of 3 numbers");
     }
     for (int column = 0; column < 3; ++column) {
       const std::string name = fmt::format("{}[{}][{}]", field, row, column);
-      const auto value = static_cast<double>(
-          io::yaml_number(numbers.items[static_cast<std::size_t>(column)], map.path(), name));
+      const auto value =
+          static_cast<double>(io::yaml_number(numbers.items[column], map.path(), name));
       if (!(std::abs(value) <= 1.001)) {
         fail_at(map.path(), numbers.line, fmt::format("{} = {:g}, allowed -1 to 1", name, value));
       }
@@ -189,8 +189,7 @@ long double scale_of(const std::string& name) {
 /// A covariance and the sigmas beside it are of one adjustment.
 void require_own_covariance(const Mount& mount) {
   const algebra::NamedCovariance& own = mount.covariance;
-  if (const auto n = static_cast<Eigen::Index>(own.names.size());
-      own.matrix.rows() != n || own.matrix.cols() != n) {
+  if (const auto n = std::ssize(own.names); own.matrix.rows() != n || own.matrix.cols() != n) {
     throw InvalidArgument(fmt::format("covariance is {} x {}, expected {} x {}, one row per name",
                                       own.matrix.rows(), own.matrix.cols(), n, n));
   }
@@ -274,17 +273,16 @@ algebra::NamedCovariance joint_covariance(const algebra::NamedCovariance& sensor
     joint.names.push_back(mount_names()[k]);
     variances.push_back(sigmas[k] * sigmas[k]);
   }
-  const auto known = static_cast<Eigen::Index>(sensor.names.size());
-  const auto all = static_cast<Eigen::Index>(joint.names.size());
+  const Eigen::Index known = sensor.names.size();
+  const Eigen::Index all = joint.names.size();
   joint.matrix = Eigen::MatrixXd::Zero(all, all);
   joint.matrix.topLeftCorner(known, known) = sensor.matrix;
   for (Eigen::Index i = known; i < all; ++i) {
-    joint.matrix(i, i) = variances[static_cast<std::size_t>(i - known)];
+    joint.matrix(i, i) = variances[i - known];
   }
   const bool together = found_together(mount, sensor);
   const auto row_of = [&](Eigen::Index i) {
-    return i < known && !together ? -1
-                                  : mount.covariance.find(joint.names[static_cast<std::size_t>(i)]);
+    return i < known && !together ? -1 : mount.covariance.find(joint.names[i]);
   };
   for (Eigen::Index i = known; i < all; ++i) {
     const Eigen::Index row = row_of(i);

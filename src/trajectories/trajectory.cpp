@@ -39,41 +39,23 @@ void require_lengths(const Trajectory& trajectory) {
 
 }  // namespace
 
-std::string to_string(TimeScale scale) {
-  switch (scale) {
-    case TimeScale::unknown:
-      return "unknown";
-    case TimeScale::gps_second_of_week:
-      return "gps-second-of-week";
-    case TimeScale::utc_second_of_day:
-      return "utc-second-of-day";
-    case TimeScale::gps:
-      return "gps";
-    case TimeScale::adjusted_gps:
-      return "adjusted-gps";
-    case TimeScale::utc_unix:
-      return "utc-unix";
-  }
-  return "unknown";
-}
+namespace {
 
-std::string words_of(TimeScale scale) {
-  switch (scale) {
-    case TimeScale::unknown:
-      break;
-    case TimeScale::gps_second_of_week:
-      return "GPS second of week";
-    case TimeScale::utc_second_of_day:
-      return "UTC second of day";
-    case TimeScale::gps:
-      return "GPS second since 1980";
-    case TimeScale::adjusted_gps:
-      return "adjusted GPS second";
-    case TimeScale::utc_unix:
-      return "UTC second since 1970";
-  }
-  return "of a scale that the file does not name";
-}
+/// [TimeScale], as files and as sentences name them.
+struct ScaleName {
+  const char *name, *words;
+};
+constexpr ScaleName kScaleNames[] = {{"unknown", "of a scale that the file does not name"},
+                                     {"gps-second-of-week", "GPS second of week"},
+                                     {"utc-second-of-day", "UTC second of day"},
+                                     {"gps", "GPS second since 1980"},
+                                     {"adjusted-gps", "adjusted GPS second"},
+                                     {"utc-unix", "UTC second since 1970"}};
+
+}  // namespace
+
+std::string to_string(TimeScale scale) { return kScaleNames[static_cast<int>(scale)].name; }
+std::string words_of(TimeScale scale) { return kScaleNames[static_cast<int>(scale)].words; }
 
 std::string to_string(Frame frame) { return frame == Frame::geocentric ? "geocentric" : "local"; }
 
@@ -104,7 +86,7 @@ RollPitchHeading roll_pitch_heading(const Eigen::Quaterniond& ned_from_body) {
 }
 
 void require_trajectory(const Trajectory& trajectory) {
-  require_at_least("records", static_cast<long long>(trajectory.size()), 1);
+  require_at_least("records", trajectory.size(), 1);
   require_lengths(trajectory);
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     const std::int64_t time_ns = trajectory.time_ns[i];
@@ -182,8 +164,7 @@ RowOrder row_order(const std::vector<std::int64_t>& times) {
   if (in_order) return order;
   std::vector<std::size_t> rows(times.size());
   std::iota(rows.begin(), rows.end(), std::size_t{0});
-  std::stable_sort(rows.begin(), rows.end(),
-                   [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
+  std::ranges::stable_sort(rows, [&](std::size_t a, std::size_t b) { return times[a] < times[b]; });
   for (const std::size_t row : rows) {
     if (order.rows.empty() || times[row] != times[order.rows.back()]) {
       order.rows.push_back(row);

@@ -111,8 +111,8 @@ TrajectoryAudit audit_trajectory(const Trajectory& t, const InterpolationOptions
     audit.warnings.push_back({{}, std::move(message)});
   };
   if (!audit.times.gaps.empty()) {
-    const auto longest = std::max_element(
-        audit.times.gaps.begin(), audit.times.gaps.end(),
+    const auto longest = std::ranges::max_element(
+        audit.times.gaps,
         [](const auto& a, const auto& b) { return a.end_ns - a.begin_ns < b.end_ns - b.begin_ns; });
     warn(
         fmt::format("{} {} without records, the longest {:.3f} s from {}: there are no poses in "
@@ -152,7 +152,7 @@ TrajectoryAudit audit_trajectory(const Trajectory& t, const InterpolationOptions
 
 AccuracyAudit audit_accuracies(const AccuracyRecords& accuracies) {
   const std::vector<std::int64_t>& times = accuracies.time_ns;
-  require_at_least("records", static_cast<long long>(times.size()), 1);
+  require_at_least("records", times.size(), 1);
   require_length("accuracy", accuracies.accuracy.size(), times.size());
   std::vector<double> steps;
   for (std::size_t i = 1; i < times.size(); ++i) {
@@ -174,7 +174,7 @@ AccuracyAudit audit_accuracies(const AccuracyRecords& accuracies) {
   audit.times = times_of(times, std::llround(usual), std::move(gaps));
   audit.median = for_each_accuracy(accuracies.accuracy, median);
   audit.worst = for_each_accuracy(accuracies.accuracy, [](const std::vector<double>& values) {
-    return *std::max_element(values.begin(), values.end());
+    return *std::ranges::max_element(values);
   });
   return audit;
 }

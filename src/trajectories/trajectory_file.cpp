@@ -22,15 +22,8 @@ namespace {
 /// In the order in which they are tried.
 const std::vector<const Format*>& formats() {
   static const std::vector<const Format*> all{
-      &kInertialExplorerFormat,
-      &kPospacFormat,
-      &kRtklibFormat,
-      &kNamedCsvFormat,
-      &kOpenmmsFormat,
-      &kTumFormat,
-      &kKittiFormat,
-      &kRosBagFormat,
-      &kSbetFormat,
+      &kInertialExplorerFormat, &kPospacFormat, &kRtklibFormat, &kNamedCsvFormat,
+      &kOpenmmsFormat,          &kTumFormat,    &kRosBagFormat, &kSbetFormat,
   };
   return all;
 }
@@ -38,7 +31,7 @@ const std::vector<const Format*>& formats() {
 std::string known_formats() {
   std::string names;
   for (const Format* format : formats()) {
-    if (format == &kRtklibFormat || format == &kKittiFormat) continue;
+    if (format == &kRtklibFormat) continue;
     names += fmt::format("{}{}", names.empty() ? "" : ", ", format->name);
   }
   return names;

@@ -93,7 +93,7 @@ Comparison compare(const Trajectory& t, const std::vector<double>& wander,
               kGapSteps * static_cast<double>(step);
     }
     if (!whole) continue;
-    std::fill(sums.begin(), sums.end(), Vector3d(0, 0, 0));
+    std::ranges::fill(sums, Vector3d(0, 0, 0));
     for (std::size_t i = begin; i <= end; ++i) {
       const Matrix3d axes = ned_axes(t.frame, t.position[i]);
       const Eigen::Quaterniond body = Eigen::Quaterniond(axes).conjugate() * t.attitude[i];
@@ -164,8 +164,8 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
     trajectory.velocity_frame = VelocityFrame{"none", "the file holds no velocities", {}};
     return;
   }
-  const bool still = std::all_of(trajectory.velocity.begin(), trajectory.velocity.end(),
-                                 [](const Vector3d& v) { return v.isZero(0); });
+  const bool still =
+      std::ranges::all_of(trajectory.velocity, [](const Vector3d& v) { return v.isZero(0); });
   const bool few = trajectory.size() < kFewestRecords;
   std::vector<VelocityAxes> tried(kCandidates.begin(), kCandidates.end());
   if (stated == VelocityAxes::frame) tried.push_back(VelocityAxes::frame);
@@ -174,7 +174,7 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
   auto& candidates = comparison.candidates;
   const auto spans = static_cast<double>(comparison.spans);
   const auto total = [&](const auto& candidate) { return candidate.second.rms(spans).norm(); };
-  std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+  std::ranges::stable_sort(candidates, [](const auto& a, const auto& b) {
     return a.second.squares.sum() < b.second.squares.sum();
   });
 
@@ -203,8 +203,8 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
     }
     found.reason = can_compare ? "as the file states" : "as the file states; " + cannot;
     if (can_compare) {
-      const auto own = std::find_if(candidates.begin(), candidates.end(),
-                                    [&](const auto& each) { return each.first == *stated; });
+      const auto own =
+          std::ranges::find_if(candidates, [&](const auto& each) { return each.first == *stated; });
       found.residual = own->second.rms(spans);
       const auto& best = candidates.front();
       if (total(*own) > largest) {

@@ -105,7 +105,7 @@ class DataReader {
   void code(std::string& text) {
     if (!take(kCodeBytes)) return;
     const auto field = bytes_.subspan(at_ - kCodeBytes, kCodeBytes);
-    const auto end = std::find(field.begin(), field.end(), std::uint8_t{0});
+    const auto end = std::ranges::find(field, std::uint8_t{0});
     // A name of a device is plain text.
     const bool plain = end != field.end() && end != field.begin() &&
                        std::all_of(field.begin(), end,
@@ -312,7 +312,7 @@ constexpr CommandId kAnsweredByResult[] = {
 };
 
 bool is_among(std::span<const CommandId> list, CommandId command) {
-  return std::find(list.begin(), list.end(), command) != list.end();
+  return std::ranges::find(list, command) != list.end();
 }
 
 struct CommandName {

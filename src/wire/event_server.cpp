@@ -107,9 +107,9 @@ std::vector<std::string> host_names(const Endpoint& local) {
   return hosts;
 }
 
-class EventServer::Work {
+class EventServer::Server {
  public:
-  Work(const Endpoint& local, std::vector<ServedText> texts)
+  Server(const Endpoint& local, std::vector<ServedText> texts)
       : local_(local), texts_(std::move(texts)) {
     if (local.address == Address{}) {
       throw InvalidArgument(
@@ -119,7 +119,7 @@ class EventServer::Work {
     io::FileDescriptor socket = listening_socket(local_);
     daemon_ = MHD_start_daemon(
         MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, local_.port,
-        nullptr, nullptr, &Work::answer, this, MHD_OPTION_LISTEN_SOCKET, socket.release(),
+        nullptr, nullptr, &Server::answer, this, MHD_OPTION_LISTEN_SOCKET, socket.release(),
         MHD_OPTION_CONNECTION_LIMIT, static_cast<unsigned>(kMostConnections),
         MHD_OPTION_CONNECTION_TIMEOUT, kIdleSeconds, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
         kMostHeaderBytes, MHD_OPTION_END);
@@ -131,7 +131,7 @@ class EventServer::Work {
     hosts_ = host_names(local_);
   }
 
-  ~Work() {
+  ~Server() {
     {
       const std::scoped_lock lock(mutex_);
       ending_ = true;
@@ -145,8 +145,8 @@ class EventServer::Work {
     }
     MHD_stop_daemon(daemon_);
   }
-  Work(const Work&) = delete;
-  Work& operator=(const Work&) = delete;
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
 
   const Endpoint& local() const { return local_; }
 
@@ -173,7 +173,7 @@ class EventServer::Work {
  private:
   /// A browser that gets events.
   struct Listener {
-    Work* work = nullptr;
+    Server* server = nullptr;
     MHD_Connection* connection = nullptr;
     std::deque<std::string> waiting;
     std::string current;  // of which `sent` bytes are gone
@@ -189,31 +189,31 @@ class EventServer::Work {
   static MHD_Result answer(void* self, MHD_Connection* connection, const char* url,
                            const char* method, const char*, const char*, std::size_t*,
                            void** of_request) {
-    auto& work = *static_cast<Work*>(self);
+    auto& server = *static_cast<Server*>(self);
     if (std::string_view(method) != MHD_HTTP_METHOD_GET) {
-      return work.refuse(connection, MHD_HTTP_METHOD_NOT_ALLOWED, "only GET is allowed\n");
+      return server.refuse(connection, MHD_HTTP_METHOD_NOT_ALLOWED, "only GET is allowed\n");
     }
     static char seen;
     if (*of_request == nullptr) {  // the headers are there, a body might follow
       *of_request = &seen;
       return MHD_YES;
     }
-    if (!work.is_for_us(connection)) {
-      return work.refuse(connection, MHD_HTTP_FORBIDDEN,
-                         "Host or Origin is not the address of this page\n");
+    if (!server.is_for_us(connection)) {
+      return server.refuse(connection, MHD_HTTP_FORBIDDEN,
+                           "Host or Origin is not the address of this page\n");
     }
     const std::string_view path(url);
-    if (path == kEventsPath) return work.listen(connection);
-    for (const ServedText& text : work.texts_) {
+    if (path == kEventsPath) return server.listen(connection);
+    for (const ServedText& text : server.texts_) {
       if (text.path == path) return queue(connection, MHD_HTTP_OK, text.body, text.type.c_str());
     }
-    return work.refuse(connection, MHD_HTTP_NOT_FOUND, "there is no such page\n");
+    return server.refuse(connection, MHD_HTTP_NOT_FOUND, "there is no such page\n");
   }
 
   bool is_for_us(MHD_Connection* connection) const {
     const std::scoped_lock lock(mutex_);
     const auto hosts = header_values(connection, MHD_HTTP_HEADER_HOST);
-    if (hosts.size() != 1 || std::find(hosts_.begin(), hosts_.end(), hosts[0]) == hosts_.end()) {
+    if (hosts.size() != 1 || std::ranges::find(hosts_, hosts[0]) == hosts_.end()) {
       return false;
     }
     const auto origins = header_values(connection, MHD_HTTP_HEADER_ORIGIN);
@@ -246,12 +246,12 @@ class EventServer::Work {
       const std::scoped_lock lock(mutex_);
       listener = &listeners_.emplace_front();
       listener->place = listeners_.begin();
-      listener->work = this;
+      listener->server = this;
       listener->connection = connection;
       if (!latest_.empty()) listener->waiting.push_back(latest_);
     }
     MHD_Response* response = MHD_create_response_from_callback(
-        MHD_SIZE_UNKNOWN, kStreamBlock, &Work::give, listener, &Work::forget);
+        MHD_SIZE_UNKNOWN, kStreamBlock, &Server::give, listener, &Server::forget);
     if (response == nullptr) {
       forget(listener);
       return MHD_NO;
@@ -265,10 +265,10 @@ class EventServer::Work {
   /// Gives bytes of events to the server's thread, which waits where there are none.
   static ssize_t give(void* to, std::uint64_t, char* bytes, std::size_t most) {
     auto& listener = *static_cast<Listener*>(to);
-    const std::scoped_lock lock(listener.work->mutex_);
+    const std::scoped_lock lock(listener.server->mutex_);
     if (listener.sent == listener.current.size()) {
       if (listener.waiting.empty()) {
-        if (listener.work->ending_) return MHD_CONTENT_READER_END_OF_STREAM;
+        if (listener.server->ending_) return MHD_CONTENT_READER_END_OF_STREAM;
         listener.suspended = true;
         MHD_suspend_connection(listener.connection);
         return 0;
@@ -285,9 +285,9 @@ class EventServer::Work {
 
   static void forget(void* whom) {
     auto* listener = static_cast<Listener*>(whom);
-    Work& work = *listener->work;
-    const std::scoped_lock lock(work.mutex_);
-    work.listeners_.erase(listener->place);
+    Server& server = *listener->server;
+    const std::scoped_lock lock(server.mutex_);
+    server.listeners_.erase(listener->place);
   }
 
   Endpoint local_;
@@ -302,12 +302,12 @@ class EventServer::Work {
 };
 
 EventServer::EventServer(const Endpoint& local, std::vector<ServedText> texts)
-    : work_(std::make_unique<Work>(local, std::move(texts))) {}
+    : server_(std::make_unique<Server>(local, std::move(texts))) {}
 EventServer::~EventServer() = default;
 
-const Endpoint& EventServer::local() const { return work_->local(); }
-void EventServer::send(std::string_view data) { work_->send(data); }
-EventServerCounts EventServer::counts() const { return work_->counts(); }
+const Endpoint& EventServer::local() const { return server_->local(); }
+void EventServer::send(std::string_view data) { server_->send(data); }
+EventServerCounts EventServer::counts() const { return server_->counts(); }
 
 Endpoint listening_endpoint(std::string_view text) {
   constexpr Address kLoopback{{127, 0, 0, 1}};

@@ -93,7 +93,7 @@ std::vector<std::uint8_t> encode_frame(const Frame& frame) {
   store<std::uint16_t>(&bytes[kHeaderChecksumAt], frame_crc16(whole.first(kHeaderChecksumAt)));
   bytes[kSetAt] = frame.command.set;
   bytes[kIdAt] = frame.command.id;
-  std::copy(frame.data.begin(), frame.data.end(), bytes.begin() + kDataAt);
+  std::ranges::copy(frame.data, bytes.begin() + kDataAt);
   store<std::uint32_t>(&bytes[length - kChecksumBytes],
                        frame_crc32(whole.first(length - kChecksumBytes)));
   return bytes;

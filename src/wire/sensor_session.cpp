@@ -160,8 +160,7 @@ ParametersReply SensorSession::reset(const ResetParameters& wanted) {
     }
   }
   for (auto& [key, value] : parameters_) {
-    if (!wanted.listed ||
-        std::find(wanted.keys.begin(), wanted.keys.end(), key) != wanted.keys.end()) {
+    if (!wanted.listed || std::ranges::find(wanted.keys, key) != wanted.keys.end()) {
       value = 0;
     }
   }

@@ -88,8 +88,8 @@ Interface interface_of(const std::string& address) {
   std::vector<Interface> all = interfaces();
   if (address.empty()) {
     std::vector<Interface> real;
-    std::copy_if(all.begin(), all.end(), std::back_inserter(real),
-                 [](const Interface& one) { return !one.is_loopback; });
+    std::ranges::copy_if(all, std::back_inserter(real),
+                         [](const Interface& one) { return !one.is_loopback; });
     if (real.size() == 1) return real.front();
     throw InvalidArgument(fmt::format(
         "option interface: which interface the sensors are at cannot be told, this machine has "
@@ -197,11 +197,10 @@ std::size_t UdpSocket::receive(const std::function<void(const Datagram&)>& take)
     throw NetworkError(fmt::format("{}: {}", to_string(local_), std::strerror(errno)));
   }
   for (int i = 0; i < count; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    msghdr& header = batch_->headers[at].msg_hdr;
+    msghdr& header = batch_->headers[i].msg_hdr;
     Datagram datagram;
-    datagram.from = endpoint_of(batch_->senders[at]);
-    datagram.bytes = {&batch_->buffers[at * kMostBytes], batch_->headers[at].msg_len};
+    datagram.from = endpoint_of(batch_->senders[i]);
+    datagram.bytes = {&batch_->buffers[i * kMostBytes], batch_->headers[i].msg_len};
     for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr;
          part = CMSG_NXTHDR(&header, part)) {
       if (part->cmsg_level != SOL_SOCKET) continue;

@@ -51,7 +51,7 @@ struct Serializer<risley::bags::written::RawMessage> {
   template <class Stream>
   static void write(Stream& stream, const risley::bags::written::RawMessage& m) {
     const auto bytes = static_cast<std::uint32_t>(m.bytes.size());
-    std::copy(m.bytes.begin(), m.bytes.end(), stream.advance(bytes));
+    std::ranges::copy(m.bytes, stream.advance(bytes));
   }
   // NOLINTNEXTLINE(readability-identifier-naming): the name that ROS calls
   static std::uint32_t serializedLength(const risley::bags::written::RawMessage& m) {

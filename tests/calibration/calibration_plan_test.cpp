@@ -106,8 +106,7 @@ void expect_adjustment(const CalibrationPlan& plan) {
     for (Index j = 0; j < expected.covariance.rows(); ++j) {
       const double size = std::sqrt(expected.covariance(i, i) * expected.covariance(j, j));
       EXPECT_NEAR(found.covariance(i, j), expected.covariance(i, j), 0.03 * size)
-          << found.free[static_cast<std::size_t>(i)].name << ", "
-          << found.free[static_cast<std::size_t>(j)].name;
+          << found.free[i].name << ", " << found.free[j].name;
     }
   }
   EXPECT_NEAR(found.range_offset_sigma, expected.number_sigma("range_offset_m"),

@@ -163,6 +163,25 @@ TEST(DirectionErrors, RefuseWhatCannotBeCompared) {
   EXPECT_THROW(direction_errors(Bundle(10, {kNaN, kNaN, kNaN}), beams), InvalidArgument);
 }
 
+/// Root of a covariance with some correlation, of the size of a calibration's.
+Eigen::MatrixXd some_root(Index n) {
+  Eigen::MatrixXd root(n, n);
+  const RandomStream entries(7, 1);
+  for (Index i = 0; i < n; ++i) {
+    for (Index j = 0; j < n; ++j) {
+      root(i, j) = 2e-5 * entries.normal(static_cast<std::uint64_t>(i * n + j));
+    }
+  }
+  return root;
+}
+
+Eigen::VectorXd white_noise(const RandomStream& draws, int draw, Index n) {
+  Eigen::VectorXd white(n);
+  draws.fill_normal(static_cast<std::uint64_t>(draw * n),
+                    {white.data(), static_cast<std::size_t>(n)});
+  return white;
+}
+
 /// Against draws from the covariance, each measured with the errors above.
 TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   constexpr int kDraws = 5000;
@@ -173,15 +192,8 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   shared.set("refractive_index", 1.51);
   names.push_back("refractive_index");  // of two places
   const auto free = estimation::free_parameters(names, {2});
-  const auto n = static_cast<Index>(free.size());
-  // Some correlation, of the size of a calibration.
-  Eigen::MatrixXd root(n, n);
-  const RandomStream entries(7, 1);
-  for (Index i = 0; i < n; ++i) {
-    for (Index j = 0; j < n; ++j) {
-      root(i, j) = 2e-5 * entries.normal(static_cast<std::uint64_t>(i * n + j));
-    }
-  }
+  const Index n = free.size();
+  Eigen::MatrixXd root = some_root(n);
   root.row(n - 1) *= 0.3;
   const Eigen::MatrixXd covariance = root * root.transpose();
   const auto angles = some_angles(80, 4);
@@ -191,11 +203,8 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
   const RandomStream draws(8, 1);
   double roll = 0, pitch = 0, yaw = 0, gauge = 0, shape = 0, total = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    Eigen::VectorXd white(n);
-    draws.fill_normal(static_cast<std::uint64_t>(draw * n),
-                      {white.data(), static_cast<std::size_t>(n)});
     PrismTrain off = shared;
-    add_errors(off, free, root * white);
+    add_errors(off, free, root * white_noise(draws, draw, n));
     const DirectionErrors errors = direction_errors(beams_of(off, angles), truth);
     roll += errors.rotation.x * errors.rotation.x / kDraws;
     pitch += errors.rotation.y * errors.rotation.y / kDraws;
@@ -222,11 +231,11 @@ TEST(FormalDatum, EqualsDrawsOfTheCovariance) {
 TEST(BeamBundle, WhatWasHeldCountsUnlessItIsLeftOut) {
   const PrismTrain train = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
-  const auto n = static_cast<Index>(free.size());
+  const Index n = free.size();
   const Eigen::MatrixXd covariance = 4e-10 * Eigen::MatrixXd::Identity(n, n);
   const auto angles = some_angles(60, 4);
   HeldMovement held;
-  held.train = Eigen::MatrixXd::Zero(static_cast<Index>(train.parameters().size()), 1);
+  held.train = Eigen::MatrixXd::Zero(train.parameters().size(), 1);
   held.rotation_angles = Eigen::MatrixXd::Zero(2, 1);
   held.turn = Eigen::MatrixXd::Zero(3, 1);
   held.turn(2, 0) = 1e-3;
@@ -281,14 +290,8 @@ TEST(PointingError, ScatterOverDrawsAsTheirSigmasSay) {
   constexpr int kDraws = 2000;
   const PrismTrain truth = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
-  const auto n = static_cast<Index>(free.size());
-  Eigen::MatrixXd root = Eigen::MatrixXd::Zero(n, n);
-  const RandomStream entries(7, 1);
-  for (Index i = 0; i < n; ++i) {
-    for (Index j = 0; j < n; ++j) {
-      root(i, j) = 2e-5 * entries.normal(static_cast<std::uint64_t>(i * n + j));
-    }
-  }
+  const Index n = free.size();
+  const Eigen::MatrixXd root = some_root(n);
   const Eigen::MatrixXd covariance = root * root.transpose();
   const auto angles = some_angles(80, 4);
   PrismTrain believed = truth;
@@ -304,11 +307,8 @@ TEST(PointingError, ScatterOverDrawsAsTheirSigmasSay) {
   const RandomStream draws(8, 1);
   double total = 0, gauge = 0, shape = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    Eigen::VectorXd white(n);
-    draws.fill_normal(static_cast<std::uint64_t>(draw * n),
-                      {white.data(), static_cast<std::size_t>(n)});
     PrismTrain found = truth;
-    add_errors(found, free, root * white);
+    add_errors(found, free, root * white_noise(draws, draw, n));
     const DirectionErrors errors =
         BeamBundle(found, free, angles).pointing_error(believed, covariance).errors;
     total += std::pow(errors.total - known.total, 2) / kDraws;
@@ -326,7 +326,7 @@ TEST(PointingError, TellHowProbablyACalibrationIsBetter) {
   constexpr int kDraws = 4000;
   const PrismTrain found = testing::imperfect_train("PA-AP", 0.3, 5);
   const auto free = estimation::free_parameters(testing::kTiltNames, {2});
-  const auto n = static_cast<Index>(free.size());
+  const Index n = free.size();
   const auto angles = some_angles(40, 4);
   const Bundle calibrated = beams_of(found, angles);
   const RandomStream draws(8, 2);
@@ -337,11 +337,8 @@ TEST(PointingError, TellHowProbablyACalibrationIsBetter) {
     const Bundle reported = beams_of(believed, angles);
     double better = 0;
     for (int draw = 0; draw < kDraws; ++draw) {
-      Eigen::VectorXd white(n);
-      draws.fill_normal(static_cast<std::uint64_t>(draw * n),
-                        {white.data(), static_cast<std::size_t>(n)});
       PrismTrain truth = found;
-      add_errors(truth, free, sigma * white);
+      add_errors(truth, free, sigma * white_noise(draws, draw, n));
       const Bundle beams = beams_of(truth, angles);
       better += direction_errors(calibrated, beams).total < direction_errors(reported, beams).total;
     }

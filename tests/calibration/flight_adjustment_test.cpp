@@ -60,7 +60,7 @@ struct KnownPlanes {
     model.range_offset = 0;
     model.clock_offset = 0;
     model.knots = make_knots(flight.shots, knots);
-    model.corrections = MatrixXd::Zero(6, static_cast<Index>(model.knots.size()));
+    model.corrections = MatrixXd::Zero(6, model.knots.size());
     model.planes = flight.true_planes();
     for (GroundPlane& ground : model.planes) {
       ground.centre += Eigen::Vector3d(0.02, 0, 0.03);
@@ -108,8 +108,7 @@ TEST(FlightAdjustment, RecoversEverythingFromANoiseFreeFlight) {
   EXPECT_LT(model.corrections.bottomRows(3).cwiseAbs().maxCoeff(), 1e-8);
   const auto truth = known.flight.true_planes();
   for (std::size_t p = 0; p < truth.size(); ++p) {
-    if (std::count(known.plane.begin(), known.plane.end(), static_cast<std::int32_t>(p)) < 20)
-      continue;
+    if (std::ranges::count(known.plane, static_cast<std::int32_t>(p)) < 20) continue;
     EXPECT_LT((model.planes[p].normal - truth[p].normal).norm(), 1e-6);
     EXPECT_LT(std::abs(truth[p].normal.dot(model.planes[p].centre - truth[p].centre)), 1e-5);
   }
@@ -175,11 +174,11 @@ TEST(FlightAdjustment, RecoversTheTrajectorysCorrections) {
   const auto& knots = model.knots;
   for (std::size_t k = 0; k < knots.size(); ++k) {
     const auto& times = known.flight.trajectory.time_ns;
-    const auto at = static_cast<std::size_t>(
-        std::lower_bound(times.begin(), times.end(), knots.time_ns[k]) - times.begin());
+    const auto at =
+        static_cast<std::size_t>(std::ranges::lower_bound(times, knots.time_ns[k]) - times.begin());
     const Eigen::Matrix<double, 6, 1> truth = known.flight.error[std::min(at, times.size() - 1)];
     before += truth.cwiseAbs2();
-    after += (model.corrections.col(static_cast<Index>(k)) - truth).cwiseAbs2();
+    after += (model.corrections.col(k) - truth).cwiseAbs2();
   }
   for (int c = 3; c < 6; ++c) EXPECT_LT(after[c], 0.25 * before[c]) << c;
   EXPECT_LT(after.head<3>().sum(), before.head<3>().sum());
@@ -188,14 +187,14 @@ TEST(FlightAdjustment, RecoversTheTrajectorysCorrections) {
 /// Everything in one dense system, planes included.
 MatrixXd dense_equations(const FlightEquations& equations, const FlightModel& model,
                          VectorXd& right) {
-  const Index knots = 6 * static_cast<Index>(model.knots.size()), g = model.unknowns().size();
-  const Index size = knots + g + 3 * static_cast<Index>(model.planes.size());
+  const Index knots = 6 * std::ssize(model.knots), g = model.unknowns().size();
+  const Index size = knots + g + 3 * std::ssize(model.planes);
   MatrixXd all = MatrixXd::Zero(size, size);
   right = VectorXd::Zero(size);
   all.block(knots, knots, g, g) = equations.hessian;
   right.segment(knots, g) = equations.gradient;
   for (std::size_t i = 0; i < model.knots.intervals.size(); ++i) {
-    const Index at = 6 * static_cast<Index>(model.knots.intervals[i].knot);
+    const Index at = 6 * model.knots.intervals[i].knot;
     all.block(at, at, 12, 12) += equations.knot_hessian[i];
     all.block(knots, at, g, 12) += equations.knot_global[i].transpose();
     all.block(at, knots, 12, g) += equations.knot_global[i];
@@ -204,8 +203,8 @@ MatrixXd dense_equations(const FlightEquations& equations, const FlightModel& mo
   for (const PlaneBlock& block : equations.plane_blocks) {
     const Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>> rows(
         equations.plane_products.data() + block.at, 3, g + 16);
-    const Index plane = knots + g + 3 * static_cast<Index>(block.plane);
-    const Index at = 6 * static_cast<Index>(model.knots.intervals[block.interval].knot);
+    const Index plane = knots + g + 3 * block.plane;
+    const Index at = 6 * model.knots.intervals[block.interval].knot;
     all.block(plane, knots, 3, g) += rows.leftCols(g);
     all.block(knots, plane, g, 3) += rows.leftCols(g).transpose();
     all.block(plane, at, 3, 12) += rows.middleCols(g, 12);
@@ -213,7 +212,7 @@ MatrixXd dense_equations(const FlightEquations& equations, const FlightModel& mo
     all.block(plane, plane, 3, 3) += rows.rightCols(3);
     right.segment(plane, 3) += rows.col(g + 12);
   }
-  for (Index p = 0; p < static_cast<Index>(model.planes.size()); ++p) {
+  for (Index p = 0; p < std::ssize(model.planes); ++p) {
     const Index at = knots + g + 3 * p;
     all(at, at) += 1e-2;
     all(at + 1, at + 1) += 1e-2;
@@ -231,8 +230,7 @@ void add_plane_prior(const PlanePrior& prior, const FlightModel& model, MatrixXd
   const Eigen::Vector3d off(tilt.dot(Eigen::Vector3d(first.x, first.y, first.z)),
                             tilt.dot(Eigen::Vector3d(second.x, second.y, second.z)),
                             plane.normal.dot(prior.place - plane.centre));
-  const Index at = all.rows() - 3 * static_cast<Index>(model.planes.size()) +
-                   3 * static_cast<Index>(prior.plane);
+  const Index at = all.rows() - 3 * std::ssize(model.planes) + 3 * prior.plane;
   for (Index k = 0; k < 3; ++k) {
     const double sigma = k < 2 ? prior.normal_sigma : prior.sigma;
     all(at + k, at + k) += 1 / (sigma * sigma) - (k < 2 ? 1e-2 : 1e-6);
@@ -245,7 +243,7 @@ TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
   known.priors.information.diagonal().setConstant(10);
   known.priors.mean.array() += 0.001;
   known.model.corrections.setConstant(1e-4);
-  known.priors.held.assign(static_cast<std::size_t>(known.model.unknowns().size()), false);
+  known.priors.held.assign(known.model.unknowns().size(), false);
   known.priors.held[FlightUnknowns::lever_arm(2)] = true;
   known.priors.planes.push_back({.plane = 0,
                                  .place = {3, 4, 0.01},
@@ -257,8 +255,7 @@ TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
   VectorXd right;
   MatrixXd all = dense_equations(equations, known.model, right);
   add_plane_prior(known.priors.planes.front(), known.model, all, right);
-  const Index knots = 6 * static_cast<Index>(known.model.knots.size()),
-              g = known.model.unknowns().size();
+  const Index knots = 6 * std::ssize(known.model.knots), g = known.model.unknowns().size();
   const MatrixXd rates = value_rates(known.model);
   all.block(knots, knots, g, g) += 10 * rates.transpose() * rates;
   right.segment(knots, g) +=
@@ -266,14 +263,13 @@ TEST(FlightAdjustment, EliminatesPlanesWithoutLoss) {
   for (int c = 0; c < 6; ++c) {
     const KnotInformation chain = knot_information(known.model.knots, known.priors.process, c);
     for (Index k = 0; 6 * k < knots; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      all(6 * k + c, 6 * k + c) += chain.diagonal[at];
-      right[6 * k + c] -= 1e-4 * chain.diagonal[at];
+      all(6 * k + c, 6 * k + c) += chain.diagonal[k];
+      right[6 * k + c] -= 1e-4 * chain.diagonal[k];
       if (6 * (k + 1) == knots) continue;
-      all(6 * k + c, 6 * (k + 1) + c) += chain.next[at];
-      all(6 * (k + 1) + c, 6 * k + c) += chain.next[at];
-      right[6 * k + c] -= 1e-4 * chain.next[at];
-      right[6 * (k + 1) + c] -= 1e-4 * chain.next[at];
+      all(6 * k + c, 6 * (k + 1) + c) += chain.next[k];
+      all(6 * (k + 1) + c, 6 * k + c) += chain.next[k];
+      right[6 * k + c] -= 1e-4 * chain.next[k];
+      right[6 * (k + 1) + c] -= 1e-4 * chain.next[k];
     }
   }
   const Index held = knots + FlightUnknowns::lever_arm(2);

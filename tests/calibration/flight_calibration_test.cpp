@@ -24,12 +24,7 @@ using testing::FlightSettings;
 using testing::SimulatedFlight;
 
 std::string failure(const SimulatedFlight& flight, const FlightCalibrationOptions& options) {
-  try {
-    calibrate_flight(flight.shots, flight.trajectory, options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+  return refusal<Error>([&] { calibrate_flight(flight.shots, flight.trajectory, options); });
 }
 
 /// A short flight with few shots: finds what a full one does, less well.
@@ -102,13 +97,11 @@ TEST(FlightCalibration, CorrectsTheTrajectory) {
   // What is written down belongs to what was found.
   const Eigen::VectorXd values = unknown_values(found.model);
   for (int k = 0; k < 3; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    EXPECT_EQ(found.mount.boresight[at].value, values[k]);
-    EXPECT_EQ(found.mount.lever_arm[at].sigma, found.unknowns[3 + at].sigma);
+    EXPECT_EQ(found.mount.boresight[k].value, values[k]);
+    EXPECT_EQ(found.mount.lever_arm[k].sigma, found.unknowns[3 + k].sigma);
   }
   EXPECT_EQ(found.mount.clock_offset.value, found.model.clock_offset);
-  EXPECT_EQ(found.sensor.covariance.rows(),
-            static_cast<Index>(found.sensor.covariance_names.size()));
+  EXPECT_EQ(found.sensor.covariance.rows(), std::ssize(found.sensor.covariance_names));
   // Mount and sensor are known together: yaw of the boresight against yaw of the beams above all.
   const algebra::NamedCovariance of_sensor{found.sensor.covariance_names, found.sensor.covariance};
   EXPECT_TRUE(trajectories::found_together(found.mount, of_sensor));
@@ -133,7 +126,7 @@ TEST(FlightCalibration, CorrectsTheTrajectory) {
 
 /// Whether nothing that was not told has the word.
 bool told(const FlightCalibration& found, const std::string& word) {
-  return std::none_of(found.not_told.begin(), found.not_told.end(), [&](const NotTold& own) {
+  return std::ranges::none_of(found.not_told, [&](const NotTold& own) {
     return own.words.find(word) != std::string::npos;
   });
 }
@@ -209,8 +202,9 @@ TEST(FlightCalibration, DoesNotDependOnThreads) {
 Eigen::Vector3d level_place(const SimulatedFlight& flight, double east, double north) {
   for (double step = 0;; step += 0.7) {
     const Eigen::Vector2d at(east + step * std::cos(step), north + step * std::sin(step));
-    if (std::all_of(flight.roofs.begin(), flight.roofs.end(),
-                    [&](const testing::Roof& roof) { return (roof.centre - at).norm() > 9; })) {
+    if (std::ranges::all_of(flight.roofs, [&](const testing::Roof& roof) {
+          return (roof.centre - at).norm() > 9;
+        })) {
       return {at.x(), at.y(), 0};
     }
   }
@@ -285,10 +279,9 @@ TEST(FlightCalibration, KnownGroundFixesTheHeight) {
   const FlightCalibration fooled = calibrate_flight(flight.shots, flight.trajectory, options);
   EXPECT_TRUE(fooled.control[1].significant);
   EXPECT_LT(fooled.control[1].off, -5 * fooled.control[1].sigma);
-  EXPECT_TRUE(
-      std::any_of(fooled.warnings.begin(), fooled.warnings.end(), [](const std::string& words) {
-        return words.find("\"field\" contradicts the flight") != std::string::npos;
-      }));
+  EXPECT_TRUE(std::ranges::any_of(fooled.warnings, [](const std::string& words) {
+    return words.find("\"field\" contradicts the flight") != std::string::npos;
+  }));
 }
 
 TEST(FlightCalibration, HoldsWhatIsStatedToBeExact) {
@@ -329,11 +322,10 @@ TEST(FlightCalibration, TellsAClockThatDrifts) {
 
       EXPECT_EQ(clock.significant, drift != 0) << "seed " << seed;
       EXPECT_NEAR(clock.value, drift, 2e-6) << "seed " << seed;
-      const bool warned =
-          std::any_of(found.warnings.begin(), found.warnings.end(), [](const std::string& words) {
-            return words.find("drift apart") != std::string::npos &&
-                   words.find("ppm") != std::string::npos && words.find("PPS") != std::string::npos;
-          });
+      const bool warned = std::ranges::any_of(found.warnings, [](const std::string& words) {
+        return words.find("drift apart") != std::string::npos &&
+               words.find("ppm") != std::string::npos && words.find("PPS") != std::string::npos;
+      });
       EXPECT_EQ(warned, drift != 0);
       EXPECT_EQ(found.verdict.code == CalibrationCode::undecided, drift != 0);
       if (drift != 0) continue;

@@ -103,7 +103,7 @@ struct Flight {
       poses.pose.push_back(pose);
     }
     model.knots = make_knots(shots, 0.1);
-    model.corrections = Eigen::MatrixXd::NullaryExpr(6, static_cast<Index>(model.knots.size()),
+    model.corrections = Eigen::MatrixXd::NullaryExpr(6, model.knots.size(),
                                                      [&] { return 1e-4 * normal(generator); });
     weights.range_variance = 4e-4;
     for (std::size_t i = 0; i < count; ++i) {
@@ -155,7 +155,7 @@ struct Flight {
     const Matrix3d mount = m.nominal * m.boresight;
     const Vector3d from = position + local * (m.lever_arm + mount * eigen(start.origin));
     const Vector3d along = local * mount * eigen(ray.direction);
-    const GroundPlane& ground = m.planes[static_cast<std::size_t>(plane[i])];
+    const GroundPlane& ground = m.planes[plane[i]];
     return ground.normal.dot(ground.centre - from) / ground.normal.dot(along) + m.range_offset;
   }
 
@@ -224,8 +224,8 @@ struct Flight {
 
   /// The rows of all shots that have a plane [columns, shots], NaN elsewhere.
   Eigen::MatrixXd rows(InstructionSet set) const {
-    Eigen::MatrixXd all = Eigen::MatrixXd::Constant(model.unknowns().size() + 12,
-                                                    static_cast<Index>(shots.size()), kNaN);
+    Eigen::MatrixXd all =
+        Eigen::MatrixXd::Constant(model.unknowns().size() + 12, shots.size(), kNaN);
     for_each_flight_piece(
         shots, poses, plane, model, weights,
         [&](std::size_t, const FlightRows& found) {
@@ -253,11 +253,11 @@ TEST_P(EveryTrain, DerivativesAreThoseOfThePredictedRange) {
     int checked = 0;
     for (std::size_t i = 0; i < flight.shots.size(); i += 5) {
       if (flight.plane[i] == kNoPlane) {
-        EXPECT_TRUE(std::isnan(rows(0, static_cast<Index>(i))));
+        EXPECT_TRUE(std::isnan(rows(0, i)));
         continue;
       }
       ++checked;
-      const Eigen::VectorXd row = rows.col(static_cast<Index>(i));
+      const Eigen::VectorXd row = rows.col(i);
       EXPECT_NEAR(row[globals + 9], flight.shots.range[i] - flight.truth[i], 1e-9);
       const Eigen::VectorXd slopes = flight.slopes(i);
       for (Index c = 0; c < slopes.size(); ++c) {
@@ -319,7 +319,7 @@ TEST(FlightEquations, AreTheSumsOfTheRows) {
     std::size_t used = 0, outliers = 0;
     for (std::size_t i = 0; i < flight.shots.size(); ++i) {
       if (flight.plane[i] == kNoPlane) continue;
-      const Eigen::VectorXd row = rows.col(static_cast<Index>(i));
+      const Eigen::VectorXd row = rows.col(i);
       const double residual = row[g + 9], variance = row[g + 10], weight = row[g + 11];
       ++used;
       if (weight == 0) {
@@ -390,7 +390,7 @@ TEST(FlightEquations, CountShotsThatMissTheirPlane) {
   flight.model.planes[1].centre.z() = 500;  // above the flight
   const FlightEquations found =
       flight_equations(flight.shots, flight.poses, flight.plane, flight.model, flight.weights);
-  const auto on_it = std::count(flight.plane.begin(), flight.plane.end(), 1);
+  const auto on_it = std::ranges::count(flight.plane, 1);
   EXPECT_EQ(found.lost, static_cast<std::size_t>(on_it));
   EXPECT_TRUE(found.hessian.allFinite());
 }

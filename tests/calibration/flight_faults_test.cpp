@@ -59,7 +59,7 @@ FlightCalibration calibrated(const SimulatedFlight& flight, double stated = 1) {
 }
 
 bool warned(const FlightCalibration& found, const std::string& words) {
-  return std::any_of(found.warnings.begin(), found.warnings.end(), [&](const std::string& warning) {
+  return std::ranges::any_of(found.warnings, [&](const std::string& warning) {
     return warning.find(words) != std::string::npos;
   });
 }
@@ -81,8 +81,7 @@ struct Honesty {
     shape += std::pow(errors.shape / found.datum.shape, 2);
     for (int axis = 0; axis < 3; ++axis) {
       const auto at = static_cast<std::size_t>(FlightUnknowns::lever_arm(axis));
-      lever +=
-          std::pow(errors.error[static_cast<Eigen::Index>(at)] / found.unknowns[at].sigma, 2) / 3;
+      lever += std::pow(errors.error[at] / found.unknowns[at].sigma, 2) / 3;
     }
   }
 
@@ -114,12 +113,10 @@ TEST(FlightFaults, JumpsAreNamedAndMended) {
     EXPECT_TRUE(warned(found, "the trajectory jumps by"));
     // The position there and back, and the attitude, each at its time and of its size.
     const auto seen_at = [&](std::size_t strip, double time) {
-      return std::find_if(fit.jumps.begin(), fit.jumps.end(), [&](const TrajectoryJump& jump) {
-        const auto first = std::find(flight.shots.strip.begin(), flight.shots.strip.end(), strip);
+      return std::ranges::find_if(fit.jumps, [&](const TrajectoryJump& jump) {
+        const auto first = std::ranges::find(flight.shots.strip, strip);
         const double of_strip =
-            1e-9 *
-            static_cast<double>(
-                flight.shots.time_ns[static_cast<std::size_t>(first - flight.shots.strip.begin())]);
+            1e-9 * static_cast<double>(flight.shots.time_ns[first - flight.shots.strip.begin()]);
         const double begin = 1e-9 * static_cast<double>(jump.begin_ns) - of_strip,
                      end = 1e-9 * static_cast<double>(jump.end_ns) - of_strip;
         return begin - 0.51 < time && time < end + 0.51;
@@ -169,7 +166,7 @@ TEST(FlightFaults, ErrorsLargerThanStatedAreCountedAsTheyAre) {
     honesty.add(flight, settings, found);
     if (found.verdict.code == CalibrationCode::undecided) continue;
     const auto& factor = found.trajectory_fit.factor;
-    EXPECT_GT(*std::max_element(factor.begin(), factor.end()), 2);
+    EXPECT_GT(*std::ranges::max_element(factor), 2);
     EXPECT_TRUE(warned(found, "times as large as stated"));
   }
   honesty.expect("errors stated too small by 4");
@@ -233,7 +230,7 @@ TEST(ProcessCheck, FindsTheStepThatJumps) {
   const TrajectoryKnots knots = make_knots(flight.shots, 0.5);
   FlightPriors priors{
       .process = {settings.errors, flight.trajectory}, .mean = {}, .information = {}};
-  const auto count = static_cast<Eigen::Index>(knots.size());
+  const Eigen::Index count = knots.size();
   std::mt19937_64 generator(3);
   std::normal_distribution<double> normal;
   Eigen::MatrixXd truth(kCorrections, count);
@@ -243,11 +240,10 @@ TEST(ProcessCheck, FindsTheStepThatJumps) {
     const KnotSteps steps = knot_steps(knots, priors.process, c);
     double value = 0;
     for (Eigen::Index k = 0; k < count; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      value = steps.decay[at] * value + steps.sigma[at] * normal(generator);
+      value = steps.decay[k] * value + steps.sigma[k] * normal(generator);
       truth(c, k) = value;
       // Known but for a hundredth of its step.
-      band.diagonal[kCorrections * k + c] = 1e-4 * steps.sigma[at] * steps.sigma[at];
+      band.diagonal[kCorrections * k + c] = 1e-4 * steps.sigma[k] * steps.sigma[k];
     }
   }
   const ProcessCheck sound = check_process(knots, truth, priors, band);

@@ -127,7 +127,7 @@ TEST(FlightForecast, SaysWhatACalibrationStates) {
 
 /// Whether nothing that is not told has the word.
 bool told(const FlightForecast& found, const std::string& word) {
-  return std::none_of(found.not_told.begin(), found.not_told.end(), [&](const NotTold& own) {
+  return std::ranges::none_of(found.not_told, [&](const NotTold& own) {
     return own.words.find(word) != std::string::npos;
   });
 }
@@ -185,12 +185,7 @@ TEST(FlightForecast, FailsInWords) {
   FlightForecastOptions options = options_for(500);
   options.calibration.knot_spacing = 4;
   const auto failure = [&](const PlannedFlight& planned) -> std::string {
-    try {
-      forecast(planned, options);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return {};
+    return refusal<Error>([&] { forecast(planned, options); });
   };
   EXPECT_THAT(failure(flat_flight({90}, 60, 0)), HasSubstr("one strip"));
   PlannedFlight apart = flat_flight({90, 90}, 60, 0);

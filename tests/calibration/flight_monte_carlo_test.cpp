@@ -85,7 +85,7 @@ class StripsApart {
     truth_.range_offset = settings.range_offset;
     truth_.clock_offset = settings.clock_offset;
     truth_.knots = make_knots(shots_, 1);
-    truth_.corrections = MatrixXd::Zero(kCorrections, static_cast<Index>(truth_.knots.size()));
+    truth_.corrections = MatrixXd::Zero(kCorrections, truth_.knots.size());
     true_points_ = points_of(truth_, exact);
   }
 
@@ -117,7 +117,7 @@ class StripsApart {
       const auto place = [](float at) { return static_cast<int>(std::floor(at / 2)); };
       Mean& mean = cells[{place(truth[0]), place(truth[1])}][shots_.strip[i]];
       for (std::size_t k = 0; k < 3; ++k) {
-        mean.sum[static_cast<Index>(k)] += static_cast<double>(points[i][k]) - truth[k];
+        mean.sum[k] += static_cast<double>(points[i][k]) - truth[k];
       }
       ++mean.count;
     }

@@ -23,16 +23,15 @@ RangedRecording recording(const std::string& name, int begin_s, int shots) {
   result.believed = sensors::load_sensor("mid-40");
   result.believed.set("refractive_index", 1.5123);
   result.believed.set_knowledge({"refractive_index", 2e-6, "its own estimate", 0});
-  result.shots.resize(2, static_cast<std::size_t>(shots));
+  result.shots.resize(2, shots);
   result.angle_sensitivity = Eigen::MatrixXd::Zero(2, 0);
   for (int i = 0; i < shots; ++i) {
-    const auto row = static_cast<std::size_t>(i);
     result.time_ns.push_back((begin_s + i) * kSecond);
-    result.shots.range[row] = begin_s + i;
-    result.shots.rotation_angle[0][row] = 3.1;
-    result.shots.rotation_angle[1][row] = -0.01 * i;
-    result.shots.angle_covariance[0][row] = 4e-6F;
-    result.shots.angle_covariance[2][row] = 2e-6F;
+    result.shots.range[i] = begin_s + i;
+    result.shots.rotation_angle[0][i] = 3.1;
+    result.shots.rotation_angle[1][i] = -0.01 * i;
+    result.shots.angle_covariance[0][i] = 4e-6F;
+    result.shots.angle_covariance[2][i] = 2e-6F;
   }
   return result;
 }

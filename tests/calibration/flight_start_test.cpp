@@ -45,20 +45,20 @@ TEST(FlightStart, ACalibrationOnWallsIsAPriorWithAllItsCovariance) {
   const std::vector<std::string> names = unknown_names(start.model);
   std::vector<Index> at;
   for (const std::string& name : options.sensor.covariance_names) {
-    const auto found = std::find(names.begin(), names.end(), name);
+    const auto found = std::ranges::find(names, name);
     ASSERT_NE(found, names.end()) << name;
     at.push_back(found - names.begin());
   }
   const MatrixXd covariance = start.priors.information.inverse();
   for (Index i = 0; i < 3; ++i) {
     for (Index j = 0; j < 3; ++j) {
-      EXPECT_NEAR(covariance(at[static_cast<std::size_t>(i)], at[static_cast<std::size_t>(j)]),
-                  walls(i, j), 1e-6 * std::sqrt(walls(i, i) * walls(j, j)));
+      EXPECT_NEAR(covariance(at[i], at[j]), walls(i, j),
+                  1e-6 * std::sqrt(walls(i, i) * walls(j, j)));
     }
-    EXPECT_NEAR(start.prior_sigma[at[static_cast<std::size_t>(i)]], std::sqrt(walls(i, i)), 1e-12);
+    EXPECT_NEAR(start.prior_sigma[at[i]], std::sqrt(walls(i, i)), 1e-12);
   }
   // The others keep theirs: 0.3 degree, and what the mount states.
-  const auto other = std::find(names.begin(), names.end(), "prism_tilt_b_vertical_deg");
+  const auto other = std::ranges::find(names, "prism_tilt_b_vertical_deg");
   ASSERT_NE(other, names.end());
   EXPECT_NEAR(start.prior_sigma[other - names.begin()], 0.3 * degree, 1e-9);
   EXPECT_EQ(start.prior_sigma[FlightUnknowns::lever_arm(2)], 0.01);

@@ -237,10 +237,9 @@ class SimulatedFlight {
     std::mt19937_64 generator(settings_.seed + 77);
     std::normal_distribution<double> normal;
     for (int i = 0; i < 3; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      options.mount.boresight[at] = {0, radians_from_degrees(3.0), "as built"};
-      options.mount.lever_arm[at] = {settings_.lever_arm[i] + 0.01 * normal(generator), 0.01,
-                                     "tape"};
+      options.mount.boresight[i] = {0, radians_from_degrees(3.0), "as built"};
+      options.mount.lever_arm[i] = {settings_.lever_arm[i] + 0.01 * normal(generator), 0.01,
+                                    "tape"};
     }
     options.mount.clock_offset = {settings_.clock_offset + 0.002 * normal(generator), 0.002, "PPS"};
     options.range_offset_sigma = 0.02;
@@ -278,9 +277,8 @@ class SimulatedFlight {
     std::vector<Eigen::Vector2d> centres{{0, 0}};
     while (centres.size() < 20) {
       const Eigen::Vector2d centre(100 * uniform(generator_) - 50, 100 * uniform(generator_) - 50);
-      const bool free = std::all_of(centres.begin(), centres.end(), [&](const Eigen::Vector2d& c) {
-        return (c - centre).norm() > 12;
-      });
+      const bool free = std::ranges::all_of(
+          centres, [&](const Eigen::Vector2d& c) { return (c - centre).norm() > 12; });
       if (free) centres.push_back(centre);
     }
     for (const Eigen::Vector2d& centre : centres) {
@@ -358,7 +356,7 @@ class SimulatedFlight {
           if (s < jump.strip || (s == jump.strip && since < jump.begin)) continue;
           if (jump.end < duration() && (s > jump.strip || since >= jump.end)) continue;
           for (int c = 0; c < 6; ++c) {
-            const double size = jump.size[static_cast<std::size_t>(c)];
+            const double size = jump.size[c];
             off[c] += c < 3 ? size : radians_from_degrees(size);
           }
         }

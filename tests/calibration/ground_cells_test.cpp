@@ -49,7 +49,7 @@ TEST(GroundCells, HaveAPlaneEach) {
   EXPECT_NEAR(cells.scatter, 0.01 * normal.z(), 0.001);
   for (std::size_t i = 0; i < strips.points.size(); ++i) {
     ASSERT_NE(cells.plane[i], kNoPlane);
-    const auto& plane = cells.planes[static_cast<std::size_t>(cells.plane[i])];
+    const auto& plane = cells.planes[cells.plane[i]];
     EXPECT_LT(std::abs(plane.centre.x() - strips.points[i][0]), 2);
   }
 }
@@ -119,7 +119,7 @@ TEST(GroundCells, CirclesTakePointsOutOfTheirCells) {
   ASSERT_NE(found[2], kNoPlane) << "one strip is enough";
   EXPECT_EQ(cells.planes.size(), before + 3);
   EXPECT_NEAR(cells.planes[before].centre.z(), 1, 0.003);
-  EXPECT_NEAR(cells.planes[static_cast<std::size_t>(found[2])].centre.z(), 0, 0.003);
+  EXPECT_NEAR(cells.planes[found[2]].centre.z(), 0, 0.003);
   for (std::size_t i = 0; i < strips.points.size(); ++i) {
     const double from = std::hypot(strips.points[i][0] - 4, strips.points[i][1] - 4);
     EXPECT_EQ(cells.plane[i] == found[0], from <= 1.5) << from;

@@ -38,9 +38,9 @@ struct SvdPlane {
   Eigen::VectorXd residuals;
 
   explicit SvdPlane(const std::vector<Vector3<double>>& points) {
-    Eigen::MatrixXd rows(static_cast<Index>(points.size()), 3);
+    Eigen::MatrixXd rows(points.size(), 3);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      rows.row(static_cast<Index>(i)) = testing::eigen(points[i]);
+      rows.row(i) = testing::eigen(points[i]);
     }
     const Eigen::Vector3d mean = rows.colwise().mean();
     rows.rowwise() -= mean.transpose();
@@ -56,7 +56,7 @@ Eigen::VectorXd distances(const PlanarProblem& p, const Eigen::VectorXd& paramet
   PrismTrain train = p.train;
   for (std::size_t j = 0; j < p.free.size(); ++j) {
     for (const int at : p.free[j].places) {
-      train.set_place(at, parameters[static_cast<Index>(j)]);
+      train.set_place(at, parameters[j]);
     }
   }
   Eigen::VectorXd all(0);
@@ -92,8 +92,8 @@ struct BruteForce {
       if (step.norm() < 1e-13) break;
     }
     squares = distances(p, parameters).squaredNorm();
-    sigma0 = std::sqrt(squares / static_cast<double>(jacobian.rows() - free -
-                                                     3 * static_cast<Index>(p.views.size())));
+    sigma0 =
+        std::sqrt(squares / static_cast<double>(jacobian.rows() - free - 3 * std::ssize(p.views)));
     covariance = sigma0 * sigma0 * normal.inverse();
   }
 };
@@ -201,7 +201,7 @@ TEST(PaperAdjustment, StopsWhenItIsTold) {
 TEST(PaperAdjustment, RefusesALineAndNothing) {
   PlanarProblem p = problem_of(one_wall(), {}, 100);
   auto shots = std::make_shared<RangedShots>(*p.views[0].shots);
-  for (auto& column : shots->rotation_angle) std::fill(column.begin(), column.end(), 0.3);
+  for (auto& column : shots->rotation_angle) std::ranges::fill(column, 0.3);
   p.views[0].shots = shots;
   EXPECT_THROW(adjust_as_paper(p), EstimationError);
   p.views.clear();

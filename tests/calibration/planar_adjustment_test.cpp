@@ -64,7 +64,7 @@ Eigen::Matrix3d turn_by(const Eigen::Vector3d& by) {
 /// distances.
 Eigen::VectorXd flat(const PlanarSolution& solution) {
   const PlanarProblem& p = solution.problem;
-  Eigen::VectorXd values(solution.parameters.size() + 1 + static_cast<Index>(p.views.size()));
+  Eigen::VectorXd values(solution.parameters.size() + 1 + std::ssize(p.views));
   values.head(solution.parameters.size()) = solution.parameters;
   Index next = solution.parameters.size();
   values[next++] = p.range_offset;
@@ -108,11 +108,11 @@ struct RangeResidual {
                   T* residual) const {
     std::array<T, parameter_count(2)> parameters;
     for (int i = 0; i < parameter_count(2); ++i) {
-      parameters[static_cast<std::size_t>(i)] = T(problem->train[i]);
+      parameters[i] = T(problem->train[i]);
     }
     for (std::size_t j = 0; j < problem->free.size(); ++j) {
       for (const int at : problem->free[j].places) {
-        parameters[static_cast<std::size_t>(at)] = free[j];
+        parameters[at] = free[j];
       }
     }
     const Vector3<T> scene_normal = direction_from_angles(SphericalAngles<T>{angles[0], angles[1]});
@@ -165,7 +165,7 @@ class Referee {
  public:
   explicit Referee(const PlanarProblem& solved) : p_(solved) {
     const auto positions = face_positions(p_.train.face_order(), p_.geometry);
-    std::copy(positions.begin(), positions.end(), positions_.begin());
+    std::ranges::copy(positions, positions_.begin());
     for (std::size_t j = 0; j < p_.free.size(); ++j) {
       free_[j] = p_.train[p_.free[j].places.front()];
     }
@@ -226,7 +226,7 @@ class Referee {
     }
   }
 
-  double parameter(Index j) const { return free_[static_cast<std::size_t>(j)]; }
+  double parameter(Index j) const { return free_[j]; }
   double range_offset() const { return offset_; }
   double distance(std::size_t view) const { return distances_[view]; }
   Vector3<double> normal(std::size_t wall) const {
@@ -247,7 +247,7 @@ class Referee {
     using Jet = ceres::Jet<double, 2>;
     std::array<Jet, parameter_count(2)> parameters;
     for (int i = 0; i < parameter_count(2); ++i) {
-      parameters[static_cast<std::size_t>(i)] = Jet(p_.train[i]);
+      parameters[i] = Jet(p_.train[i]);
     }
     const Eigen::Vector3d normal = p_.stations[view.recording].scene_from_sensor.transpose() *
                                    testing::eigen(p_.walls[view.wall].normal);
@@ -265,7 +265,7 @@ class Referee {
 
   void build() {
     for (const WallView& view : p_.views) {
-      double* distance = &distances_[static_cast<std::size_t>(&view - p_.views.data())];
+      double* distance = &distances_[&view - p_.views.data()];
       for (std::size_t i = 0; i < view.shots->size(); ++i) {
         problem_.AddResidualBlock(
             new ceres::AutoDiffCostFunction<RangeResidual, 1, kFree, 1, 2, 3, 1>(
@@ -428,7 +428,7 @@ TEST(PlanarAdjustment, ConvergesFromZeroForAnySensor) {
     most_iterations = std::max(most_iterations, solution.iterations);
     Eigen::VectorXd error = solution.parameters;
     for (Index j = 0; j < error.size(); ++j) {
-      error[j] -= truth[p.free[static_cast<std::size_t>(j)].places.front()];
+      error[j] -= truth[p.free[j].places.front()];
     }
     chi2 += error.dot(solution.covariance.ldlt().solve(error)) / kSeeds;
   }
@@ -611,7 +611,7 @@ void shift_angles(PlanarProblem& p, std::size_t recording, const Eigen::VectorXd
     if (view.recording != recording) continue;
     auto shots = std::make_shared<RangedShots>(*view.shots);
     for (std::size_t k = 0; k < shots->rotation_angle.size(); ++k) {
-      for (double& angle : shots->rotation_angle[k]) angle += by[static_cast<Index>(k)];
+      for (double& angle : shots->rotation_angle[k]) angle += by[k];
     }
     view.shots = std::move(shots);
   }
@@ -667,10 +667,10 @@ TEST(CommonErrors, OfAllAnglesOfARecordingReachTheResult) {
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(4, 4);
   covariance.topLeftCorner(2, 2) = first;
   covariance.bottomRightCorner(2, 2) = second;
-  Eigen::MatrixXd responses(static_cast<Index>(p.free.size() + 1 + p.views.size()), 4);
+  Eigen::MatrixXd responses(p.free.size() + 1 + p.views.size(), 4);
   for (Index i = 0; i < 4; ++i) {
     responses.col(i) = response(p, [i](PlanarProblem& changed, double step) {
-      shift_angles(changed, static_cast<std::size_t>(i / 2), step * Eigen::Vector2d::Unit(i % 2));
+      shift_angles(changed, i / 2, step * Eigen::Vector2d::Unit(i % 2));
     });
   }
   expect_added(p, responses, covariance);
@@ -695,11 +695,11 @@ TEST(CommonErrors, OfBelievedParametersReachTheResult) {
       p.free.push_back(estimation::free_parameters({"refractive_index"}, {2}).front());
       p.prior_sigma.push_back(1e-4);
     }
-    Eigen::MatrixXd responses(static_cast<Index>(p.free.size() + 1 + p.views.size()), 4);
+    Eigen::MatrixXd responses(p.free.size() + 1 + p.views.size(), 4);
     for (Index i = 0; i < 4; ++i) {
       responses.col(i) = response(p, [&, i](PlanarProblem& changed, double step) {
         if ((i == 0 && !index_free) || i == 3) {
-          for (const int at : p.considered[static_cast<std::size_t>(i)].places) {
+          for (const int at : p.considered[i].places) {
             changed.train.set_place(at, changed.train[at] + step);
           }
         }
@@ -716,7 +716,7 @@ TEST(HeldResponse, IsHowTheSolutionFollowsWhatIsHeld) {
   const PlanarProblem p = exact_corner();
   const int tilt = place::prism_tilt_horizontal(0), wedge = place::wedge_angle(1);
   HeldQuantities held;
-  held.train = Eigen::MatrixXd::Zero(static_cast<Index>(p.train.parameters().size()), 3);
+  held.train = Eigen::MatrixXd::Zero(p.train.parameters().size(), 3);
   held.train(tilt, 0) = 1.0;
   held.train(wedge, 1) = 0.5;
   held.train(tilt, 1) = -2.0;
@@ -776,8 +776,8 @@ TEST(CommonErrors, AddUp) {
 // ---------------------------------------------------------------- prior knowledge
 
 PriorTest test_of(const PlanarSolution& solution, const std::string& name) {
-  const auto found = std::find_if(solution.prior_tests.begin(), solution.prior_tests.end(),
-                                  [&](const PriorTest& test) { return test.name == name; });
+  const auto found = std::ranges::find_if(solution.prior_tests,
+                                          [&](const PriorTest& test) { return test.name == name; });
   EXPECT_NE(found, solution.prior_tests.end()) << name;
   return *found;
 }
@@ -853,7 +853,7 @@ TEST(PriorTests, AreDistributedAsChiSquare) {
     const Eigen::VectorXd off = normal_vector(8, 1.0, 1000 + draw);
     for (std::size_t s = 0; s < 2; ++s) {
       StationPose& pose = p.stations[s];
-      pose.stated = turn_by(pose.sigma * off.segment<3>(3 * static_cast<Index>(s))) * pose.stated;
+      pose.stated = turn_by(pose.sigma * off.segment<3>(3 * s)) * pose.stated;
     }
     const auto [u1, u2] = tangents_of(p.walls[0].stated);
     p.walls[0].stated =
@@ -942,42 +942,31 @@ TEST(PlanarAdjustment, ReportsItsProgress) {
 
 TEST(PlanarAdjustment, RefusesWhatMakesNoSense) {
   const PlanarProblem sound = everything({});
-  const auto with = [&](const std::function<void(PlanarProblem&)>& spoil) {
+  const std::function<void(PlanarProblem&)> damages[] = {
+      [](auto& p) {
+        p.free.clear();
+        p.prior_sigma.clear();
+      },
+      [](auto& p) { p.views[1].shots = nullptr; },
+      [](auto& p) { p.views[1].shots = std::make_shared<const RangedShots>(); },
+      [](auto& p) { p.prior_sigma.pop_back(); },
+      [](auto& p) { p.views[0].wall = 2; },
+      [](auto& p) { p.views[0].recording = 2; },
+      [](auto& p) { p.views[0].range_variance = 0; },
+      [](auto& p) { p.prior_sigma[0] = 0; },
+      [](auto& p) { p.considered = p.free; },  // without a covariance
+      [](auto& p) { p.mean_angle_covariance.assign(2, Eigen::MatrixXd::Zero(1, 1)); },
+      [](auto& p) { p.angle_sensitivity.assign(2, Eigen::MatrixXd::Zero(5, 1)); }};
+  for (std::size_t i = 0; i < std::size(damages); ++i) {
     PlanarProblem p = sound;
-    spoil(p);
-    return p;
-  };
-  EXPECT_THROW(adjust(with([](auto& p) { p.views.clear(); })), EstimationError);
-  EXPECT_THROW(adjust(with([](auto& p) {
-                 p.free.clear();
-                 p.prior_sigma.clear();
-               })),
-               InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.views[1].shots = nullptr; })), InvalidArgument);
-  EXPECT_THROW(
-      adjust(with([](auto& p) { p.views[1].shots = std::make_shared<const RangedShots>(); })),
-      InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.prior_sigma.pop_back(); })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.views[0].wall = 2; })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.views[0].recording = 2; })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.views[0].range_variance = 0; })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) { p.prior_sigma[0] = 0; })), InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) {
-                 p.considered = p.free;
-                 p.considered_covariance.resize(0, 0);
-               })),
-               InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) {
-                 p.mean_angle_covariance.assign(p.stations.size(), Eigen::MatrixXd::Zero(1, 1));
-               })),
-               InvalidArgument);
-  EXPECT_THROW(adjust(with([](auto& p) {
-                 p.angle_sensitivity.assign(p.stations.size(), Eigen::MatrixXd::Zero(5, 1));
-               })),
-               InvalidArgument);
-  // A wall that stands behind the sensor is met by no shot.
-  EXPECT_THROW(adjust(with([](auto& p) { p.walls[0].normal = -p.walls[0].normal; })),
-               EstimationError);
+    damages[i](p);
+    EXPECT_THROW(adjust(p), InvalidArgument) << i;
+  }
+  PlanarProblem empty = sound, behind = sound;
+  empty.views.clear();
+  EXPECT_THROW(adjust(empty), EstimationError);
+  behind.walls[0].normal = -behind.walls[0].normal;  // met by no shot
+  EXPECT_THROW(adjust(behind), EstimationError);
 }
 
 TEST(PlanarAdjustment, LostShotsAddNoRedundancy) {

@@ -15,6 +15,8 @@
 #include "risley/core/error.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "refusal.hpp"
+
 namespace risley::calibration::plane_points_test {
 
 using ::testing::AllOf;
@@ -189,13 +191,8 @@ TEST(RangedRecording, LeavesOutWhatHasNoRangeOrNoDirection) {
 }
 
 TEST(RangedRecording, RefusesWhatIsNoEstimateWithRanges) {
-  const auto error_of = [](const estimation::Estimate& estimate) -> std::string {
-    try {
-      ranged_recording(estimate, "one.lvx", "");
-    } catch (const EstimationError& error) {
-      return error.what();
-    }
-    return "nothing was thrown";
+  const auto error_of = [](const estimation::Estimate& estimate) {
+    return refusal<EstimationError>([&] { ranged_recording(estimate, "one.lvx", ""); });
   };
   estimation::Estimate estimate = some_estimate();
   estimate.converged = false;

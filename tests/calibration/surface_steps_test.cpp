@@ -111,10 +111,10 @@ TEST_P(SurfaceStepSizes, AStepIsFoundWithItsHeightAndPlace) {
   EXPECT_NEAR(step.solid_angle, 0.05 * kPi * kHalfField * kHalfField, 0.0035);
   EXPECT_GT(step.significance, 20.0);
   EXPECT_EQ(step.points, step.rows.size());
-  EXPECT_TRUE(std::is_sorted(step.rows.begin(), step.rows.end()));
+  EXPECT_TRUE(std::ranges::is_sorted(step.rows));
   double hits = 0;
   for (std::size_t row : step.rows) hits += surface.in_step[row];
-  const auto all = std::count(surface.in_step.begin(), surface.in_step.end(), true);
+  const auto all = std::ranges::count(surface.in_step, true);
   const bool high = std::abs(c.height) > 4 * kNoise;
   EXPECT_GT(hits / static_cast<double>(step.rows.size()), high ? 0.9 : 0.65);
   EXPECT_GT(hits / static_cast<double>(all), 0.9);

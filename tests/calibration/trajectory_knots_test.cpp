@@ -78,28 +78,27 @@ TEST(TrajectoryKnots, DivideEveryStripEvenly) {
 
 TEST(TrajectoryKnots, KnowTheProcessByTheInverseOfItsCovariance) {
   const TrajectoryKnots knots = make_knots(two_strips(), 0.25);
-  const auto n = static_cast<Index>(knots.size());
+  const Index n = knots.size();
   for (int number = 0; number < 2 * kCorrections; ++number) {
     const int c = number % kCorrections;
     const bool growing = number >= kCorrections;
     const trajectories::ErrorProcess process = some_process(growing);
     const auto sigma = [&](Index k) {
-      const double seconds = 1e-9 * static_cast<double>(knots.time_ns[static_cast<std::size_t>(k)]);
+      const double seconds = 1e-9 * static_cast<double>(knots.time_ns[k]);
       return kSigma[c] * (growing ? 1 + std::min(0.1 * seconds, 1.0) : 1);
     };
     MatrixXd covariance(n, n);
     for (Index i = 0; i < n; ++i) {
       for (Index j = 0; j < n; ++j) {
-        const double apart = 1e-9 * static_cast<double>(knots.time_ns[static_cast<std::size_t>(i)] -
-                                                        knots.time_ns[static_cast<std::size_t>(j)]);
+        const double apart = 1e-9 * static_cast<double>(knots.time_ns[i] - knots.time_ns[j]);
         covariance(i, j) = sigma(i) * sigma(j) * std::exp(-std::abs(apart) / kTime[c]);
       }
     }
     const KnotInformation information = knot_information(knots, process, c);
     MatrixXd all = MatrixXd::Zero(n, n);
     for (Index i = 0; i < n; ++i) {
-      all(i, i) = information.diagonal[static_cast<std::size_t>(i)];
-      if (i + 1 < n) all(i, i + 1) = all(i + 1, i) = information.next[static_cast<std::size_t>(i)];
+      all(i, i) = information.diagonal[i];
+      if (i + 1 < n) all(i, i + 1) = all(i + 1, i) = information.next[i];
     }
     EXPECT_LT((all * covariance - MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-9);
   }
@@ -137,14 +136,13 @@ TEST(TrajectoryKnots, KnowWhatHappensBetweenThem) {
 TEST(TrajectoryKnots, PassCorrectionsOn) {
   const FlightShots shots = two_strips();
   const TrajectoryKnots coarse = make_knots(shots, 1), fine = make_knots(shots, 0.25);
-  MatrixXd corrections = MatrixXd::Zero(6, static_cast<Index>(coarse.size()));
+  MatrixXd corrections = MatrixXd::Zero(6, coarse.size());
   for (Index k = 0; k < corrections.cols(); ++k) {
-    corrections(2, k) = 1e-9 * static_cast<double>(coarse.time_ns[static_cast<std::size_t>(k)]);
+    corrections(2, k) = 1e-9 * static_cast<double>(coarse.time_ns[k]);
   }
   const MatrixXd found = resampled(coarse, corrections, fine);
   for (Index k = 0; k < found.cols(); ++k) {
-    EXPECT_NEAR(found(2, k), 1e-9 * static_cast<double>(fine.time_ns[static_cast<std::size_t>(k)]),
-                1e-9);
+    EXPECT_NEAR(found(2, k), 1e-9 * static_cast<double>(fine.time_ns[k]), 1e-9);
   }
   EXPECT_NE(refusal([&] { resampled(fine, corrections, coarse); }), "");
 }
@@ -152,7 +150,7 @@ TEST(TrajectoryKnots, PassCorrectionsOn) {
 TEST(TrajectoryKnots, CorrectPosesBetweenBeforeAndBehindThem) {
   const TrajectoryKnots knots = make_knots(two_strips(), 1);  // at 0, 1, 2; 12.01, 13 s
   const trajectories::ErrorProcess process = some_process();
-  MatrixXd corrections = MatrixXd::Zero(6, static_cast<Index>(knots.size()));
+  MatrixXd corrections = MatrixXd::Zero(6, knots.size());
   corrections.row(3) << 1e-4, 3e-4, -1e-4, 2e-4, 0;
   const auto at = [&](double seconds) {
     return correction_at(knots, corrections, process, std::llround(1e9 * seconds))[3];
@@ -167,7 +165,7 @@ TEST(TrajectoryKnots, CorrectPosesBetweenBeforeAndBehindThem) {
               -1e-4 * (before - behind * both) / rest + 2e-4 * (behind - before * both) / rest,
               1e-15);
   // Half known at the knots: half and half between, and forgotten by and by.
-  MatrixXd sigma(6, static_cast<Index>(knots.size()));
+  MatrixXd sigma(6, knots.size());
   for (int c = 0; c < 6; ++c) sigma.row(c).setConstant(0.5 * kSigma[c]);
   const auto sigma_of = [&](double seconds) {
     return correction_sigma_at(knots, sigma, process, std::llround(1e9 * seconds))[3];

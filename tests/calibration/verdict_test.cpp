@@ -176,7 +176,7 @@ FlightCalibration flown(double change) {
   c.model.train = sensors::load_sensor("mid-40").train;
   c.model.free = estimation::free_parameters({"incident_beam_vertical_deg"}, c.model.train.shape());
   const auto count = FlightUnknowns::parameter(1);
-  c.unknowns.resize(static_cast<std::size_t>(count));
+  c.unknowns.resize(count);
   for (FlightUnknown& own : c.unknowns) own.held = true;
   FlightUnknown& beam = c.unknowns.back();
   beam.held = false;

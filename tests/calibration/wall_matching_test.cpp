@@ -13,6 +13,7 @@
 #include "risley/core/error.hpp"
 
 #include "calibration/walls.hpp"
+#include "refusal.hpp"
 
 namespace risley::calibration::wall_matching_test {
 
@@ -50,17 +51,6 @@ std::vector<std::string> names_of(const WallMatching& matching) {
   std::vector<std::string> names;
   for (const Wall& w : matching.walls) names.push_back(w.name);
   return names;
-}
-
-/// What the call throws, in words.
-template <class Function>
-std::string error_of(Function&& function) {
-  try {
-    function();
-  } catch (const EstimationError& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
 }
 
 const scenes::ScenePlane kLeft = wall("left", 40, 88, 10);
@@ -215,7 +205,7 @@ TEST(WallMatching, RefusesWhenNoKnownPlaneIsSeen) {
   scenes::Scene scene;
   scene.planes = {wall("known", 60, 90, 10, 0.1), wall("named", 0, 90, 10)};
   std::vector<FoundPlane> found{found_from(0, kUpright, scene.planes[1])};
-  EXPECT_THAT(error_of([&] { match_walls(found, {"one.lvx"}, scene, {}); }),
+  EXPECT_THAT(refusal<EstimationError>([&] { match_walls(found, {"one.lvx"}, scene, {}); }),
               AllOf(HasSubstr("none of the known planes is seen"), HasSubstr("one.lvx"),
                     HasSubstr("azimuth 0.0"), HasSubstr("distance 10.00 m")));
   // Planes that are only named are no datum and may be missing.
@@ -229,7 +219,7 @@ TEST(WallMatching, NamesAStationThatSharesNothing) {
   wrong.yaw += radians_from_degrees(20.0);  // stated so, and not standing so
   std::vector<FoundPlane> found{found_from(0, kUpright, kLeft), found_from(0, kUpright, kRight),
                                 found_from(1, kFlipped, kLeft), found_from(1, kFlipped, kRight)};
-  EXPECT_THAT(error_of([&] {
+  EXPECT_THAT(refusal<EstimationError>([&] {
                 match_walls(found, {"one", "two"}, std::nullopt, {kUpright, wrong});
               }),
               AllOf(HasSubstr("station upright contradicts the data"), HasSubstr("20.0 degrees")));
@@ -238,7 +228,7 @@ TEST(WallMatching, NamesAStationThatSharesNothing) {
   scenes::Station third = kUpright;
   third.name = "third";
   found.push_back(found_from(2, third, kLeft));
-  EXPECT_THAT(error_of([&] {
+  EXPECT_THAT(refusal<EstimationError>([&] {
                 match_walls(found, {"one", "two", "three"}, std::nullopt, {kUpright, wrong, third});
               }),
               HasSubstr("station flipped contradicts the data"));

@@ -68,7 +68,7 @@ Wall wall_of(const WallGrid& grid, Index columns, std::uint64_t seed) {
   const RandomStream random(seed, 1);
   Wall wall;
   wall.sums.grid = grid;
-  const auto cells = static_cast<Index>(grid.cells.size());
+  const Index cells = grid.cells.size();
   wall.sums.weight.assign(grid.cells.size(), Eigen::Matrix3d::Zero());
   wall.sums.columns.setZero(3 * cells, columns);
   wall.rows.resize(kShots, columns);
@@ -84,8 +84,8 @@ Wall wall_of(const WallGrid& grid, Index columns, std::uint64_t seed) {
     for (Index j = 0; j < columns; ++j) wall.rows(i, j) = random.normal(number++);
     const Eigen::Vector3d e = d * Eigen::Vector3d(1, du, dv);
     wall.sums.weight[cell] += e * e.transpose();
-    wall.sums.columns.middleRows<3>(3 * static_cast<Index>(cell)) += e * wall.rows.row(i);
-    wall.white(i, static_cast<Index>(cell)) = d;
+    wall.sums.columns.middleRows<3>(3 * cell) += e * wall.rows.row(i);
+    wall.white(i, cell) = d;
     const Index u = grid.cells[cell] % grid.row(), v = grid.cells[cell] / grid.row();
     const Index nu = grid.cells_u + 1;
     const double slope = 0.5 / grid.spacing;
@@ -174,7 +174,7 @@ TEST(WallShape, IsWhatDenseMatricesSay) {
     seen += all.weight[i];
   }
   EXPECT_NEAR(seen, 1.0, 1e-12);
-  const auto most = std::max_element(likelihood.begin(), likelihood.end()) - likelihood.begin();
+  const auto most = std::ranges::max_element(likelihood) - likelihood.begin();
   EXPECT_EQ(all.likeliest, static_cast<std::size_t>(most));
 }
 

@@ -155,13 +155,13 @@ inline void add_errors(PrismTrain& train, const std::vector<estimation::FreePara
                        const Eigen::VectorXd& errors) {
   for (std::size_t j = 0; j < free.size(); ++j) {
     for (const int at : free[j].places) {
-      train.set_place(at, train[at] + errors[static_cast<Eigen::Index>(j)]);
+      train.set_place(at, train[at] + errors[j]);
     }
   }
 }
 
 inline Eigen::VectorXd normal_vector(std::size_t size, double sigma, std::uint64_t seed) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(size));
+  Eigen::VectorXd values(size);
   RandomStream(seed, 1002).fill_normal(0, {values.data(), size});
   return sigma * values;
 }

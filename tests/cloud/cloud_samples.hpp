@@ -10,8 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "risley/cloud/cloud_writer.hpp"
 #include "risley/cloud/points.hpp"
+
+#include "io/test_folder.hpp"
 
 namespace risley::cloud {
 
@@ -35,7 +39,7 @@ std::vector<CloudCase> cloud_cases();
 Points make_points(const CloudCase& one);
 
 /// Points [first, first + count).
-Points slice(const CloudHeader& header, const Points& points, std::size_t first, std::size_t count);
+Points slice(const Points& points, std::size_t first, std::size_t count);
 
 /// Writes a whole cloud in pieces of uneven lengths, the first and some others empty.
 void write_uneven(const std::string& path, const std::string& format, const CloudHeader& header,
@@ -67,19 +71,16 @@ std::size_t record_bytes(const TestTable& table);
 /// Same names, types and numbers, bit by bit but for the kind of NaN.
 void expect_same(const TestTable& found, const TestTable& expected);
 
-/// A new empty folder of this test, removed with what is in it.
-class TestFolder {
- public:
-  TestFolder();
-  ~TestFolder();
-  TestFolder(const TestFolder&) = delete;
-  TestFolder& operator=(const TestFolder&) = delete;
+using io::TestFolder;
 
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-  bool empty() const;
+/// A cloud that a format is written with, and what a file of it has to hold.
+class CloudTest : public ::testing::TestWithParam<CloudCase> {
+ protected:
+  const CloudHeader& header() const { return GetParam().header; }
 
- private:
-  std::string path_;
+  TestFolder folder_;
+  Points points_ = make_points(GetParam());
+  TestTable expected_ = expected_table(header(), points_);
 };
 
 /// A Python that has a module; empty when there is none.

@@ -47,7 +47,7 @@ TEST(Entries, EveryFormatAsksForTheColumnsOfItsHeader) {
   header.factors = {"range_offset_m"};
   for (const char* name :
        {"cloud.las", "cloud.ply", "cloud.csv", "cloud.npy", "cloud.nc", "cloud.bag"}) {
-    const auto writer = create_cloud(folder / name, header);
+    const auto writer = create_cloud(folder.file(name), header);
     const auto run = [&](const auto& spoil) {
       Points points = make_points({"", 3, header});
       points.return_number.assign(3, 1);

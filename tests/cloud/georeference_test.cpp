@@ -123,8 +123,7 @@ class BentUnit {
     sensor_.reference = sensors::CalibrationReference::planes;
     sensor_.covariance_names = names_;
     sensor_.covariance =
-        kPrismSigma * kPrismSigma *
-        MatrixXd::Identity(static_cast<Index>(names_.size()), static_cast<Index>(names_.size()));
+        kPrismSigma * kPrismSigma * MatrixXd::Identity(names_.size(), names_.size());
   }
   const sensors::Sensor& sensor() const { return sensor_; }
   sensors::Sensor& sensor() { return sensor_; }
@@ -268,7 +267,7 @@ TEST(Georeference, PosesAreThoseOfTheTrajectory) {
       };
       Matrix3d frame_from_sensor;
       for (Index k = 0; k < 9; ++k) {
-        frame_from_sensor.data()[k] = got.turn[static_cast<std::size_t>(k)][row];
+        frame_from_sensor.data()[k] = got.turn[k][row];
       }
       place = std::max(place, (vector(got.reference) - pose->position).norm());
       turn = std::max(
@@ -424,14 +423,12 @@ class Draws {
   Draws(const MovingPlatform& platform, const SensorPoints& of, const BentUnit& unit,
         const std::vector<double>& times)
       : platform_(platform), of_(of), unit_(unit), times_(times) {
-    const auto n = static_cast<Index>(times.size());
+    const Index n = times.size();
     for (const double tau : {120.0, 300.0}) {
       MatrixXd kernel(n, n);
       for (Index i = 0; i < n; ++i) {
         for (Index j = 0; j < n; ++j) {
-          kernel(i, j) = std::exp(
-              -std::abs(times[static_cast<std::size_t>(i)] - times[static_cast<std::size_t>(j)]) /
-              tau);
+          kernel(i, j) = std::exp(-std::abs(times[i] - times[j]) / tau);
         }
       }
       kernel.diagonal().array() += 1e-12;
@@ -444,13 +441,13 @@ class Draws {
     const RandomStream random(number, 1);
     std::uint64_t drawn = 0;
     const auto normal = [&] { return random.normal(drawn++); };
-    const auto n = static_cast<Index>(times_.size());
+    const Index n = times_.size();
     const auto& terms = platform_.errors->terms;
     MatrixXd errors(n, 6);
     for (Index k = 0; k < 6; ++k) {
       Eigen::VectorXd z(n);
       for (Index i = 0; i < n; ++i) z[i] = normal();
-      errors.col(k) = *terms[static_cast<std::size_t>(k)].sigma * (factors_[k == 5 ? 1 : 0] * z);
+      errors.col(k) = *terms[k].sigma * (factors_[k == 5 ? 1 : 0] * z);
     }
     trajectories::Mount mount = platform_.mount;
     for (auto& one : mount.boresight) one.value += one.sigma * normal();
@@ -467,10 +464,9 @@ class Draws {
     std::int64_t sample = -1;
     Vector3d white = Vector3d::Zero();
     for (Index i = 0; i < n; ++i) {
-      const auto row = static_cast<std::size_t>(i);
-      const double t = times_[row] + clock;
+      const double t = times_[i] + clock;
       const auto pose = interpolation.at(200'000 * kSecond + std::llround(1e9 * t));
-      const auto own = static_cast<std::int64_t>(std::floor(times_[row] * kRate + 1e-6));
+      const auto own = static_cast<std::int64_t>(std::floor(times_[i] * kRate + 1e-6));
       if (own != sample) {
         for (Index k = 0; k < 3; ++k) white[k] = terms[3].white * normal();
         sample = own;
@@ -482,8 +478,8 @@ class Draws {
           Eigen::AngleAxisd(turn.norm(), axes * turn.normalized()).toRotationMatrix());
       const Matrix3d body = (wrong * pose->attitude).toRotationMatrix();
       const double noise = kRangeNoise * normal() - range;
-      const double measured = of_.point(row).norm() + noise;
-      const Vector3d p = measured * unit_.direction(times_[row], prisms);
+      const double measured = of_.point(i).norm() + noise;
+      const Vector3d p = measured * unit_.direction(times_[i], prisms);
       places.push_back(pose->position + axes * shift + body * (lever + sensor * p));
     }
     return places;
@@ -540,12 +536,12 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
     Eigen::MatrixXd weights;  // [3, 3 n]
     double squares[3] = {};
   };
-  const auto n = static_cast<Index>(times.size());
+  const Index n = times.size();
   std::vector<Functional> functionals;
   const auto add = [&](const std::string& name, const std::vector<double>& weight) {
     MatrixXd weights = MatrixXd::Zero(3, 3 * n);
     for (Index i = 0; i < n; ++i) {
-      weights.block<3, 3>(0, 3 * i) = weight[static_cast<std::size_t>(i)] * Matrix3d::Identity();
+      weights.block<3, 3>(0, 3 * i) = weight[i] * Matrix3d::Identity();
     }
     functionals.push_back({name, weights});
   };
@@ -583,24 +579,22 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
   std::vector<MapTangent> tangents;
   std::vector<Vector3d> true_places;
   for (Index i = 0; i < n; ++i) {
-    const auto row = static_cast<std::size_t>(i);
     Vector3d place;
-    const Vector3d arm = at.lever_arm + sensor.point(row);
+    const Vector3d arm = at.lever_arm + sensor.point(i);
     for (std::size_t k = 0; k < 3; ++k) {
-      place[static_cast<Index>(k)] = at.reference[k][row] + at.turn[k][row] * arm.x() +
-                                     at.turn[3 + k][row] * arm.y() + at.turn[6 + k][row] * arm.z();
+      place[k] = at.reference[k][i] + at.turn[k][i] * arm.x() + at.turn[3 + k][i] * arm.y() +
+                 at.turn[6 + k][i] * arm.z();
     }
     tangents.push_back(map.tangent(place));
     true_places.push_back(tangents.back().map(place));
-    EXPECT_NEAR((true_places.back() - of.point(row)).norm(), 0, 1e-5);
+    EXPECT_NEAR((true_places.back() - of.point(i)).norm(), 0, 1e-5);
   }
   constexpr int kDraws = 1000;
   for (int draw = 0; draw < kDraws; ++draw) {
     const std::vector<Vector3d> places = draws.draw(static_cast<std::uint64_t>(draw));
     Eigen::VectorXd off(3 * n);
     for (Index i = 0; i < n; ++i) {
-      const auto row = static_cast<std::size_t>(i);
-      off.segment<3>(3 * i) = tangents[row].map(places[row]) - true_places[row];
+      off.segment<3>(3 * i) = tangents[i].map(places[i]) - true_places[i];
     }
     for (Functional& one : functionals) {
       const Vector3d value = one.weights * off;
@@ -629,12 +623,11 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
         RecordProperty(fmt::format("{} {} {}", one.name, axis, table == 0 ? "1 s" : "10 s"),
                        fmt::format("{:.3f}", ratio));
       }
-      wrong[static_cast<std::size_t>(axis)] = measured / independent(axis, axis);
+      wrong[axis] = measured / independent(axis, axis);
       RecordProperty(fmt::format("{} {} independent", one.name, axis),
                      fmt::format("{:.3f}", measured / independent(axis, axis)));
     }
-    const double least = *std::min_element(wrong.begin(), wrong.end()),
-                 most = *std::max_element(wrong.begin(), wrong.end());
+    const double least = *std::ranges::min_element(wrong), most = *std::ranges::max_element(wrong);
     if (one.name.find("difference") != std::string::npos) {
       EXPECT_LT(most, 0.88) << one.name;
     } else if (one.name == "a roof's tilt") {
@@ -684,8 +677,7 @@ TEST(Georeference, MountAndPrismsThatWereFoundTogetherAreCountedTogether) {
   const auto place = [&](double time, double range, const Eigen::VectorXd& errors) {
     trajectories::Mount moved = m;
     for (Index k = 0; k < 3; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      moved.lever_arm[at].value += errors[prisms + 3 + k] * sigmas[at + 3];
+      moved.lever_arm[k].value += errors[prisms + 3 + k] * sigmas[k + 3];
     }
     const Vector3d turn =
         errors.segment<3>(prisms).cwiseProduct(Eigen::Map<const Vector3d>(sigmas.data()));

@@ -224,10 +224,9 @@ class Checker {
     if (record != nullptr) {
       require(record->data.size() % 192 == 0 && !record->data.empty(), "length of extra bytes");
       // The record was copied from there; text() and number() look into the file.
-      const auto found =
-          std::search(bytes_.begin() + static_cast<std::ptrdiff_t>(kHeaderBytes), bytes_.end(),
-                      record->data.begin(), record->data.end(),
-                      [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); });
+      const auto found = std::search(
+          bytes_.begin() + kHeaderBytes, bytes_.end(), record->data.begin(), record->data.end(),
+          [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); });
       auto at = static_cast<std::size_t>(found - bytes_.begin());
       std::set<std::string> names;
       for (std::size_t k = 0; k < record->data.size() / 192; ++k, at += 192) {
@@ -275,8 +274,7 @@ class Checker {
       require(point.number_of_returns >= 1, "number of returns");
       require(point.return_number >= 1 && point.return_number <= point.number_of_returns,
               "return number");
-      point.bytes.assign(bytes_.begin() + static_cast<std::ptrdiff_t>(at),
-                         bytes_.begin() + static_cast<std::ptrdiff_t>(at + record_bytes_));
+      point.bytes.assign(bytes_.begin() + at, bytes_.begin() + (at + record_bytes_));
       file_.points.push_back(std::move(point));
     }
   }

@@ -17,6 +17,7 @@
 
 #include "cloud/cloud_samples.hpp"
 #include "parameter_name.hpp"
+#include "refusal.hpp"
 
 namespace risley::cloud::las_recording_test {
 
@@ -51,7 +52,7 @@ class LasRecordingTest : public ::testing::TestWithParam<std::string> {
   CloudCase one_{"cloud", 9000, {}};
   Points points_;
   TestFolder folder_;
-  std::string path_ = folder_ / "cloud";
+  std::string path_ = folder_.file("cloud");
 };
 
 TEST_P(LasRecordingTest, GivesBackEveryPoint) {
@@ -117,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(Formats, LasRecordingTest, ::testing::ValuesIn(formats_
 
 TEST(LazRecordingTest, IsTested) {
   const std::vector<std::string> formats = formats_of_this_build();
-  if (std::find(formats.begin(), formats.end(), "laz") == formats.end()) {
+  if (std::ranges::find(formats, "laz") == formats.end()) {
     GTEST_SKIP() << "SKIPPED: this build has no LASzip (Debian 13 has it)";
   }
 }
@@ -131,21 +132,16 @@ std::string laz_error(const std::string& path, std::uint64_t at, const std::stri
     stream.seekp(static_cast<std::streamoff>(at));
     stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   }
-  try {
-    recordings::load_recording(path);
-  } catch (const FileError& error) {
-    return error.what();
-  }
-  return "was read";
+  return refusal<FileError>([&] { recordings::load_recording(path); });
 }
 
 TEST(LazRecordingTest, ChunkTablesThatCannotBeAreRefused) {
   const TestFolder folder;
-  const std::string path = folder / "cloud.laz";
+  const std::string path = folder.file("cloud.laz");
   const CloudCase one{"cloud", 2000, {}};
   Points points = make_points(one);
-  std::fill(points.return_number.begin(), points.return_number.end(), std::uint8_t{1});
-  std::fill(points.number_of_returns.begin(), points.number_of_returns.end(), std::uint8_t{1});
+  std::ranges::fill(points.return_number, std::uint8_t{1});
+  std::ranges::fill(points.number_of_returns, std::uint8_t{1});
   const auto writer = create_cloud(path, one.header);
   writer->write(points);
   writer->close();

@@ -3,12 +3,10 @@
 // LAZ read back by LASzip itself, against the same cloud as LAS.
 #include <algorithm>
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 #ifdef RISLEY_HAS_LASZIP
 #include <laszip/laszip_api.h>
 #endif
@@ -32,9 +30,7 @@ T at(const std::string& bytes, std::size_t offset) {
 class LazTest : public ::testing::TestWithParam<std::size_t> {};
 
 TEST_P(LazTest, HoldsWhatTheLasFileHolds) {
-  namespace fs = std::filesystem;
-  const fs::path folder = fs::temp_directory_path() / ("risley-laz-" + std::to_string(::getpid()));
-  fs::create_directories(folder);
+  const TestFolder folder;
   CloudCase one{"laz", GetParam(), {}};
   CloudHeader& header = one.header;
   header.sensor = "Livox Mid-40";
@@ -45,11 +41,11 @@ TEST_P(LazTest, HoldsWhatTheLasFileHolds) {
     points.return_number[i] = static_cast<std::uint8_t>(1 + i % points.number_of_returns[i]);
   }
   for (const char* name : {"cloud.las", "cloud.laz"}) {
-    const auto writer = create_cloud((folder / name).string(), header);
+    const auto writer = create_cloud(folder.file(name), header);
     writer->write(points);
     writer->close();
   }
-  const std::string las = io::read_text_file((folder / "cloud.las").string());
+  const std::string las = io::read_text_file(folder.file("cloud.las"));
   const auto data = at<std::uint32_t>(las, 96);
   const auto record = at<std::uint16_t>(las, 105);
   constexpr std::size_t kBase = 30;  // bytes of point format 6
@@ -58,7 +54,7 @@ TEST_P(LazTest, HoldsWhatTheLasFileHolds) {
   laszip_POINTER reader = nullptr;
   ASSERT_EQ(laszip_create(&reader), 0);
   laszip_BOOL compressed = 0;
-  ASSERT_EQ(laszip_open_reader(reader, (folder / "cloud.laz").c_str(), &compressed), 0);
+  ASSERT_EQ(laszip_open_reader(reader, folder.file("cloud.laz").c_str(), &compressed), 0);
   EXPECT_TRUE(compressed);
   laszip_header* found = nullptr;
   ASSERT_EQ(laszip_get_header_pointer(reader, &found), 0);
@@ -87,7 +83,6 @@ TEST_P(LazTest, HoldsWhatTheLasFileHolds) {
   }
   laszip_close_reader(reader);
   laszip_destroy(reader);
-  fs::remove_all(folder);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, LazTest, ::testing::Values(0, 1, 60000));

@@ -3,7 +3,6 @@
 #include "risley/cloud/make_cloud.hpp"
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -13,15 +12,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/simulation/scanner.hpp"
 
+#include "io/test_folder.hpp"
+#include "refusal.hpp"
+
 namespace risley::cloud::make_cloud_test {
 
-namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
 /// A simulated recording before a wall at 10 m that goes through a reader, changed on its way.
@@ -68,16 +68,8 @@ simulation::SimulationSettings wall_settings(double duration, double rate) {
 
 class MakeCloud : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("risley-make-cloud-" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path(const char* name = "cloud.csv") const { return (folder_ / name).string(); }
-  std::size_t files() const {
-    return static_cast<std::size_t>(
-        std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
-  }
+  std::string path(const char* name = "cloud.csv") const { return folder_.file(name); }
+  std::size_t files() const { return folder_.names().size(); }
 
   /// Columns of the CSV by name.
   std::map<std::string, std::vector<double>> columns() const {
@@ -97,7 +89,7 @@ class MakeCloud : public ::testing::Test {
     return result;
   }
 
-  fs::path folder_;
+  io::TestFolder folder_;
   sensors::Sensor type_ = sensors::load_sensor("mid-40-table3");
 };
 
@@ -121,12 +113,8 @@ TEST_F(MakeCloud, TwoSensorsAreRefusedByName) {
   recordings::Device other = reader.header().devices.front();
   other.serial = "3GGDJ9600100401";
   reader.header().devices.push_back(other);
-  try {
-    make_cloud(reader, type_, path(), {});
-    FAIL();
-  } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("3GGDJ9600100401"));
-  }
+  EXPECT_THAT(refusal([&] { make_cloud(reader, type_, path(), {}); }),
+              HasSubstr("3GGDJ9600100401"));
   EXPECT_EQ(files(), 0U);
 }
 
@@ -342,13 +330,9 @@ TEST_F(MakeCloud, ATurnedFrameIsRefusedByNameAndLeavesNothing) {
   SimulatedReader reader(wall_settings(1.0, 5000.0), [yaw](recordings::Observations& rows) {
     for (double& azimuth : rows.azimuth) azimuth += yaw;
   });
-  try {
-    make_cloud(reader, type_, path(), {});
-    ADD_FAILURE() << "points in two frames";
-  } catch (const TurnedFrame& error) {
-    EXPECT_THAT(error.what(), ::testing::ContainsRegex("(39\\.9|40\\.0)[0-9]* deg in yaw"));
-    EXPECT_THAT(error.what(), ::testing::ContainsRegex("-?0\\.0[0-9]* deg in pitch"));
-  }
+  EXPECT_THAT(refusal<TurnedFrame>([&] { make_cloud(reader, type_, path(), {}); }),
+              AllOf(::testing::ContainsRegex("(39\\.9|40\\.0)[0-9]* deg in yaw"),
+                    ::testing::ContainsRegex("-?0\\.0[0-9]* deg in pitch")));
   EXPECT_EQ(files(), 0U);
 }
 

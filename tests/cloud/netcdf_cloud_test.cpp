@@ -36,7 +36,7 @@ class Reader {
     std::vector<std::string> names;
     for (int k = 0; k < count; ++k) {
       std::array<char, NC_MAX_NAME + 1> text{};
-      EXPECT_EQ(nc_inq_dimname(id_, ids[static_cast<std::size_t>(k)], text.data()), NC_NOERR);
+      EXPECT_EQ(nc_inq_dimname(id_, ids[k], text.data()), NC_NOERR);
       names.emplace_back(text.data());
     }
     return names;
@@ -86,7 +86,7 @@ class NetcdfCloud : public ::testing::TestWithParam<CloudCase> {
  protected:
   const CloudHeader& header() const { return GetParam().header; }
   std::string write() {
-    std::string path = folder_ / "cloud.nc";
+    std::string path = folder_.file("cloud.nc");
     write_uneven(path, "netcdf", header(), points_);
     return path;
   }
@@ -201,8 +201,8 @@ TEST(NetcdfClouds, HaveDatesWhenTheClockIsUtc) {
   const TestFolder folder;
   CloudCase one = cloud_cases().at(1);
   one.header.time_reference = recordings::TimeReference::utc;
-  write_uneven(folder / "cloud.nc", "netcdf", one.header, make_points(one));
-  const Reader file(folder / "cloud.nc");
+  write_uneven(folder.file("cloud.nc"), "netcdf", one.header, make_points(one));
+  const Reader file(folder.file("cloud.nc"));
   EXPECT_EQ(file.text("time", "units"), "seconds since 1970-01-01 00:00:00");
   EXPECT_EQ(file.text("time", "standard_name"), "time");
 }
@@ -212,8 +212,8 @@ TEST(NetcdfClouds, GoOverManyBlocks) {
   CloudCase one = cloud_cases().at(5);
   one.points = 70'000;
   const Points points = make_points(one);
-  write_uneven(folder / "cloud.nc", "netcdf", one.header, points);
-  const Reader file(folder / "cloud.nc");
+  write_uneven(folder.file("cloud.nc"), "netcdf", one.header, points);
+  const Reader file(folder.file("cloud.nc"));
   TestTable expected = expected_table(one.header, points);
   expect_same({file.values("x_m", "X"), file.values("range_m", "LidarRange")},
               {column(expected, "X"), column(expected, "LidarRange")});

@@ -369,8 +369,7 @@ TEST(PointDistribution, LooksForCirclesOnAsMuchGroundAsItMay) {
   points.add(100, 71, 1, 3);
   std::vector<std::size_t> order(points.x.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return points.y[a] < points.y[b]; });
+  std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return points.y[a] < points.y[b]; });
   Scattered flown;
   for (const std::size_t i : order) {
     flown.x.push_back(points.x[i]);

@@ -16,14 +16,7 @@
 
 namespace risley::cloud::record_files_test {
 
-class RecordFiles : public ::testing::TestWithParam<CloudCase> {
- protected:
-  const CloudHeader& header() const { return GetParam().header; }
-
-  TestFolder folder_;
-  Points points_ = make_points(GetParam());
-  TestTable expected_ = expected_table(header(), points_);
-};
+class RecordFiles : public CloudTest {};
 
 INSTANTIATE_TEST_SUITE_P(Clouds, RecordFiles, ::testing::ValuesIn(cloud_cases()),
                          [](const auto& one) { return one.param.name; });
@@ -79,7 +72,7 @@ TestTable read_ply(std::string bytes, std::vector<std::string>& comments) {
 }
 
 TEST_P(RecordFiles, PlyHoldsEveryField) {
-  const std::string path = folder_ / "cloud.ply";
+  const std::string path = folder_.file("cloud.ply");
   write_uneven(path, "ply", header(), points_);
   std::vector<std::string> comments;
   const TestTable found = read_ply(io::read_text_file(path), comments);
@@ -91,7 +84,7 @@ TEST_P(RecordFiles, PlyHoldsEveryField) {
 }
 
 TEST_P(RecordFiles, PcdHoldsEveryField) {
-  const std::string path = folder_ / "cloud.pcd";
+  const std::string path = folder_.file("cloud.pcd");
   write_uneven(path, "pcd", header(), points_);
   std::string bytes = io::read_text_file(path);
   std::map<std::string, std::vector<std::string>> entries;
@@ -128,7 +121,7 @@ TEST_P(RecordFiles, PcdHoldsEveryField) {
 }
 
 TEST_P(RecordFiles, NumpyReadsEveryField) {
-  const std::string path = folder_ / "cloud.npy", answer = folder_ / "answer";
+  const std::string path = folder_.file("cloud.npy"), answer = folder_.file("answer");
   write_uneven(path, "npy", header(), points_);
   const std::string head = io::read_text_file(path).substr(0, 10);
   EXPECT_EQ(head.substr(0, 8), std::string("\x93NUMPY\x01\0", 8));
@@ -139,7 +132,7 @@ TEST_P(RecordFiles, NumpyReadsEveryField) {
             points_.size() * record_bytes(expected_));
   const std::string python = find_python("numpy");
   if (python.empty()) GTEST_SKIP() << "no Python with numpy";
-  const std::string script = folder_ / "read.py";
+  const std::string script = folder_.file("read.py");
   io::write_text_file(script, R"(
 import sys
 import numpy
@@ -190,11 +183,11 @@ TEST(PlyComments, TellTheProvenanceInLinesThatEveryReaderTakes) {
   std::string letters;
   for (int i = 0; i < 1200; ++i) letters += "\xC3\xA4";  // two bytes each
   one.header.provenance.emplace_back("long", letters);
-  write_uneven(folder / "cloud.ply", "ply", one.header, make_points(one));
+  write_uneven(folder.file("cloud.ply"), "ply", one.header, make_points(one));
   std::vector<std::string> comments;
-  read_ply(io::read_text_file(folder / "cloud.ply"), comments);
+  read_ply(io::read_text_file(folder.file("cloud.ply")), comments);
   const auto has = [&comments](const std::string& text) {
-    return std::find(comments.begin(), comments.end(), text) != comments.end();
+    return std::ranges::find(comments, text) != comments.end();
   };
   EXPECT_TRUE(has("command: risley cloud over two lines"));
   EXPECT_TRUE(has("version: 0.1"));

@@ -14,14 +14,7 @@
 
 namespace risley::cloud::text_clouds_test {
 
-class TextClouds : public ::testing::TestWithParam<CloudCase> {
- protected:
-  const CloudHeader& header() const { return GetParam().header; }
-
-  TestFolder folder_;
-  Points points_ = make_points(GetParam());
-  TestTable expected_ = expected_table(header(), points_);
-};
+class TextClouds : public CloudTest {};
 
 INSTANTIATE_TEST_SUITE_P(Clouds, TextClouds, ::testing::ValuesIn(cloud_cases()),
                          [](const auto& one) { return one.param.name; });
@@ -77,17 +70,17 @@ std::string unit_of(const std::string& name) {
 }
 
 TEST_P(TextClouds, CsvLosesNothing) {
-  write_uneven(folder_ / "cloud.csv", "csv", header(), points_);
+  write_uneven(folder_.file("cloud.csv"), "csv", header(), points_);
   for (TestColumn& one : expected_) one.name += unit_of(one.name);
-  expect_same(read_text(io::read_text_file(folder_ / "cloud.csv"), ',', expected_), expected_);
+  expect_same(read_text(io::read_text_file(folder_.file("cloud.csv")), ',', expected_), expected_);
 }
 
 TEST_P(TextClouds, XyzLosesNothing) {
-  write_uneven(folder_ / "cloud.xyz", "xyz", header(), points_);
+  write_uneven(folder_.file("cloud.xyz"), "xyz", header(), points_);
   std::rotate(expected_.begin() + 3, expected_.begin() + 4, expected_.begin() + 5);
   ASSERT_EQ(expected_[3].name, "Intensity");
   expected_[0].name = "//X";
-  expect_same(read_text(io::read_text_file(folder_ / "cloud.xyz"), ' ', expected_), expected_);
+  expect_same(read_text(io::read_text_file(folder_.file("cloud.xyz")), ' ', expected_), expected_);
 }
 
 TEST(TextCloud, UnknownNumbersHaveNoSign) {
@@ -95,8 +88,8 @@ TEST(TextCloud, UnknownNumbersHaveNoSign) {
   CloudCase one = cloud_cases().at(1);
   Points points = make_points(one);
   points.incidence[0] = -std::numeric_limits<double>::quiet_NaN();
-  write_uneven(folder / "cloud.csv", "csv", one.header, points);
-  const std::string text = io::read_text_file(folder / "cloud.csv");
+  write_uneven(folder.file("cloud.csv"), "csv", one.header, points);
+  const std::string text = io::read_text_file(folder.file("cloud.csv"));
   EXPECT_NE(text.find(",nan,"), std::string::npos);
   EXPECT_EQ(text.find("-nan"), std::string::npos);
 }

@@ -25,7 +25,7 @@ class CloudWriters : public ::testing::TestWithParam<std::string> {
     }
     points_ = make_points(many_);
     options_.format = GetParam();
-    path_ = folder_ / ("cloud." + GetParam());
+    path_ = folder_.file("cloud." + GetParam());
   }
 
   TestFolder folder_;
@@ -59,9 +59,9 @@ TEST_P(CloudWriters, LeaveNothingWhenNotClosed) {
   {
     const auto writer = create_cloud(path_, many_.header, options_);
     writer->write(points_);
-    EXPECT_FALSE(folder_.empty());
+    EXPECT_FALSE(folder_.names().empty());
   }
-  EXPECT_TRUE(folder_.empty());
+  EXPECT_TRUE(folder_.names().empty());
 }
 
 TEST_P(CloudWriters, GiveTheSameBytesInWhateverPieces) {
@@ -76,7 +76,7 @@ TEST_P(CloudWriters, GiveTheSameBytesInWhateverPieces) {
 }
 
 TEST_P(CloudWriters, RefuseAFolderThatIsNotThere) {
-  EXPECT_THROW(create_cloud(folder_ / "none/cloud", many_.header, options_), FileError);
+  EXPECT_THROW(create_cloud(folder_.file("none/cloud"), many_.header, options_), FileError);
 }
 
 TEST_P(CloudWriters, SayWhenTheDiskRefuses) {
@@ -96,7 +96,7 @@ TEST_P(CloudWriters, SayWhenTheDiskRefuses) {
     }
     // HDF5 cannot close a file that must not grow even then: its fault would be at exit.
     writer.reset();
-    EXPECT_TRUE(folder_.empty()) << bytes;
+    EXPECT_TRUE(folder_.names().empty()) << bytes;
   }
 }
 

@@ -48,14 +48,7 @@ TEST(Control, IsRead) {
 
 TEST(Control, MistakesAreToldWithTheirLine) {
   const auto failure = [](const std::string& from, const std::string& to) {
-    std::string text = kText;
-    text.replace(text.find(from), from.size(), to);
-    try {
-      parse_control(text, "c.yaml");
-    } catch (const FileError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return refusal<FileError>([&] { parse_control(replaced(kText, from, to), "c.yaml"); });
   };
   EXPECT_THAT(failure("risley_control: 1\n", ""), HasSubstr("risley_control is missing"));
   EXPECT_THAT(failure("risley_control: 1", "risley_control: 2"),
@@ -69,12 +62,9 @@ TEST(Control, MistakesAreToldWithTheirLine) {
   EXPECT_THAT(failure("normal_zenith_deg: 30", "normal_zenith_deg: 80"), HasSubstr("0 to 60"));
   EXPECT_THAT(failure("name: roof", "name: yard"), HasSubstr("appears twice"));
   EXPECT_THAT(failure("name: roof", "nam: roof"), HasSubstr("nam"));
-  try {
-    parse_control("risley_control: 1\nground: []\n", "c.yaml");
-    FAIL() << "no ground at all";
-  } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("the list is empty"));
-  }
+  EXPECT_THAT(
+      refusal<FileError>([&] { parse_control("risley_control: 1\nground: []\n", "c.yaml"); }),
+      HasSubstr("the list is empty"));
 }
 
 TEST(Control, EntriesRefuseWhatMakesNoSense) {

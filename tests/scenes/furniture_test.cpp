@@ -5,15 +5,12 @@
 #include <cmath>
 #include <string>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
 #include "risley/scenes/scene.hpp"
 
 namespace risley::scenes::furniture_test {
-
-using ::testing::HasSubstr;
 
 const std::string kRoom = R"(
 planes:
@@ -76,45 +73,5 @@ TEST(Furniture, WhoDoesNotWalkStandsStill) {
   EXPECT_EQ((Person{"a", {1, 2, 0}, {3, 2, 0}, 0.0}.feet_at(7).x), 1.0);
   EXPECT_EQ((Person{"a", {1, 2, 0}, {1, 2, 0}, 2.0}.feet_at(7).x), 1.0);
 }
-
-struct Mistake {
-  const char* name;
-  const char* text;
-  std::uint64_t line;
-  const char* message;
-};
-
-class FurnitureMistake : public ::testing::TestWithParam<Mistake> {};
-
-TEST_P(FurnitureMistake, IsNamedWithItsLine) {
-  try {
-    parse_scene(GetParam().text, "scene.yaml");
-    FAIL() << "was accepted";
-  } catch (const FileError& error) {
-    EXPECT_EQ(error.place().line, GetParam().line) << error.what();
-    EXPECT_THAT(error.problem(), HasSubstr(GetParam().message));
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Schema, FurnitureMistake,
-    ::testing::Values(
-        Mistake{"BoxName", "boxes:\n  - {center_m: [1, 2, 3], size_m: [1, 1, 1]}\n", 2,
-                "boxes[0].name is missing"},
-        Mistake{"BoxSize", "boxes:\n  - {name: a, center_m: [1, 2, 3], size_m: [1, 0, 1]}\n", 2,
-                "boxes[0].size_m[1] = 0 m, allowed 0.001"},
-        Mistake{"BoxOfTwoNumbers", "boxes:\n  - {name: a, center_m: [1, 2], size_m: [1, 1, 1]}\n",
-                2, "center_m: expected a list of 3 numbers in m"},
-        Mistake{"NameOfABoxTwice",
-                "boxes:\n  - {name: a, center_m: [1, 2, 3], size_m: [1, 1, 1]}\n"
-                "people:\n  - {name: a, from_m: [1, 2, 3], to_m: [1, 1, 1], speed_m_per_s: 1}\n",
-                4, "appears twice"},
-        Mistake{"PersonSpeed", "people:\n  - {name: a, from_m: [1, 2, 3], to_m: [1, 1, 1]}\n", 2,
-                "people[0].speed_m_per_s is missing"},
-        Mistake{"PersonBackwards",
-                "people:\n  - {name: a, from_m: [1, 2, 3], to_m: [1, 1, 1], speed_m_per_s: -1}\n",
-                2, "speed_m_per_s = -1 m/s, allowed 0 to 100"},
-        Mistake{"Footprint", "planes: []\nfootprint: 9\n", 2, "footprint"}),
-    [](const auto& each) { return std::string(each.param.name); });
 
 }  // namespace risley::scenes::furniture_test

@@ -663,16 +663,7 @@ TEST(Terrain, IsReadFromASceneBesidePlanes) {
 
 TEST(Terrain, MistakesInAFileAreToldWithTheirLine) {
   const auto message = [](const std::string& from, const std::string& to) {
-    std::string text = kVillage;
-    const auto at = text.find(from);
-    if (at == std::string::npos) return std::string("the test's text has no ") + from;
-    text.replace(at, from.size(), to);
-    try {
-      parse_scene(text, "village.yaml");
-    } catch (const FileError& error) {
-      return std::to_string(error.place().line.value_or(0)) + ": " + error.problem();
-    }
-    return std::string();
+    return line_and_problem([&] { parse_scene(replaced(kVillage, from, to), "village.yaml"); });
   };
   EXPECT_THAT(message("pitch_deg: 30", "pitch: 30"),
               HasSubstr("11: unknown field terrain.roofs[0].pitch"));

@@ -29,6 +29,13 @@ TEST(Entries, NoiseAsksForSigmasAndSteps) {
   EXPECT_EQ(run({0, 0, 0, -1}), "range resolution = -1 m, allowed 0 and above");
 }
 
+TEST(Entries, NoiseAsksForColumnsOfOneLength) {
+  const ObservationNoise noise({1e-4, 0, 0, 0}, 1);
+  std::vector<double> azimuth(4), zenith(3);
+  EXPECT_EQ(refusal([&] { noise.apply_to_angles(0, azimuth, zenith); }),
+            "zenith has 3 values, expected 4");
+}
+
 TEST(Entries, RotorSettingsAskForPrisms) {
   EXPECT_EQ(refusal([] { return rotor_settings(RotorKind::hunting, 0); }),
             "number of prisms = 0, allowed 1 to 4");
@@ -108,6 +115,11 @@ TEST(Entries, ScannersAskForSettingsThatMakeARecording) {
             }),
             "start_angle = nan rad, allowed finite");
   EXPECT_EQ(run([](Settings& s) { s.station = "roof"; }), "station \"roof\" needs a scene");
+  EXPECT_EQ(run([](Settings& s) {
+              s.reported = s.truth;
+              s.reported->train = PrismTrain(parse_face_order("PA-AP-AP"));
+            }),
+            "the reported sensor has 3 prisms and 1 emitters, the true one 2 and 1");
   EXPECT_EQ(run([](Settings& s) { s.scene.emplace(); }),
             "surfaces of the scene = 0, allowed 1 or more");
 }

@@ -124,20 +124,4 @@ TEST(ObservationNoise, DependsOnTheNumberOfTheShotAlone) {
   }
 }
 
-TEST(ObservationNoise, RefusesNegativeSettings) {
-  EXPECT_THROW(ObservationNoise({-0.01, 0, 0, 0}, 0), InvalidArgument);
-  EXPECT_THROW(ObservationNoise({0, -0.01, 0, 0}, 0), InvalidArgument);
-  EXPECT_THROW(ObservationNoise({0, 0, std::nan(""), 0}, 0), InvalidArgument);
-}
-
-TEST(ObservationNoise, AsksForColumnsOfOneLength) {
-  const ObservationNoise noise({1e-4, 0, 0, 0}, 1);
-  std::vector<double> azimuth(4), zenith(3);
-  EXPECT_EQ(refusal([&] {
-              noise.apply_to_angles(0, azimuth, zenith);
-              return 0;
-            }),
-            "zenith has 3 values, expected 4");
-}
-
 }  // namespace risley::simulation::noise_test

@@ -105,8 +105,7 @@ std::shared_ptr<trajectories::Trajectory> flown(double duration, const OnEarth* 
     Eigen::Matrix3d matrix;
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
-        matrix(row, column) = static_cast<double>(
-            rotation[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)]);
+        matrix(row, column) = static_cast<double>(rotation[row][column]);
       }
     }
     flight->attitude.emplace_back(Eigen::Quaterniond(matrix).normalized());

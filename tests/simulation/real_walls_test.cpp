@@ -25,8 +25,7 @@ struct Shots {
 
   std::size_t size() const { return range.size(); }
   std::size_t returns() const {
-    return static_cast<std::size_t>(
-        std::count_if(range.begin(), range.end(), [](double r) { return r > 0.0; }));
+    return static_cast<std::size_t>(std::ranges::count_if(range, [](double r) { return r > 0.0; }));
   }
 };
 
@@ -92,7 +91,7 @@ TEST(RealWalls, RangeErrorsAreThoseOfTheSensor) {
                                           up * sensor.beam_divergence_vertical);
     const double expected = -0.004 + 0.015 * std::exp(-(r - 1.0) / 2.0) + 0.3 * depth +
                             0.01 * std::log10(100.0 / shots.intensity[i]) +
-                            sensor.range_errors.emitter[static_cast<std::size_t>(shots.emitter[i])];
+                            sensor.range_errors.emitter[shots.emitter[i]];
     ASSERT_NEAR(shots.range[i] - r, expected, 1e-8) << i;
   }
 }
@@ -164,7 +163,7 @@ TEST(RealWalls, DarkSurfacesEndBeforeBrightOnes) {
     settings.duration = 0.02;
     const Shots shots = scan(settings);
     return std::pair{static_cast<double>(shots.returns()) / static_cast<double>(shots.size()),
-                     *std::max_element(shots.intensity.begin(), shots.intensity.end())};
+                     *std::ranges::max_element(shots.intensity)};
   };
   const std::string limit = "limit_by_reflectivity: yes\n";
   // 260 m sqrt(0.1 / 0.8) = 91.9 m; at an angle a the range is d / cos a and cos a is left.
@@ -208,30 +207,6 @@ TEST(RealWalls, PeopleAreWhereTheyWalkAtTheTimeOfTheShot) {
     ASSERT_NEAR(from_middle, 1.0, 1e-9) << i;
   }
   EXPECT_GT(seen, 1000);
-}
-
-TEST(RealWalls, SameNumbersForAnyThreadCountAndAnyPieces) {
-  SimulationSettings settings = exact("avia", R"(
-planes:
-  - {name: end, distance_m: 10, normal_azimuth_deg: 0, normal_zenith_deg: 90, extent_m: [20, 10], waves: {peak_to_valley_m: 0.005, half_wave_m: 3.5}, bow_m: 0.01, patches: [{center_m: [1, 0], size_m: [1, 2], depth_m: 0.1, glass: yes}]}
-  - {name: yard, distance_m: 20, normal_azimuth_deg: 0, normal_zenith_deg: 90}
-boxes:
-  - {name: shelf, center_m: [6, -1, 0], size_m: [1, 1, 2], yaw_deg: 20}
-people:
-  - {name: walker, from_m: [5, -1, -1], to_m: [5, 1, -1], speed_m_per_s: 1.5}
-footprint: yes
-limit_by_reflectivity: yes
-)");
-  settings.truth.range_errors = {0.015, 0.3, 0.01, {}};
-  settings.range_noise = 0.02;
-  settings.threads = 1;
-  const Shots one = scan(settings);
-  for (const auto& [threads, piece] : {std::pair{2, 65536}, {1, 1000}, {2, 4097}}) {
-    settings.threads = threads;
-    const Shots other = scan(settings, static_cast<std::size_t>(piece));
-    EXPECT_EQ(one.range, other.range);
-    EXPECT_EQ(one.intensity, other.intensity);
-  }
 }
 
 }  // namespace risley::simulation::real_walls_test

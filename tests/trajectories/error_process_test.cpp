@@ -111,15 +111,7 @@ TEST(ErrorProcess, CovariancesOfManyTimesArePositive) {
 }
 
 std::string mistake(const std::string& what, const std::string& by) {
-  std::string text = kStated;
-  const std::size_t at = text.find(what);
-  EXPECT_NE(at, std::string::npos);
-  try {
-    parse_error_model(text.replace(at, what.size(), by), "errors.yaml");
-  } catch (const FileError& error) {
-    return error.what();
-  }
-  return {};
+  return refusal<FileError>([&] { parse_error_model(replaced(kStated, what, by), "errors.yaml"); });
 }
 
 TEST(ErrorModel, MistakesAreNamedWithTheirLine) {

@@ -237,16 +237,7 @@ TEST(FlightPlan, IsRead) {
 
 TEST(FlightPlan, MistakesAreToldWithTheirLine) {
   const auto message = [](const std::string& from, const std::string& to) {
-    std::string text = kText;
-    const auto at = text.find(from);
-    if (at == std::string::npos) return "the test's text has no " + from;
-    text.replace(at, from.size(), to);
-    try {
-      parse_flight_plan(text, "plan.yaml");
-    } catch (const FileError& error) {
-      return std::to_string(error.place().line.value_or(0)) + ": " + error.problem();
-    }
-    return std::string();
+    return line_and_problem([&] { parse_flight_plan(replaced(kText, from, to), "plan.yaml"); });
   };
   EXPECT_THAT(message("rate_hz", "rate"),
               AllOf(HasSubstr("6: unknown field rate"), HasSubstr("did you mean rate_hz?")));

@@ -163,8 +163,7 @@ TEST(Interpolation, NothingBeyondTheEnds) {
 /// Without records [begin, end).
 Trajectory without(Trajectory t, std::size_t begin, std::size_t end) {
   const auto cut = [&](auto& column) {
-    column.erase(column.begin() + static_cast<std::ptrdiff_t>(begin),
-                 column.begin() + static_cast<std::ptrdiff_t>(end));
+    column.erase(column.begin() + begin, column.begin() + end);
   };
   cut(t.time_ns);
   cut(t.position);

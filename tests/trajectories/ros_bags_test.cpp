@@ -24,6 +24,7 @@
 #include "bags/written_bags.hpp"
 #include "bags/written_mcap.hpp"
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 #include "trajectories/known_flight.hpp"
 
 namespace risley::trajectories::ros_bags_test {
@@ -148,12 +149,7 @@ std::string write(BagKind kind, const std::vector<TopicOfSamples>& topics) {
 
 /// What reading says is wrong, "" when nothing is.
 std::string fault(const std::string& path, const std::string& topic = {}) {
-  try {
-    require_trajectory(load_trajectory(path, {}, topic));
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
+  return refusal<Error>([&] { require_trajectory(load_trajectory(path, {}, topic)); });
 }
 
 std::string fault(BagKind kind, const std::vector<Sample>& samples, Type type = Type::odometry) {
@@ -182,8 +178,8 @@ std::vector<Sample> samples(int count) {
     const Eigen::Quaterniond q(left_up);
     const Vector3d twist = left_up.transpose() * turn * flight.velocity(t);
     for (int k = 0; k < 3; ++k) {
-      s.position[static_cast<std::size_t>(k)] = position[k];
-      s.twist[static_cast<std::size_t>(k)] = twist[k];
+      s.position[k] = position[k];
+      s.twist[k] = twist[k];
     }
     s.xyzw = {q.x(), q.y(), q.z(), q.w()};
     all.push_back(s);

@@ -25,39 +25,29 @@ Frame frame_of(const std::vector<std::uint8_t>& bytes) {
   return std::get<Frame>(decoded);
 }
 
-/// A frame that some sensor or client has sent means the command, and the command makes the frame.
-void expect_command(const char* digits, const Command& command, std::uint16_t sequence = 0) {
+/// A frame that some sensor or client has sent means the value, and the value makes the frame.
+template <class Value, class Decode>
+void expect_frame(const char* digits, const Value& value, FrameType type, std::uint16_t sequence,
+                  const Decode& decode) {
   SCOPED_TRACE(digits);
   const auto bytes = bytes_of(digits);
   const Frame frame = frame_of(bytes);
-  const auto decoded = decode_command(frame);
-  ASSERT_TRUE(std::holds_alternative<Command>(decoded)) << to_string(std::get<DataFault>(decoded));
-  EXPECT_TRUE(same(std::get<Command>(decoded), command));
-  EXPECT_EQ(frame.type, FrameType::command);
+  const auto decoded = decode(frame);
+  ASSERT_TRUE(std::holds_alternative<Value>(decoded)) << to_string(std::get<DataFault>(decoded));
+  EXPECT_TRUE(same(std::get<Value>(decoded), value));
+  EXPECT_EQ(frame.type, type);
   EXPECT_EQ(frame.sequence, sequence);
-  EXPECT_EQ(encode(command, sequence), bytes);
+  EXPECT_EQ(encode(value, sequence), bytes);
 }
 
+void expect_command(const char* digits, const Command& command, std::uint16_t sequence = 0) {
+  expect_frame(digits, command, FrameType::command, sequence, decode_command);
+}
 void expect_reply(const char* digits, const Reply& reply, std::uint16_t sequence = 0) {
-  SCOPED_TRACE(digits);
-  const auto bytes = bytes_of(digits);
-  const Frame frame = frame_of(bytes);
-  const auto decoded = decode_reply(frame);
-  ASSERT_TRUE(std::holds_alternative<Reply>(decoded)) << to_string(std::get<DataFault>(decoded));
-  EXPECT_TRUE(same(std::get<Reply>(decoded), reply));
-  EXPECT_EQ(frame.type, FrameType::reply);
-  EXPECT_EQ(encode(reply, sequence), bytes);
+  expect_frame(digits, reply, FrameType::reply, sequence, decode_reply);
 }
-
 void expect_message(const char* digits, const Message& message) {
-  SCOPED_TRACE(digits);
-  const auto bytes = bytes_of(digits);
-  const Frame frame = frame_of(bytes);
-  const auto decoded = decode_message(frame);
-  ASSERT_TRUE(std::holds_alternative<Message>(decoded)) << to_string(std::get<DataFault>(decoded));
-  EXPECT_TRUE(same(std::get<Message>(decoded), message));
-  EXPECT_EQ(frame.type, FrameType::message);
-  EXPECT_EQ(encode(message, 0), bytes);
+  expect_frame(digits, message, FrameType::message, 0, decode_message);
 }
 
 // Recorded with real sensors, or computed independently of this code.
@@ -151,7 +141,7 @@ TEST(Commands, EveryCommandGoesThereAndBack) {
   }
   std::vector<bool> met(std::variant_size_v<Command>);
   for (const Command& command : all_commands()) met[command.index()] = true;
-  EXPECT_EQ(std::count(met.begin(), met.end(), false), 0);
+  EXPECT_EQ(std::ranges::count(met, false), 0);
 }
 
 TEST(Commands, EveryReplyGoesThereAndBack) {

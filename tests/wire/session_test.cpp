@@ -58,7 +58,7 @@ class Link {
     return run(ms, [&] { return client.state() == state; });
   }
   bool met(ClientEvent::Kind kind, const std::string& text = {}) const {
-    return std::any_of(events.begin(), events.end(), [&](const ClientEvent& event) {
+    return std::ranges::any_of(events, [&](const ClientEvent& event) {
       return event.kind == kind && (text.empty() || event.text == text);
     });
   }

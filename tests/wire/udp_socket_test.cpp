@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "refusal.hpp"
+
 namespace risley::wire::socket_test {
 
 const Address kHere{{127, 0, 0, 1}}, kThere{{127, 0, 0, 77}};
@@ -68,12 +70,7 @@ TEST(UdpSocket, WhatTheKernelHasNoRoomForIsCounted) {
 TEST(UdpSocket, MessagesNameAddressAndRemedy) {
   const UdpSocket first({kHere, 0});
   const auto message = [](const Endpoint& local) {
-    try {
-      const UdpSocket second(local);
-    } catch (const NetworkError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return refusal<NetworkError>([&] { const UdpSocket second(local); });
   };
   EXPECT_NE(message(first.local())
                 .find(to_string(first.local()) + ": Address already in use: "

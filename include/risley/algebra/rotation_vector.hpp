@@ -68,4 +68,11 @@ inline Eigen::Vector3d angular_velocity_of(const Eigen::Vector3d& vector,
   return rate - first * across + second * vector.cross(across);
 }
 
+/// The matrix that multiplied by w gives the cross product v x w.
+inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+  return m;
+}
+
 }  // namespace risley::algebra

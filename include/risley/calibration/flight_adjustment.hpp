@@ -90,8 +90,8 @@ class FlightSystem {
   Eigen::MatrixXd prior_times(const Eigen::MatrixXd& columns) const;
 
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  struct ReducedEquations;
+  std::unique_ptr<ReducedEquations> reduced_;
 };
 
 /// Adds a step to a model.

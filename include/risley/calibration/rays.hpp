@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "risley/calibration/plane_points.hpp"
@@ -21,6 +23,11 @@ class Rays {
   /// The same of some rows, which count from 0 here: a block of them stays in the processor's
   /// memory.
   Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots,
+       estimation::ShotRange rows)
+      : Rays(train, geometry, shots.rotation_angle, shots.beam, rows) {}
+  /// @param rotation_angle  [prisms][shots], rad  @param emitter  [shots] or empty
+  Rays(const PrismTrain& train, const PrismGeometry& geometry,
+       std::span<const std::vector<double>> rotation_angle, std::span<const std::uint8_t> emitter,
        estimation::ShotRange rows);
 
   std::size_t size() const { return x_.size(); }

@@ -10,9 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "risley/cloud/swath_reach.hpp"
 #include "risley/core/progress.hpp"
-#include "risley/sensors/sensor.hpp"
-#include "risley/trajectories/mount.hpp"
 
 namespace risley::cloud {
 
@@ -22,17 +21,6 @@ struct StripLine {
   std::array<double, 2> begin{0, 0}, end{0, 0};  ///< x, y, m
   double height = 0;                             ///< z of the sensor, in the middle, m
 };
-
-/// How far the beams of a level platform reach from the place below it, per metre of height above
-/// ground. Negative on a side that they do not get to.
-struct SwathReach {
-  double left = 0, right = 0, ahead = 0, behind = 0;
-};
-
-/// The reach of a sensor's whole field of view on a mount.
-/// @throws InvalidArgument as require_mount, for a sensor without prisms, and where a beam points
-///         less than 10 degrees below the horizon
-SwathReach swath_reach(const sensors::Sensor& sensor, const trajectories::Mount& mount);
 
 /// What of a distribution is looked at.
 struct PointDistributionOptions {
@@ -138,8 +126,8 @@ class PointDistribution {
   PointDistributionSummary summary(std::size_t most_squares = 12'000);
 
  private:
-  class Work;
-  std::unique_ptr<Work> work_;
+  class Counts;
+  std::unique_ptr<Counts> counts_;
 };
 
 }  // namespace risley::cloud

@@ -92,8 +92,8 @@ class Scanner {
             std::size_t max_rows = recordings::kDefaultChunkRows);
 
  private:
-  class Work;
-  std::unique_ptr<Work> work_;
+  class State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace risley::simulation

@@ -57,8 +57,8 @@ class EventServer {
   EventServerCounts counts() const;  ///< so far
 
  private:
-  class Work;
-  std::unique_ptr<Work> work_;
+  class Server;
+  std::unique_ptr<Server> server_;
 };
 
 /// An address and a port to listen on: "127.0.0.1:8421"; a port alone is one of loopback.

@@ -19,15 +19,6 @@ namespace {
 
 constexpr std::size_t kBufferBytes = 1 << 20;
 
-template <class T>
-void print(fmt::memory_buffer& text, const std::uint8_t* bytes) {
-  T value = io::load<T>(bytes);
-  if constexpr (std::is_floating_point_v<T>) {
-    if (std::isnan(value)) value = std::abs(value);  // never "-nan"
-  }
-  fmt::format_to(std::back_inserter(text), FMT_COMPILE("{}"), value);
-}
-
 class TextWriter final : public CloudWriter {
  public:
   TextWriter(const std::string& path, std::vector<PointField> fields, const std::string& head,
@@ -54,17 +45,13 @@ class TextWriter final : public CloudWriter {
     for (std::size_t k = 0; k < packer_.fields().size(); ++k) {
       if (k > 0) text_.push_back(separator_);
       const std::uint8_t* number = record + packer_.offset(k);
-      switch (packer_.fields()[k].type) {
-        case FieldType::uint8:
-          print<std::uint8_t>(text_, number);
-          break;
-        case FieldType::float32:
-          print<float>(text_, number);
-          break;
-        case FieldType::float64:
-          print<double>(text_, number);
-          break;
-      }
+      with_number_type(packer_.fields()[k].type, [&]<class T>() {
+        T value = io::load<T>(number);
+        if constexpr (std::is_floating_point_v<T>) {
+          if (std::isnan(value)) value = std::abs(value);  // never "-nan"
+        }
+        fmt::format_to(std::back_inserter(text_), FMT_COMPILE("{}"), value);
+      });
     }
     text_.push_back('\n');
   }

@@ -19,24 +19,18 @@ class LasWriter final : public CloudWriter {
   LasWriter(const std::string& path, las::Layout layout)
       : layout_(std::move(layout)), output_(path) {
     const std::vector<std::uint8_t> head = layout_.head({});
-    std::copy(head.begin(), head.end(), output_.append(head.size()));
+    std::ranges::copy(head, output_.append(head.size()));
   }
 
   void write(const Points& points) override {
-    check_sound();
-    sound_ = false;  // unless all goes well
     for (std::size_t first = 0; first < points.size();) {
       const std::size_t rows = std::min(las::Layout::kBlock, points.size() - first);
       layout_.pack(points, first, rows, output_.append(rows * layout_.record_bytes()), summary_);
       first += rows;
     }
-    sound_ = true;
   }
 
   void close() override {
-    if (closed_) return;
-    check_sound();
-    sound_ = false;
     // Only the public header depends on the points; its last eight bytes may overlap those before.
     const std::vector<std::uint8_t> head = layout_.head(summary_);
     for (std::size_t at = 0; at < layout_.header_bytes(); at += 8) {
@@ -44,19 +38,12 @@ class LasWriter final : public CloudWriter {
       output_.patch_u64(offset, io::load<std::uint64_t>(head.data() + offset));
     }
     output_.commit();
-    closed_ = true;
   }
 
  private:
-  void check_sound() const {
-    if (sound_) return;
-    throw FileError(output_.path(), {}, "is incomplete: points given before could not be written");
-  }
-
   las::Layout layout_;
   las::Summary summary_;
   io::BlockOutput output_;
-  bool sound_ = true, closed_ = false;
 };
 
 }  // namespace

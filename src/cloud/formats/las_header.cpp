@@ -41,8 +41,8 @@ std::uint8_t* put_text(std::uint8_t* out, std::string_view text, std::size_t len
 
 /// What header fields may hold: printable ASCII.
 std::string plain(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
   return text;
 }
 
@@ -77,7 +77,7 @@ VariableLengthRecord coordinate_system(const CloudHeader& header) {
         "UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH],AXIS[\"Z\",UP]]";
   } else if (text.empty()) {
     std::string name = plain(header.sensor.empty() ? "sensor" : header.sensor + " sensor");
-    std::replace(name.begin(), name.end(), '"', '\'');
+    std::ranges::replace(name, '"', '\'');
     text = fmt::format(
         "LOCAL_CS[\"{} frame\",LOCAL_DATUM[\"sensor origin\",32767],UNIT[\"metre\",1],"
         "AXIS[\"X (forward)\",OTHER],AXIS[\"Y (left)\",OTHER],AXIS[\"Z (up)\",UP]]",

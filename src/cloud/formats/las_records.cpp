@@ -56,8 +56,8 @@ void Layout::pack_coordinates(const Points& points, std::size_t first, std::size
     std::array<double, Batch::size> lows, highs;
     low.store_unaligned(lows.data());
     high.store_unaligned(highs.data());
-    double least = *std::min_element(lows.begin(), lows.end());
-    double greatest = *std::max_element(highs.begin(), highs.end());
+    double least = *std::ranges::min_element(lows);
+    double greatest = *std::ranges::max_element(highs);
     for (std::size_t i = whole; i < rows; ++i) {
       const double steps = (from[i] - offset) / scale_;
       all_inside = all_inside && std::fabs(steps) <= kMaxSteps;

@@ -54,8 +54,6 @@ class LazWriter final : public CloudWriter {
   LazWriter& operator=(const LazWriter&) = delete;
 
   void write(const Points& points) override {
-    check_sound();
-    sound_ = false;  // unless all goes well
     for (std::size_t first = 0; first < points.size();) {
       const std::size_t rows = std::min(las::Layout::kBlock, points.size() - first);
       layout_.pack(points, first, rows, block_.data(), summary_);
@@ -63,13 +61,9 @@ class LazWriter final : public CloudWriter {
       first += rows;
     }
     if (!stream_) fail_to_write();
-    sound_ = true;
   }
 
   void close() override {
-    if (!open_) return;
-    check_sound();
-    sound_ = false;
     open_ = false;
     check(laszip_close_writer(laszip_));
     write_summary();
@@ -176,11 +170,6 @@ class LazWriter final : public CloudWriter {
                     fmt::format("cannot be written: LASzip: {}", known ? problem : "no message"));
   }
 
-  void check_sound() const {
-    if (sound_) return;
-    throw FileError(output_.path(), {}, "is incomplete: points given before could not be written");
-  }
-
   [[noreturn]] void fail_to_write() const {
     throw FileError(output_.path(), {}, fmt::format("cannot be written: {}", std::strerror(errno)));
   }
@@ -193,7 +182,6 @@ class LazWriter final : public CloudWriter {
   laszip_POINTER laszip_ = nullptr;
   laszip_point_struct* point_ = nullptr;
   bool open_ = false;  ///< LASzip's writer
-  bool sound_ = true;
 };
 
 }  // namespace

@@ -34,6 +34,7 @@ constexpr std::array<CovarianceTerm, 3> kVariances{kXX, kYY, kZZ};
 /// What a variable is called and what it means.
 struct Description {
   std::string name, units, long_name;
+  bool coordinate = false;  ///< otherwise an attribute leads to the coordinates
 };
 
 class NetcdfWriter final : public CloudWriter {
@@ -87,24 +88,43 @@ class NetcdfWriter final : public CloudWriter {
     file_.put_text("time_reference", recordings::to_string(header.time_reference));
   }
 
-  /// @param value  of one entry: value(points, point, column), column in [0, width)
-  /// @param inner  dimension of the columns, if there are several
-  template <class T, class Value>
-  tables::NetcdfVariable define(const Description& what, Value value,
+  /// A variable with the numbers of a column, or of one for each entry of an inner dimension.
+  /// @param column  column(points, k), k in [0, width)
+  template <class T, class Column>
+  tables::NetcdfVariable define(const Description& what, Column column, double scale = 1,
                                 const tables::NetcdfDimension* inner = nullptr) {
+    const auto value = [scale](auto number) {
+      if constexpr (std::is_floating_point_v<T>) {
+        return static_cast<T>(scale * static_cast<double>(number));
+      } else {
+        return static_cast<T>(number);
+      }
+    };
+    return define_values<T>(
+        what,
+        [=](const Points& points, std::size_t i, std::size_t k) {
+          return value(column(points, k)[i]);
+        },
+        inner);
+  }
+
+  /// @param value  of one entry: value(points, point, k)
+  template <class T, class Value>
+  tables::NetcdfVariable define_values(const Description& what, Value value,
+                                       const tables::NetcdfDimension* inner = nullptr) {
     const tables::NetcdfStorage storage{kChunkRows, true, false};
     auto variable = inner == nullptr ? file_.define<T>(what.name, {&point_}, storage)
                                      : file_.define<T>(what.name, {&point_, inner}, storage);
     file_.put_text(variable, "units", what.units);
     file_.put_text(variable, "long_name", what.long_name);
+    if (!what.coordinate) file_.put_text(variable, "coordinates", "time x_m y_m z_m");
     const std::size_t width = variable.width;
     auto block = std::make_shared<std::vector<T>>(kChunkRows * width);
     variables_.push_back({[block, value, width](const Points& points, std::size_t first,
                                                 std::size_t count, std::size_t row) {
                             T* to = block->data() + row * width;
                             for (std::size_t i = first; i < first + count; ++i) {
-                              for (std::size_t k = 0; k < width; ++k)
-                                *to++ = static_cast<T>(value(points, i, k));
+                              for (std::size_t k = 0; k < width; ++k) *to++ = value(points, i, k);
                             }
                           },
                           [this, block, variable](std::size_t first, std::size_t rows) {
@@ -114,48 +134,33 @@ class NetcdfWriter final : public CloudWriter {
     return variable;
   }
 
-  /// As define, with the attribute that leads to the coordinates.
-  template <class T, class Value>
-  tables::NetcdfVariable define_data(const Description& what, Value value,
-                                     const tables::NetcdfDimension* inner = nullptr) {
-    auto variable = define<T>(what, value, inner);
-    file_.put_text(variable, "coordinates", "time x_m y_m z_m");
-    return variable;
-  }
-
   void define_sensor_variables(const CloudHeader& header) {
     const bool utc = header.time_reference == recordings::TimeReference::utc;
-    const auto time_ns = [](const Points& p, std::size_t i, std::size_t) { return p.time_ns[i]; };
+    const auto time_ns = [](const Points& p, auto) -> auto& { return p.time_ns; };
     const auto time = define<double>({"time", utc ? "seconds since 1970-01-01 00:00:00" : "s",
-                                      "time of the shot, as in the recording"},
-                                     [](const Points& p, std::size_t i, std::size_t) {
-                                       return 1e-9 * static_cast<double>(p.time_ns[i]);
-                                     });
+                                      "time of the shot, as in the recording", true},
+                                     time_ns, 1e-9);
     file_.put_text(time, "axis", "T");
     if (utc) {
       file_.put_text(time, "standard_name", "time");
       file_.put_text(time, "calendar", "standard");
     }
-    const auto coordinate = [this, &header](const char* name, const char* axis, const char* meaning,
-                                            std::vector<double> Points::*column) {
+    const std::vector<double> Points::*const places[] = {&Points::x, &Points::y, &Points::z};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::string name = fmt::format("{}_m", kAxes[k]);
       const auto variable = define<double>(
-          {name, "m", meaning},
-          [column](const Points& p, std::size_t i, std::size_t) { return (p.*column)[i]; });
-      file_.put_text(variable, "axis", axis);
+          {name, "m", header.frame.axes[k], true},
+          [column = places[k]](const Points& p, auto) -> auto& { return p.*column; });
+      file_.put_text(variable, "axis", std::string(1, "XYZ"[k]));
       if (header.has_covariance) {
-        file_.put_text(variable, "ancillary_variables", fmt::format("std_{}", name));
+        file_.put_text(variable, "ancillary_variables", "std_" + name);
       }
-    };
-    const auto& axes = header.frame.axes;
-    coordinate("x_m", "X", axes[0].c_str(), &Points::x);
-    coordinate("y_m", "Y", axes[1].c_str(), &Points::y);
-    coordinate("z_m", "Z", axes[2].c_str(), &Points::z);
-    define_data<std::int64_t>({"time_ns", "ns", "time without rounding"}, time_ns);
+    }
+    define<std::int64_t>({"time_ns", "ns", "time without rounding"}, time_ns);
     const auto byte = [this](const char* name, const char* meaning,
                              std::vector<std::uint8_t> Points::*column) {
-      define_data<std::uint8_t>(
-          {name, "1", meaning},
-          [column](const Points& p, std::size_t i, std::size_t) { return (p.*column)[i]; });
+      define<std::uint8_t>(
+          {name, "1", meaning}, [column](const Points& p, auto) -> auto& { return p.*column; });
     };
     byte("intensity", "intensity as the sensor reports it", &Points::intensity);
     byte("return_number", "number of the return within its shot, from 1", &Points::return_number);
@@ -163,35 +168,33 @@ class NetcdfWriter final : public CloudWriter {
     byte("tag", "tag byte of the sensor", &Points::tag);
     byte("beam", "firing beam, from 0", &Points::beam);
     if (!header.has_point_source) return;
-    define_data<std::int32_t>(
+    define<std::int32_t>(
         {"strip", "1", "strip of the flight, from 1; 0: of none"},
-        [](const Points& p, std::size_t i, std::size_t) { return p.point_source[i]; });
+        [](const Points& p, auto) -> auto& { return p.point_source; });
   }
 
   void define_covariance(const CloudHeader& header) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      define_data<float>({fmt::format("std_{}_m", kAxes[axis]), "m",
-                          fmt::format("standard deviation of {}_m", kAxes[axis])},
-                         [term = kVariances[axis]](const Points& p, std::size_t i, std::size_t) {
-                           return std::sqrt(p.covariance[term][i]);
-                         });
+      define_values<float>({fmt::format("std_{}_m", kAxes[axis]), "m",
+                            fmt::format("standard deviation of {}_m", kAxes[axis])},
+                           [term = kVariances[axis]](const Points& p, std::size_t i, auto) {
+                             return static_cast<float>(std::sqrt(p.covariance[term][i]));
+                           });
     }
     for (std::size_t term = 0; term < kCovarianceTerms; ++term) {
       const char* name = kTermNames[term];
-      define_data<float>(
+      define<float>(
           {fmt::format("covariance_{}_m2", name), "m2",
            fmt::format("covariance of {}_m and {}_m", name[0], name[1])},
-          [term](const Points& p, std::size_t i, std::size_t) { return p.covariance[term][i]; });
+          [term](const Points& p, auto) -> auto& { return p.covariance[term]; });
     }
     if (!header.has_own_covariance) return;
     for (std::size_t term = 0; term < kCovarianceTerms; ++term) {
       const char* name = kTermNames[term];
-      define_data<float>(
+      define<float>(
           {fmt::format("own_covariance_{}_m2", name), "m2",
            fmt::format("part of covariance_{}_m2 that the point shares with no other", name)},
-          [term](const Points& p, std::size_t i, std::size_t) {
-            return p.own_covariance[term][i];
-          });
+          [term](const Points& p, auto) -> auto& { return p.own_covariance[term]; });
     }
   }
 
@@ -241,31 +244,26 @@ class NetcdfWriter final : public CloudWriter {
   }
 
   void define_geometry(const CloudHeader& header) {
-    define_data<float>({"range_m", "m", "range from where the beam leaves the sensor"},
-                       [](const Points& p, std::size_t i, std::size_t) { return p.range[i]; });
-    const auto incidence = define_data<float>(
+    define<float>(
+        {"range_m", "m", "range from where the beam leaves the sensor"},
+        [](const Points& p, auto) -> auto& { return p.range; });
+    const auto incidence = define<float>(
         {"incidence_angle_deg", "degree", "angle between beam and surface normal"},
-        [](const Points& p, std::size_t i, std::size_t) {
-          return degrees_from_radians(p.incidence[i]);
-        });
+        [](const Points& p, auto) -> auto& { return p.incidence; }, kDegreesPerRadian);
     file_.set_fill(incidence, std::numeric_limits<float>::quiet_NaN());  // unknown
     if (!header.has_rotation_angles) return;
     for (int k = 0; k < header.prisms; ++k) {
-      define_data<float>(
+      define<float>(
           {fmt::format("rotation_angle_{}_deg", prism_letter(k)), "degree",
            fmt::format("rotation angle of prism {}", prism_capital(k))},
-          [k](const Points& p, std::size_t i, std::size_t) {
-            return degrees_from_radians(p.rotation_angle[static_cast<std::size_t>(k)][i]);
-          });
+          [k](const Points& p, auto) -> auto& { return p.rotation_angle[k]; }, kDegreesPerRadian);
     }
-    define_data<float>({"azimuth_residual_deg", "degree", "reported minus smoothed azimuth"},
-                       [](const Points& p, std::size_t i, std::size_t) {
-                         return degrees_from_radians(p.azimuth_residual[i]);
-                       });
-    define_data<float>({"zenith_residual_deg", "degree", "reported minus smoothed zenith angle"},
-                       [](const Points& p, std::size_t i, std::size_t) {
-                         return degrees_from_radians(p.zenith_residual[i]);
-                       });
+    define<float>(
+        {"azimuth_residual_deg", "degree", "reported minus smoothed azimuth"},
+        [](const Points& p, auto) -> auto& { return p.azimuth_residual; }, kDegreesPerRadian);
+    define<float>(
+        {"zenith_residual_deg", "degree", "reported minus smoothed zenith angle"},
+        [](const Points& p, auto) -> auto& { return p.zenith_residual; }, kDegreesPerRadian);
   }
 
   void define_loadings(const std::vector<std::string>& factors) {
@@ -274,10 +272,10 @@ class NetcdfWriter final : public CloudWriter {
     file_.define_texts("factor_name", factor,
                        "common factor, one standard deviation of which the loadings tell", factors);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      define_data<float>(
+      define<float>(
           {fmt::format("loading_{}_m", kAxes[axis]), "m",
            fmt::format("change of {}_m by one standard deviation of a common factor", kAxes[axis])},
-          [axis](const Points& p, std::size_t i, std::size_t k) { return p.loading[k][axis][i]; },
+          [axis](const Points& p, std::size_t k) -> auto& { return p.loading[k][axis]; }, 1,
           &factor);
     }
   }

@@ -11,25 +11,13 @@
 namespace risley::cloud {
 namespace {
 
-const char* npy_type(FieldType type) {
-  switch (type) {
-    case FieldType::uint8:
-      return "|u1";
-    case FieldType::float32:
-      return "<f4";
-    case FieldType::float64:
-      return "<f8";
-  }
-  return "";
-}
-
 std::unique_ptr<CloudWriter> create_npy(const std::string& path, const CloudHeader& header,
                                         const CloudWriterOptions&) {
   std::vector<PointField> fields = all_fields(header);
   std::string types;
   for (const PointField& field : fields) {
-    types +=
-        fmt::format("{}('{}', '{}')", types.empty() ? "" : ", ", field.name, npy_type(field.type));
+    types += fmt::format("{}('{}', '{}')", types.empty() ? "" : ", ", field.name,
+                         names_of(field.type).npy);
   }
   return std::make_unique<RecordFile>(path, std::move(fields), [types](std::uint64_t points) {
     return io::npy_head(fmt::format("{{'descr': [{}], 'fortran_order': False, 'shape': ({},), }}{}",

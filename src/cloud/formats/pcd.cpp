@@ -19,8 +19,8 @@ std::unique_ptr<CloudWriter> create_pcd(const std::string& path, const CloudHead
   }
   for (const PointField& field : fields) {
     names += fmt::format(" {}", field.name);
-    sizes += fmt::format(" {}", bytes_of(field.type));
-    types += field.type == FieldType::uint8 ? " U" : " F";
+    sizes += fmt::format(" {}", names_of(field.type).bytes);
+    types += fmt::format(" {}", names_of(field.type).pcd);
     counts += " 1";
   }
   const auto text = [notes, names, sizes, types, counts](std::uint64_t points) {

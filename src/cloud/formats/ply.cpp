@@ -10,18 +10,6 @@
 namespace risley::cloud {
 namespace {
 
-const char* ply_type(FieldType type) {
-  switch (type) {
-    case FieldType::uint8:
-      return "uchar";
-    case FieldType::float32:
-      return "float";
-    case FieldType::float64:
-      return "double";
-  }
-  return "";
-}
-
 std::vector<PointField> ply_fields(const CloudHeader& header) {
   std::vector<PointField> fields = all_fields(header);
   for (PointField& field : fields) {
@@ -40,7 +28,7 @@ std::unique_ptr<CloudWriter> create_ply(const std::string& path, const CloudHead
     notes += fmt::format("comment {}\n", note);
   }
   for (const PointField& field : fields) {
-    properties += fmt::format("property {} {}\n", ply_type(field.type), field.name);
+    properties += fmt::format("property {} {}\n", names_of(field.type).ply, field.name);
   }
   const auto text = [notes, properties](std::uint64_t points) {
     return fmt::format(

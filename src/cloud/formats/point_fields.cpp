@@ -19,22 +19,15 @@ namespace {
 template <class Column>
 PointField scaled(std::string name, std::string unit, std::string description, FieldType type,
                   Column column, double scale = 1.0) {
-  PointField field{std::move(name), std::move(unit), std::move(description), type, {}, {}};
-  field.values = [column, scale](const Points& points, std::span<double> values) {
-    const auto* from = column(points).data();
+  const auto fill = [column, scale](const Points& points, std::size_t first, auto values) {
+    const auto* from = column(points).data() + first;
     for (std::size_t i = 0; i < values.size(); ++i) {
-      values[i] = scale * static_cast<double>(from[i]);
+      const double value = scale * static_cast<double>(from[i]);
+      values[i] = static_cast<std::remove_reference_t<decltype(values[i])>>(value);
     }
   };
-  if (type == FieldType::float32) {
-    field.floats = [column, scale](const Points& points, std::size_t first,
-                                   std::span<float> values) {
-      const auto* from = column(points).data() + first;
-      for (std::size_t i = 0; i < values.size(); ++i) {
-        values[i] = static_cast<float>(scale * static_cast<double>(from[i]));
-      }
-    };
-  }
+  PointField field{std::move(name), std::move(unit), std::move(description), type, fill};
+  if (type == FieldType::float32) field.floats = fill;
   return field;
 }
 
@@ -53,39 +46,19 @@ void square_roots(const double* from, std::span<Number> to) {
 }
 
 PointField standard_deviation(const char* axis, CovarianceTerm term) {
-  PointField field{fmt::format("Std{}", axis), "m", fmt::format("1 sigma of {} (m)", axis),
-                   FieldType::float32,         {},  {}};
-  field.values = [term](const Points& points, std::span<double> values) {
-    square_roots(points.covariance[term].data(), values);
-  };
-  field.floats = [term](const Points& points, std::size_t first, std::span<float> values) {
+  const auto fill = [term](const Points& points, std::size_t first, auto values) {
     square_roots(points.covariance[term].data() + first, values);
   };
-  return field;
-}
-
-constexpr double kDegrees = 1.0 / kRadiansPerDegree;
-
-template <class T>
-void put(std::span<const double> values, std::uint8_t* out, std::size_t stride) {
-  for (const double value : values) {
-    io::store<T>(out, static_cast<T>(value));
-    out += stride;
-  }
+  return {fmt::format("Std{}", axis), "m",  fmt::format("1 sigma of {} (m)", axis),
+          FieldType::float32,         fill, fill};
 }
 
 }  // namespace
 
-std::size_t bytes_of(FieldType type) {
-  switch (type) {
-    case FieldType::uint8:
-      return 1;
-    case FieldType::float32:
-      return 4;
-    case FieldType::float64:
-      return 8;
-  }
-  return 0;
+const TypeNames& names_of(FieldType type) {
+  static constexpr TypeNames kNames[] = {
+      {1, "|u1", "uchar", 'U', 2}, {4, "<f4", "float", 'F', 7}, {8, "<f8", "double", 'F', 8}};
+  return kNames[static_cast<int>(type)];
 }
 
 std::vector<PointField> coordinate_fields(const CloudHeader& header) {
@@ -162,20 +135,20 @@ std::vector<PointField> uncertainty_fields(const CloudHeader& header) {
       [](const Points& p) -> auto& { return p.range; });
   add(
       "IncidenceAngle", "degrees", "beam to surface normal (deg)",
-      [](const Points& p) -> auto& { return p.incidence; }, kDegrees);
+      [](const Points& p) -> auto& { return p.incidence; }, kDegreesPerRadian);
   if (header.has_rotation_angles) {
     for (std::size_t k = 0; k < static_cast<std::size_t>(header.prisms); ++k) {
       add(
           fmt::format("PrismAngle{}", k + 1), "degrees",
           "rotation angle (deg)", [k](const Points& p) -> auto& { return p.rotation_angle[k]; },
-          kDegrees);
+          kDegreesPerRadian);
     }
     add(
         "ResidualAzimuth", "degrees", "reported - smoothed (deg)",
-        [](const Points& p) -> auto& { return p.azimuth_residual; }, kDegrees);
+        [](const Points& p) -> auto& { return p.azimuth_residual; }, kDegreesPerRadian);
     add(
         "ResidualZenith", "degrees", "reported - smoothed (deg)",
-        [](const Points& p) -> auto& { return p.zenith_residual; }, kDegrees);
+        [](const Points& p) -> auto& { return p.zenith_residual; }, kDegreesPerRadian);
   }
   return fields;
 }
@@ -205,7 +178,7 @@ std::vector<PointField> all_fields(const CloudHeader& header) {
 RecordPacker::RecordPacker(std::vector<PointField> fields) : fields_(std::move(fields)) {
   for (const PointField& field : fields_) {
     offsets_.push_back(record_bytes_);
-    record_bytes_ += bytes_of(field.type);
+    record_bytes_ += names_of(field.type).bytes;
   }
 }
 
@@ -213,19 +186,14 @@ void RecordPacker::pack(const Points& points, std::uint8_t* out, std::size_t str
   if (points.size() == 0) return;
   values_.resize(points.size());
   for (std::size_t k = 0; k < fields_.size(); ++k) {
-    fields_[k].values(points, values_);
-    std::uint8_t* first = out + offsets_[k];
-    switch (fields_[k].type) {
-      case FieldType::uint8:
-        put<std::uint8_t>(values_, first, stride);
-        break;
-      case FieldType::float32:
-        put<float>(values_, first, stride);
-        break;
-      case FieldType::float64:
-        put<double>(values_, first, stride);
-        break;
-    }
+    fields_[k].values(points, 0, values_);
+    with_number_type(fields_[k].type, [&]<class T>() {
+      std::uint8_t* to = out + offsets_[k];
+      for (const double value : values_) {
+        io::store<T>(to, static_cast<T>(value));
+        to += stride;
+      }
+    });
   }
 }
 

@@ -16,8 +16,22 @@ namespace risley::cloud {
 /// How a field's numbers stand in a file.
 enum class FieldType : std::uint8_t { uint8, float32, float64 };
 
-/// Bytes of one number.
-std::size_t bytes_of(FieldType type);
+/// What formats call a type.
+struct TypeNames {
+  std::size_t bytes;
+  const char *npy, *ply;
+  char pcd;
+  std::uint8_t ros;  ///< PointField::datatype
+};
+const TypeNames& names_of(FieldType type);
+
+/// Calls function.operator()<T>() with the type of the numbers.
+template <class Function>
+void with_number_type(FieldType type, const Function& function) {
+  if (type == FieldType::uint8) function.template operator()<std::uint8_t>();
+  if (type == FieldType::float32) function.template operator()<float>();
+  if (type == FieldType::float64) function.template operator()<double>();
+}
 
 /// One number per point as files hold it.
 struct PointField {
@@ -25,10 +39,9 @@ struct PointField {
   std::string unit;         ///< "m", "m2", "degrees", "s"; empty without one
   std::string description;  ///< at most 31 characters, which is what LAS has room for
   FieldType type = FieldType::float32;
-  /// Fills a column with the values of all points, in the field's unit.
-  std::function<void(const Points& points, std::span<double> values)> values;
-  /// The same numbers of the points from `first` on, as float32, for writers that go through the
-  /// points in blocks. The float32 fields made below have it.
+  /// Fills a column with the values of the points from `first` on, in the field's unit.
+  std::function<void(const Points& points, std::size_t first, std::span<double> values)> values;
+  /// The same as float32, which the float32 fields made below have.
   std::function<void(const Points& points, std::size_t first, std::span<float> values)> floats = {};
 };
 

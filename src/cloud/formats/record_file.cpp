@@ -118,8 +118,8 @@ std::vector<PointField> pcl_fields(const CloudHeader& header) {
   }
   std::vector<PointField> fields = all_fields(header);
   const auto rename = [&fields](std::string_view from, std::string_view to, FieldType type) {
-    const auto field = std::find_if(fields.begin(), fields.end(),
-                                    [from](const PointField& one) { return one.name == from; });
+    const auto field =
+        std::ranges::find_if(fields, [from](const PointField& one) { return one.name == from; });
     field->name = to;
     field->type = type;
   };

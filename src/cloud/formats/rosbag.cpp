@@ -70,18 +70,6 @@ uint8 datatype
 uint32 count
 )";
 
-std::uint8_t datatype_of(FieldType type) {
-  switch (type) {
-    case FieldType::uint8:
-      return 2;
-    case FieldType::float32:
-      return 7;
-    case FieldType::float64:
-      return 8;
-  }
-  return 0;
-}
-
 /// A message as it stands in the bag, in two parts.
 struct PointCloudMessage {
   std::vector<std::uint8_t> head;    ///< all before the points
@@ -163,17 +151,14 @@ class RosbagWriter final : public CloudWriter {
   }
 
   void write(const Points& points) override {
-    require_usable();
-    failed_ = true;  // unless all goes well
     const std::size_t step = point_bytes();
     records_.resize(points.size() * step);
     packer_.pack(points, records_.data(), step);
     const std::size_t most = std::max<std::size_t>(kMessageBytes / step, 1) * step;
     std::size_t first = 0;  // of those not in message_ yet
     const auto take = [&](std::size_t end) {
-      message_.points.insert(message_.points.end(),
-                             records_.begin() + static_cast<std::ptrdiff_t>(first * step),
-                             records_.begin() + static_cast<std::ptrdiff_t>(end * step));
+      message_.points.insert(message_.points.end(), records_.begin() + (first * step),
+                             records_.begin() + (end * step));
       first = end;
     };
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -191,11 +176,9 @@ class RosbagWriter final : public CloudWriter {
     }
     take(points.size());
     points_ += points.size();
-    failed_ = false;
   }
 
   void close() override {
-    require_usable();
     put_message();
     call([this] { bag_->close(); });
     output_.commit();
@@ -226,11 +209,6 @@ class RosbagWriter final : public CloudWriter {
                     -static_cast<double>(*shift_) / static_cast<double>(kNanoseconds)));
   }
 
-  void require_usable() const {
-    if (!bag_ || failed_)
-      throw FileError(output_.path(), {}, "cannot be written: it failed before");
-  }
-
   void put_message() {
     if (!begin_) return;
     const auto bytes = static_cast<std::uint32_t>(message_.points.size());
@@ -249,7 +227,7 @@ class RosbagWriter final : public CloudWriter {
     for (std::size_t k = 0; k < packer_.fields().size(); ++k) {
       message_.add(packer_.fields()[k].name);
       message_.add(static_cast<std::uint32_t>(packer_.offset(k)));
-      message_.add(datatype_of(packer_.fields()[k].type));
+      message_.add(names_of(packer_.fields()[k].type).ros);
       message_.add(std::uint32_t{1});
     }
     message_.add(kOffsetField);
@@ -287,7 +265,6 @@ class RosbagWriter final : public CloudWriter {
   PointCloudMessage message_;
   std::optional<std::int64_t> begin_;   ///< time of the first point of message_, ns
   std::optional<std::uint64_t> shift_;  ///< from the recording's clock to the bag's, ns
-  bool failed_ = false;
   std::uint64_t points_ = 0;
   std::uint32_t messages_ = 0;
 };

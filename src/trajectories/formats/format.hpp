@@ -2,13 +2,17 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/io/little_endian.hpp"
+#include "risley/io/text_table.hpp"
 #include "risley/trajectories/trajectory.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
@@ -44,7 +48,6 @@ extern const Format kOpenmmsFormat;           // openmms.cpp
 extern const Format kNamedCsvFormat;          // named_csv.cpp
 extern const Format kTumFormat;               // tum.cpp
 extern const Format kRtklibFormat;            // rtklib.cpp
-extern const Format kKittiFormat;             // kitti.cpp
 extern const Format kRosBagFormat;            // ros_bag.cpp
 
 bool is_smrmsg(const FileHead& head);  // smrmsg.cpp
@@ -52,5 +55,28 @@ bool is_smrmsg(const FileHead& head);  // smrmsg.cpp
 /// The lines of a text's beginning that are whole, without carriage returns; none where it is no
 /// text.
 std::vector<std::string_view> lines_of(std::string_view head);
+
+/// The numbers of a line of text; nothing where it has another number of fields, or one that is no
+/// number.
+template <std::size_t N>
+std::optional<std::array<double, N>> numbers_in(std::string_view line, char delimiter) {
+  std::array<std::string_view, N> fields;
+  std::array<double, N> numbers{};
+  if (io::split_fields(line, delimiter, fields) != N) return std::nullopt;
+  try {
+    for (std::size_t i = 0; i < N; ++i) numbers[i] = io::decimal_field(fields[i], "").value;
+  } catch (const io::BadRow&) {
+    return std::nullopt;
+  }
+  return numbers;
+}
+
+/// The numbers of a binary record.
+template <std::size_t N>
+std::array<double, N> numbers_of(const std::uint8_t* record) {
+  std::array<double, N> numbers;
+  for (std::size_t i = 0; i < N; ++i) numbers[i] = io::load<double>(record + 8 * i);
+  return numbers;
+}
 
 }  // namespace risley::trajectories

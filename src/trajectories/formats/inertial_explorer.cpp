@@ -21,36 +21,31 @@
 namespace risley::trajectories {
 namespace {
 
-struct ExplorerName {
-  std::string_view name;  ///< in lower case
-  PoseField field;
-  double sign = 1;
-};
-
-constexpr std::array kExplorerNames{
-    ExplorerName{"week", PoseField::gps_week},
-    ExplorerName{"gpsweek", PoseField::gps_week},
-    ExplorerName{"date", PoseField::date},
-    ExplorerName{"gpsdate", PoseField::date},
-    ExplorerName{"gpstime", PoseField::time},
-    ExplorerName{"corrtime", PoseField::time},
-    ExplorerName{"latitude", PoseField::latitude},
-    ExplorerName{"longitude", PoseField::longitude},
-    ExplorerName{"h-ell", PoseField::height},
-    ExplorerName{"roll", PoseField::roll},
-    ExplorerName{"pitch", PoseField::pitch},
-    ExplorerName{"heading", PoseField::heading},
-    ExplorerName{"veast", PoseField::velocity_1},
-    ExplorerName{"vnorth", PoseField::velocity_2},
-    ExplorerName{"vup", PoseField::velocity_3},
-    ExplorerName{"sdnorth", PoseField::sigma_north},
-    ExplorerName{"sdeast", PoseField::sigma_east},
-    ExplorerName{"sdheight", PoseField::sigma_down},
-    ExplorerName{"sdup", PoseField::sigma_down},
-    ExplorerName{"rollsd", PoseField::sigma_roll},
-    ExplorerName{"pitchsd", PoseField::sigma_pitch},
-    ExplorerName{"hdngsd", PoseField::sigma_heading},
-    ExplorerName{"headingsd", PoseField::sigma_heading},
+/// In lower case.
+constexpr FieldName kExplorerNames[] = {
+    {"week", PoseField::gps_week},
+    {"gpsweek", PoseField::gps_week},
+    {"date", PoseField::date},
+    {"gpsdate", PoseField::date},
+    {"gpstime", PoseField::time},
+    {"corrtime", PoseField::time},
+    {"latitude", PoseField::latitude},
+    {"longitude", PoseField::longitude},
+    {"h-ell", PoseField::height},
+    {"roll", PoseField::roll},
+    {"pitch", PoseField::pitch},
+    {"heading", PoseField::heading},
+    {"veast", PoseField::velocity_1},
+    {"vnorth", PoseField::velocity_2},
+    {"vup", PoseField::velocity_3},
+    {"sdnorth", PoseField::sigma_north},
+    {"sdeast", PoseField::sigma_east},
+    {"sdheight", PoseField::sigma_down},
+    {"sdup", PoseField::sigma_down},
+    {"rollsd", PoseField::sigma_roll},
+    {"pitchsd", PoseField::sigma_pitch},
+    {"hdngsd", PoseField::sigma_heading},
+    {"headingsd", PoseField::sigma_heading},
 };
 
 constexpr std::size_t kLongestHeader = 200;  // lines
@@ -111,7 +106,7 @@ std::vector<std::string> units_of(std::string_view names_line, std::string_view 
 }
 
 bool has_word(const std::vector<std::string>& words, std::string_view word) {
-  return std::find(words.begin(), words.end(), word) != words.end();
+  return std::ranges::find(words, word) != words.end();
 }
 
 /// Whether these are the lines of names and of units.
@@ -199,70 +194,63 @@ ExplorerHeader read_explorer_header(const std::string& path) {
       "Explorer with GPSTime, Latitude, Longitude, H-Ell, Roll, Pitch and Heading");
 }
 
+/// A unit that columns may have, and what it makes of them.
+struct ExplorerUnit {
+  std::string_view written;  ///< in lower case
+  double scale = 1;
+  bool sexagesimal = false;
+  DateOrder date_order = DateOrder::ymd;
+};
+
+constexpr ExplorerUnit kDates[] = {{""},
+                                   {"(ymd)"},
+                                   {"(y/m/d)"},
+                                   {"(mdy)", 1, false, DateOrder::mdy},
+                                   {"(m/d/y)", 1, false, DateOrder::mdy},
+                                   {"(dmy)", 1, false, DateOrder::dmy},
+                                   {"(d/m/y)", 1, false, DateOrder::dmy}};
+constexpr ExplorerUnit kSeconds[] = {{""}, {"(sec)"}, {"(s)"}};
+constexpr ExplorerUnit kAngles[] = {{"(deg)", kRadiansPerDegree},
+                                    {"(degrees)", kRadiansPerDegree},
+                                    {"(+/-deg)", kRadiansPerDegree},
+                                    {"(+/-d m s)", kRadiansPerDegree, true},
+                                    {"(d m s)", kRadiansPerDegree, true},
+                                    {"(deg min sec)", kRadiansPerDegree, true},
+                                    {"(rad)"},
+                                    {"(radians)"},
+                                    {"(arcmin)", kRadiansPerDegree / 60},
+                                    {"(arcsec)", kRadiansPerDegree / 3600}};
+constexpr ExplorerUnit kMetres[] = {{"(m)"}};
+constexpr ExplorerUnit kSpeeds[] = {{"(m/s)"}};
+
+/// The units of a field, and which to name where it has another one.
+std::pair<std::span<const ExplorerUnit>, const char*> units_for(PoseField field) {
+  if (is_angle(field) || is_angle_sigma(field)) return {kAngles, "(deg) or (+/-D M S)"};
+  if (field == PoseField::date) return {kDates, "(YMD), (MDY) or (DMY)"};
+  if (field == PoseField::time) return {kSeconds, "(sec)"};
+  if (field == PoseField::height || field >= PoseField::sigma_north) return {kMetres, "(m)"};
+  if (field >= PoseField::velocity_1) return {kSpeeds, "(m/s)"};
+  return {};
+}
+
 /// Sets scale and fields of a column by its unit. @throws FileError
-void set_unit(PoseColumn& column, const std::string& unit, double sign, const std::string& path,
+void set_unit(PoseColumn& column, const std::string& unit, const std::string& path,
               std::uint64_t line) {
-  const auto refuse = [&](std::string_view expected) {
+  // Columns that are not read may take three fields, too.
+  const bool unused = column.field == PoseField::unused;
+  const auto [units, expected] =
+      unused ? std::pair{std::span(kAngles), ""} : units_for(column.field);
+  if (units.empty()) return;
+  const auto found = std::ranges::find(units, unit, &ExplorerUnit::written);
+  if (found != units.end()) {
+    column.scale = found->scale;
+    column.sexagesimal = found->sexagesimal;
+    column.date_order = found->date_order;
+  } else if (!unused) {
     throw FileError(
         path, {{}, line},
         fmt::format("column {} has {}, expected {}", column.name,
                     unit.empty() ? "no unit" : "the unit " + io::printable(unit), expected));
-  };
-  switch (column.field) {
-    case PoseField::date:
-      if (unit == "(mdy)" || unit == "(m/d/y)") {
-        column.date_order = DateOrder::mdy;
-      } else if (unit == "(dmy)" || unit == "(d/m/y)") {
-        column.date_order = DateOrder::dmy;
-      } else if (!unit.empty() && unit != "(ymd)" && unit != "(y/m/d)") {
-        refuse("(YMD), (MDY) or (DMY)");
-      }
-      return;
-    case PoseField::time:
-      if (!unit.empty() && unit != "(sec)" && unit != "(s)") refuse("(sec)");
-      return;
-    case PoseField::latitude:
-    case PoseField::longitude:
-    case PoseField::roll:
-    case PoseField::pitch:
-    case PoseField::heading:
-    case PoseField::sigma_roll:
-    case PoseField::sigma_pitch:
-    case PoseField::sigma_heading:
-      column.scale = sign * kRadiansPerDegree;
-      if (unit == "(deg)" || unit == "(degrees)" || unit == "(+/-deg)") return;
-      if (unit == "(+/-d m s)" || unit == "(d m s)" || unit == "(deg min sec)") {
-        column.sexagesimal = true;
-        return;
-      }
-      if (unit == "(rad)" || unit == "(radians)") {
-        column.scale = sign;
-        return;
-      }
-      if (unit == "(arcmin)") {
-        column.scale = sign * kRadiansPerDegree / 60;
-        return;
-      }
-      if (unit == "(arcsec)") {
-        column.scale = sign * kRadiansPerDegree / 3600;
-        return;
-      }
-      refuse("(deg) or (+/-D M S)");
-      return;
-    case PoseField::height:
-    case PoseField::sigma_north:
-    case PoseField::sigma_east:
-    case PoseField::sigma_down:
-      if (unit != "(m)") refuse("(m)");
-      return;
-    case PoseField::velocity_1:
-    case PoseField::velocity_2:
-    case PoseField::velocity_3:
-      column.scale = sign;
-      if (unit != "(m/s)") refuse("(m/s)");
-      return;
-    default:
-      return;
   }
 }
 
@@ -286,29 +274,22 @@ Trajectory read_explorer(const std::string& path, const Progress& progress) {
   for (std::size_t i = 0; i < header.names.size(); ++i) {
     PoseColumn column;
     column.name = io::printable(header.names[i]);
-    double sign = 1;
-    for (const ExplorerName& known : kExplorerNames) {
+    for (const FieldName& known : kExplorerNames) {
       if (known.name != header.names[i]) continue;
       const bool second_time = known.name == "corrtime" && has_gps_time;
       if (second_time || has_field(table.columns, known.field)) continue;
       column.field = known.field;
-      sign = known.sign;
     }
-    const std::string& unit = header.units[i];
-    if (column.field == PoseField::unused) {
-      column.sexagesimal = unit == "(+/-d m s)" || unit == "(d m s)" || unit == "(deg min sec)";
-    }
-    set_unit(column, unit, sign, path, header.names_line + 1);
+    set_unit(column, header.units[i], path, header.names_line + 1);
     table.columns.push_back(std::move(column));
   }
-  std::vector<std::string_view> missing;
-  for (const auto& [field, name] :
-       {std::pair{PoseField::time, "GPSTime"}, std::pair{PoseField::latitude, "Latitude"},
-        std::pair{PoseField::longitude, "Longitude"}, std::pair{PoseField::height, "H-Ell"},
-        std::pair{PoseField::roll, "Roll"}, std::pair{PoseField::pitch, "Pitch"},
-        std::pair{PoseField::heading, "Heading"}}) {
-    if (!has_field(table.columns, field)) missing.push_back(name);
-  }
+  const auto missing = missing_fields(table.columns, {{PoseField::time, "GPSTime"},
+                                                      {PoseField::latitude, "Latitude"},
+                                                      {PoseField::longitude, "Longitude"},
+                                                      {PoseField::height, "H-Ell"},
+                                                      {PoseField::roll, "Roll"},
+                                                      {PoseField::pitch, "Pitch"},
+                                                      {PoseField::heading, "Heading"}});
   if (!missing.empty()) {
     refuse(
         fmt::format("column {} is missing{}", fmt::join(missing, ", "),
@@ -319,14 +300,11 @@ Trajectory read_explorer(const std::string& path, const Progress& progress) {
   }
   take_contents(table, header.warnings);
   for (PoseColumn& column : table.columns) {
-    const bool position = column.field == PoseField::sigma_north ||
-                          column.field == PoseField::sigma_east ||
-                          column.field == PoseField::sigma_down;
-    const bool attitude = column.field == PoseField::sigma_roll ||
-                          column.field == PoseField::sigma_pitch ||
-                          column.field == PoseField::sigma_heading;
-    if (position) column.scale /= header.position_scale;
-    if (attitude) column.scale /= header.attitude_scale;
+    if (is_angle_sigma(column.field)) {
+      column.scale /= header.attitude_scale;
+    } else if (column.field >= PoseField::sigma_north) {
+      column.scale /= header.position_scale;
+    }
   }
   return read_pose_table(path, table, progress, header.warnings);
 }

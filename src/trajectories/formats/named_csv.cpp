@@ -125,33 +125,31 @@ const std::vector<std::string>& all_csv_names() {
 struct CsvAlias {
   std::string_view written, base;
 };
-constexpr std::array kCsvAliases{
-    CsvAlias{"timestamp", "time"},
-    CsvAlias{"time_stamp", "time"},
-    CsvAlias{"t", "time"},
-    CsvAlias{"lat", "latitude"},
-    CsvAlias{"lon", "longitude"},
-    CsvAlias{"long", "longitude"},
-    CsvAlias{"lng", "longitude"},
-    CsvAlias{"ellipsoid_height", "ellipsoidal_height"},
-    CsvAlias{"tx", "x"},
-    CsvAlias{"ty", "y"},
-    CsvAlias{"tz", "z"},
-    CsvAlias{"q_x", "qx"},
-    CsvAlias{"q_y", "qy"},
-    CsvAlias{"q_z", "qz"},
-    CsvAlias{"q_w", "qw"},
-    CsvAlias{"p_rs_r_x", "x"},
-    CsvAlias{"p_rs_r_y", "y"},
-    CsvAlias{"p_rs_r_z", "z"},
-    CsvAlias{"q_rs_x", "qx"},
-    CsvAlias{"q_rs_y", "qy"},
-    CsvAlias{"q_rs_z", "qz"},
-    CsvAlias{"q_rs_w", "qw"},
-    CsvAlias{"v_rs_r_x", "velocity_x"},
-    CsvAlias{"v_rs_r_y", "velocity_y"},
-    CsvAlias{"v_rs_r_z", "velocity_z"},
-};
+constexpr CsvAlias kCsvAliases[] = {{"timestamp", "time"},
+                                    {"time_stamp", "time"},
+                                    {"t", "time"},
+                                    {"lat", "latitude"},
+                                    {"lon", "longitude"},
+                                    {"long", "longitude"},
+                                    {"lng", "longitude"},
+                                    {"ellipsoid_height", "ellipsoidal_height"},
+                                    {"tx", "x"},
+                                    {"ty", "y"},
+                                    {"tz", "z"},
+                                    {"q_x", "qx"},
+                                    {"q_y", "qy"},
+                                    {"q_z", "qz"},
+                                    {"q_w", "qw"},
+                                    {"p_rs_r_x", "x"},
+                                    {"p_rs_r_y", "y"},
+                                    {"p_rs_r_z", "z"},
+                                    {"q_rs_x", "qx"},
+                                    {"q_rs_y", "qy"},
+                                    {"q_rs_z", "qz"},
+                                    {"q_rs_w", "qw"},
+                                    {"v_rs_r_x", "velocity_x"},
+                                    {"v_rs_r_y", "velocity_y"},
+                                    {"v_rs_r_z", "velocity_z"}};
 constexpr std::string_view kEurocPosition = "p_rs_r_x";
 
 /// Units as they stand in brackets.
@@ -187,8 +185,8 @@ std::string csv_name(std::string_view written) {
   if (open != name.npos && open > 0 && (name.ends_with(']') || name.ends_with(')'))) {
     const std::string_view unit =
         io::trimmed(std::string_view(name).substr(open + 1, name.size() - open - 2));
-    const auto known = std::find_if(kCsvUnitAliases.begin(), kCsvUnitAliases.end(),
-                                    [&](const CsvUnitAlias& one) { return one.written == unit; });
+    const auto known = std::ranges::find_if(
+        kCsvUnitAliases, [&](const CsvUnitAlias& one) { return one.written == unit; });
     if (known == kCsvUnitAliases.end()) return name;
     suffix = known->suffix;
     base = io::trimmed(name.substr(0, open));
@@ -199,7 +197,7 @@ std::string csv_name(std::string_view written) {
     }
     base.resize(name.size() - suffix.size());
   }
-  std::replace(base.begin(), base.end(), ' ', '_');
+  std::ranges::replace(base, ' ', '_');
   for (const CsvAlias& alias : kCsvAliases) {
     if (alias.written == base) base = alias.base;
   }
@@ -215,7 +213,7 @@ std::vector<std::string> header_names(std::string_view line) {
   }
   // EuRoC counts nanoseconds, whether its header says so or not.
   if (lower_case(std::string(line)).find(kEurocPosition) != std::string::npos) {
-    std::replace(names.begin(), names.end(), std::string("time"), std::string("time_ns"));
+    std::ranges::replace(names, std::string("time"), std::string("time_ns"));
   }
   return names;
 }
@@ -235,13 +233,12 @@ bool is_trajectory_csv(const FileHead& head) {
   int found = 0;
   const std::vector<std::string> names = header_names(lines[0]);
   // A cloud may have the place of each point, too.
-  const bool has_points = std::any_of(names.begin(), names.end(), [](const std::string& name) {
+  const bool has_points = std::ranges::any_of(names, [](const std::string& name) {
     return name == "x" || name.starts_with("x_") || name.starts_with("range") ||
            name.starts_with("azimuth");
   });
   for (const std::string& name : names) {
-    const bool is_quaternion =
-        std::find(kQuaternion.begin(), kQuaternion.end(), name) != kQuaternion.end();
+    const bool is_quaternion = std::ranges::find(kQuaternion, name) != kQuaternion.end();
     const bool without_unit = name == "roll" || name == "pitch" || name == "heading";
     const bool is_place =
         !has_points && (name.starts_with("latitude") || name.starts_with("longitude"));
@@ -259,8 +256,8 @@ void refuse_ambiguous(const std::string& path, const std::vector<PoseColumn>& co
     if (has_field(columns, field)) return;
     for (const std::string& name : unknown) {
       const std::string_view base = std::string_view(name).substr(0, name.rfind('_'));
-      const bool meant = std::find(bases.begin(), bases.end(), base) != bases.end() ||
-                         std::find(bases.begin(), bases.end(), name) != bases.end();
+      const bool meant = std::ranges::find(bases, base) != bases.end() ||
+                         std::ranges::find(bases, name) != bases.end();
       if (!meant) continue;
       names.push_back(io::printable(name));
       remedies.emplace_back(remedy);
@@ -295,11 +292,10 @@ PoseTable csv_table(const std::string& path, std::string_view header,
     if (const auto found = csv_column(name)) {
       column.field = found->name->field;
       if (has_field(table.columns, column.field)) {
-        refuse(fmt::format(
-            "column {} repeats {}", io::printable(name),
-            std::find_if(table.columns.begin(), table.columns.end(), [&](const PoseColumn& other) {
-              return other.field == column.field;
-            })->name));
+        refuse(fmt::format("column {} repeats {}", io::printable(name),
+                           std::ranges::find_if(table.columns, [&](const PoseColumn& other) {
+                             return other.field == column.field;
+                           })->name));
       }
       column.scale = found->unit->scale * found->name->sign;
       column.time_decimals = found->unit->time_decimals;
@@ -313,26 +309,14 @@ PoseTable csv_table(const std::string& path, std::string_view header,
   }
   refuse_ambiguous(path, table.columns, unknown);
   for (const std::string& name : unknown) {
-    const bool lacks_unit = csv_column(name + "_deg") || csv_column(name + "_m") ||
-                            csv_column(name + "_s") || csv_column(name + "_m_per_s");
-    if (lacks_unit) {
-      const std::string with_unit = csv_column(name + "_deg") ? name + "_deg"
-                                    : csv_column(name + "_s") ? name + "_s"
-                                    : csv_column(name + "_m") ? name + "_m"
-                                                              : name + "_m_per_s";
-      refuse(
-          fmt::format("column {} names no unit, did you mean {}?", io::printable(name), with_unit));
+    for (const char* unit : {"_deg", "_s", "_m", "_m_per_s"}) {
+      if (!csv_column(name + unit)) continue;
+      refuse(fmt::format("column {} names no unit, did you mean {}{}?", io::printable(name), name,
+                         unit));
     }
     const std::string meant = did_you_mean(name, all_csv_names());
     if (!meant.empty()) refuse(fmt::format("unknown column {}{}", io::printable(name), meant));
   }
-  const auto missing = [&](std::initializer_list<std::pair<PoseField, const char*>> wanted) {
-    std::vector<std::string> names;
-    for (const auto& [field, name] : wanted) {
-      if (!has_field(table.columns, field)) names.emplace_back(name);
-    }
-    return names;
-  };
   if (time == nullptr) {
     refuse(fmt::format(
         "has no column of times: expected time_s, gps_second_of_week_s, utc_second_of_day_s, "
@@ -340,19 +324,19 @@ PoseTable csv_table(const std::string& path, std::string_view header,
         io::printable(header)));
   }
   table.contents.time_scale = time->scale;
-  const auto geodetic = missing({{PoseField::latitude, "latitude_deg"},
-                                 {PoseField::longitude, "longitude_deg"},
-                                 {PoseField::height, "ellipsoidal_height_m"},
-                                 {PoseField::roll, "roll_deg"},
-                                 {PoseField::pitch, "pitch_deg"},
-                                 {PoseField::heading, "heading_deg"}});
-  const auto local = missing({{PoseField::x, "x_m"},
-                              {PoseField::y, "y_m"},
-                              {PoseField::z, "z_m"},
-                              {PoseField::qx, "qx"},
-                              {PoseField::qy, "qy"},
-                              {PoseField::qz, "qz"},
-                              {PoseField::qw, "qw"}});
+  const auto geodetic = missing_fields(table.columns, {{PoseField::latitude, "latitude_deg"},
+                                                       {PoseField::longitude, "longitude_deg"},
+                                                       {PoseField::height, "ellipsoidal_height_m"},
+                                                       {PoseField::roll, "roll_deg"},
+                                                       {PoseField::pitch, "pitch_deg"},
+                                                       {PoseField::heading, "heading_deg"}});
+  const auto local = missing_fields(table.columns, {{PoseField::x, "x_m"},
+                                                    {PoseField::y, "y_m"},
+                                                    {PoseField::z, "z_m"},
+                                                    {PoseField::qx, "qx"},
+                                                    {PoseField::qy, "qy"},
+                                                    {PoseField::qz, "qz"},
+                                                    {PoseField::qw, "qw"}});
   if (!geodetic.empty() && !local.empty()) {
     const bool meant_local =
         has_field(table.columns, PoseField::x) ||

@@ -18,18 +18,10 @@ namespace {
 constexpr std::size_t kOpenmmsColumns = 15;
 
 bool is_openmms_row(std::string_view line) {
-  std::array<std::string_view, kOpenmmsColumns> fields;
-  std::array<double, kOpenmmsColumns> values{};
-  if (io::split_fields(line, ',', fields) != fields.size()) return false;
-  try {
-    for (std::size_t i = 0; i < fields.size(); ++i) {
-      values[i] = io::decimal_field(fields[i], "").value;
-    }
-  } catch (const io::BadRow&) {
-    return false;
-  }
+  const auto numbers = numbers_in<kOpenmmsColumns>(line, ',');
+  if (!numbers) return false;
   const auto within = [&](std::size_t i, double least, double most) {
-    return values[i] >= least && values[i] <= most;
+    return (*numbers)[i] >= least && (*numbers)[i] <= most;
   };
   return within(0, 0, 2 * 86400.0) && within(1, -90, 90) && within(2, -180, 360) &&
          within(3, -1e3, 1e5) && within(4, -200, 200) && within(5, -180, 180) &&

@@ -56,6 +56,26 @@ TimeScale scale_by_size(const std::vector<std::int64_t>& ascending) {
   return fits ? TimeScale::utc_unix : TimeScale::unknown;
 }
 
+std::vector<TrajectoryWarning> order_warnings(
+    const TimeOrder& told, std::size_t records,
+    const std::function<FilePlace(std::size_t)>& place_of) {
+  std::vector<TrajectoryWarning> warnings;
+  if (told.moved > 0) {
+    warnings.push_back(
+        {place_of(told.largest_back_at),
+         fmt::format("records that come after later ones: {} of {}, by up to {:.6f} s; all were "
+                     "sorted by time",
+                     told.moved, records, 1e-9 * static_cast<double>(told.largest_back_ns))});
+  }
+  if (told.repeated > 0) {
+    warnings.push_back(
+        {place_of(told.repeated_at),
+         fmt::format("records that repeat the time of an earlier one: {}; they were left out",
+                     told.repeated)});
+  }
+  return warnings;
+}
+
 Eigen::Quaterniond right_down_from_left_up(const Eigen::Quaterniond& q) {
   return {-q.x(), q.w(), q.z(), -q.y()};  // q i
 }
@@ -168,17 +188,9 @@ void PoseRows::put_in_order() {
                        1e-9 * static_cast<double>(trajectory_.time_ns[told.largest_back_at])));
   }
   if (order.rows.empty()) return;
-  if (told.moved > 0) {
-    warn(places_[told.largest_back_at],
-         fmt::format("records that come after later ones: {} of {}, by up to {:.6f} s; all were "
-                     "sorted by time",
-                     told.moved, trajectory_.size(),
-                     1e-9 * static_cast<double>(told.largest_back_ns)));
-  }
-  if (told.repeated > 0) {
-    warn(places_[told.repeated_at],
-         fmt::format("records that repeat the time of an earlier one: {}; they were left out",
-                     told.repeated));
+  const auto place_of = [this](std::size_t row) { return places_[row]; };
+  for (TrajectoryWarning& one : order_warnings(told, trajectory_.size(), place_of)) {
+    warn(one.place, std::move(one.message));
   }
   reorder(wander_, order.rows);
   static_cast<void>(order_by_time(trajectory_));
@@ -190,7 +202,7 @@ Trajectory PoseRows::finish() {
   put_in_order();
   if (!wander_.empty()) {
     std::vector<double> sorted = wander_;
-    std::sort(sorted.begin(), sorted.end());
+    std::ranges::sort(sorted);
     trajectory_.wander = AngleSpread{sorted.front(), sorted[sorted.size() / 2], sorted.back()};
   }
   settle_velocities(trajectory_, wander_, contents_.velocity_axes);

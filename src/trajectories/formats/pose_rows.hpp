@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -67,6 +68,12 @@ class PoseRows {
   std::vector<double> wander_;
   std::vector<FilePlace> places_;  ///< of the rows
 };
+
+/// What is to be said of records that were put in order.
+/// @param place_of  of a record, by its number from 0
+std::vector<TrajectoryWarning> order_warnings(
+    const TimeOrder& told, std::size_t records,
+    const std::function<FilePlace(std::size_t)>& place_of);
 
 /// Seconds after which a scale of time begins again; nothing where it never does.
 std::optional<std::int64_t> period_ns(TimeScale scale);

@@ -48,8 +48,8 @@ double sexagesimal_degrees(std::span<const std::string_view> fields, const std::
 /// Days from the beginning of GPS time, a Sunday, to a date.
 std::int64_t gps_day(std::string_view field, const PoseColumn& column) {
   std::string text(field);
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '/' || c == '.'; }, '-');
+  std::ranges::replace_if(
+      text, [](char c) { return c == '/' || c == '.'; }, '-');
   std::array<std::string_view, 3> parts;
   if (io::split_fields(text, '-', parts) == parts.size()) {
     const std::size_t year_at = column.date_order == DateOrder::ymd ? 0 : 2;
@@ -84,6 +84,9 @@ class RowReader {
   /// @throws BadRow
   PoseRow row(std::span<const std::string_view> fields) {
     std::array<double, kPoseFields> values{};
+    const auto value = [&](PoseField field) -> double& {
+      return values[static_cast<std::size_t>(field)];
+    };
     PoseRow row;
     std::size_t at = 0;
     std::optional<std::int64_t> week, day;
@@ -98,14 +101,13 @@ class RowReader {
       } else if (column.field == PoseField::date) {
         day = gps_day(fields[place], column);
       } else if (column.sexagesimal) {
-        values[static_cast<std::size_t>(column.field)] =
+        value(column.field) =
             column.scale * sexagesimal_degrees(fields.subspan(place, 3), column.name);
       } else {
-        values[static_cast<std::size_t>(column.field)] =
+        value(column.field) =
             column.scale * io::decimal_field(without_plus(fields[place]), column.name).value;
       }
     }
-    const auto value = [&](PoseField field) { return values[static_cast<std::size_t>(field)]; };
     row.place = {value(PoseField::latitude), value(PoseField::longitude), value(PoseField::height)};
     row.angles = {value(PoseField::roll), value(PoseField::pitch), value(PoseField::heading)};
     row.position = {value(PoseField::x), value(PoseField::y), value(PoseField::z)};
@@ -190,22 +192,39 @@ class RowReader {
 }  // namespace
 
 bool has_field(const std::vector<PoseColumn>& columns, PoseField field) {
-  return std::any_of(columns.begin(), columns.end(),
-                     [field](const PoseColumn& column) { return column.field == field; });
+  return std::ranges::any_of(columns,
+                             [field](const PoseColumn& column) { return column.field == field; });
 }
+
+std::vector<std::string_view> missing_fields(
+    const std::vector<PoseColumn>& columns,
+    std::initializer_list<std::pair<PoseField, std::string_view>> wanted) {
+  std::vector<std::string_view> names;
+  for (const auto& [field, name] : wanted) {
+    if (!has_field(columns, field)) names.push_back(name);
+  }
+  return names;
+}
+
+bool is_angle(PoseField field) {
+  return field == PoseField::latitude || field == PoseField::longitude ||
+         (field >= PoseField::roll && field <= PoseField::heading);
+}
+
+bool is_angle_sigma(PoseField field) { return field >= PoseField::sigma_roll; }
 
 void take_contents(PoseTable& table, std::vector<TrajectoryWarning>& warnings) {
   // A quantity counts when all its columns are there.
   const auto whole = [&](std::initializer_list<PoseField> fields, const char* what) {
     std::vector<std::string> there;
     for (const PoseColumn& column : table.columns) {
-      if (std::find(fields.begin(), fields.end(), column.field) != fields.end()) {
+      if (std::ranges::find(fields, column.field) != fields.end()) {
         there.push_back(column.name);
       }
     }
     if (there.size() == fields.size()) return true;
     for (PoseColumn& column : table.columns) {
-      if (std::find(fields.begin(), fields.end(), column.field) != fields.end()) {
+      if (std::ranges::find(fields, column.field) != fields.end()) {
         column.field = PoseField::unused;
       }
     }

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "risley/core/progress.hpp"
@@ -44,6 +46,12 @@ enum class PoseField : std::uint8_t {
   count,
 };
 
+/// How a format calls what a column holds.
+struct FieldName {
+  std::string_view name;
+  PoseField field;
+};
+
 /// In which order a date has year, month and day.
 enum class DateOrder : std::uint8_t { ymd, mdy, dmy };
 
@@ -78,6 +86,15 @@ Trajectory read_pose_table(const std::string& path, const PoseTable& table,
 
 /// Which fields the columns have; RowContents::has_velocity and so on follow from it.
 bool has_field(const std::vector<PoseColumn>& columns, PoseField field);
+
+/// The names of those fields that no column has.
+std::vector<std::string_view> missing_fields(
+    const std::vector<PoseColumn>& columns,
+    std::initializer_list<std::pair<PoseField, std::string_view>> wanted);
+
+/// Whether a field is an angle, and whether it is the sigma of one.
+bool is_angle(PoseField field);
+bool is_angle_sigma(PoseField field);
 
 /// Sets what the columns hold in the table's contents. Velocities and accuracies that are there in
 /// part are left out with a warning.

@@ -20,30 +20,26 @@
 namespace risley::trajectories {
 namespace {
 
-struct PospacName {
-  std::string_view name;  ///< in lower case
-  PoseField field;
-};
-
-constexpr std::array kPospacNames{
-    PospacName{"time", PoseField::time},
-    PospacName{"latitude", PoseField::latitude},
-    PospacName{"lat", PoseField::latitude},
-    PospacName{"longitude", PoseField::longitude},
-    PospacName{"long", PoseField::longitude},
-    PospacName{"ellipsoid height", PoseField::height},
-    PospacName{"roll", PoseField::roll},
-    PospacName{"pitch", PoseField::pitch},
-    PospacName{"heading", PoseField::heading},
-    PospacName{"east velocity", PoseField::velocity_1},
-    PospacName{"north velocity", PoseField::velocity_2},
-    PospacName{"up velocity", PoseField::velocity_3},
-    PospacName{"north sd", PoseField::sigma_north},
-    PospacName{"east sd", PoseField::sigma_east},
-    PospacName{"height sd", PoseField::sigma_down},
-    PospacName{"roll sd", PoseField::sigma_roll},
-    PospacName{"pitch sd", PoseField::sigma_pitch},
-    PospacName{"heading sd", PoseField::sigma_heading},
+/// In lower case.
+constexpr FieldName kPospacNames[] = {
+    {"time", PoseField::time},
+    {"latitude", PoseField::latitude},
+    {"lat", PoseField::latitude},
+    {"longitude", PoseField::longitude},
+    {"long", PoseField::longitude},
+    {"ellipsoid height", PoseField::height},
+    {"roll", PoseField::roll},
+    {"pitch", PoseField::pitch},
+    {"heading", PoseField::heading},
+    {"east velocity", PoseField::velocity_1},
+    {"north velocity", PoseField::velocity_2},
+    {"up velocity", PoseField::velocity_3},
+    {"north sd", PoseField::sigma_north},
+    {"east sd", PoseField::sigma_east},
+    {"height sd", PoseField::sigma_down},
+    {"roll sd", PoseField::sigma_roll},
+    {"pitch sd", PoseField::sigma_pitch},
+    {"heading sd", PoseField::sigma_heading},
 };
 
 std::vector<std::string> pospac_names(std::string_view line) {
@@ -57,7 +53,7 @@ std::vector<std::string> pospac_names(std::string_view line) {
 bool are_pospac_names(std::string_view line) {
   const std::vector<std::string> names = pospac_names(line);
   const auto has = [&](std::string_view name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
+    return std::ranges::find(names, name) != names.end();
   };
   return has("time") && has("distance") && (has("latitude") || has("lat")) && has("roll") &&
          has("pitch") && has("heading");
@@ -65,7 +61,7 @@ bool are_pospac_names(std::string_view line) {
 
 bool is_pospac(const FileHead& head) {
   const std::vector<std::string_view> lines = lines_of(head.bytes);
-  return std::any_of(lines.begin(), lines.end(), are_pospac_names);
+  return std::ranges::any_of(lines, are_pospac_names);
 }
 
 Trajectory read_pospac(const std::string& path, const Progress& progress) {
@@ -112,7 +108,7 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
   for (const std::string& name : pospac_names(names)) {
     PoseColumn column;
     column.name = io::printable(name);
-    for (const PospacName& known : kPospacNames) {
+    for (const FieldName& known : kPospacNames) {
       if (known.name == name && !has_field(table.columns, known.field)) column.field = known.field;
     }
     // "H" behind the longitude, where the other height has another name.
@@ -120,32 +116,19 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
                            has_field(table.columns, PoseField::longitude) &&
                            !has_field(table.columns, PoseField::height);
     if (is_height) column.field = PoseField::height;
-    switch (column.field) {
-      case PoseField::latitude:
-      case PoseField::longitude:
-      case PoseField::roll:
-      case PoseField::pitch:
-      case PoseField::heading:
-        column.scale = kRadiansPerDegree;
-        break;
-      case PoseField::sigma_roll:
-      case PoseField::sigma_pitch:
-      case PoseField::sigma_heading:
-        column.scale = kRadiansPerDegree / (arc_minutes ? 60 : 1);
-        break;
-      default:
-        break;
+    if (is_angle(column.field)) column.scale = kRadiansPerDegree;
+    if (is_angle_sigma(column.field)) {
+      column.scale = kRadiansPerDegree / (arc_minutes ? 60 : 1);
     }
     table.columns.push_back(std::move(column));
   }
-  std::vector<std::string_view> missing;
-  for (const auto& [field, name] :
-       {std::pair{PoseField::time, "TIME"}, std::pair{PoseField::latitude, "LATITUDE"},
-        std::pair{PoseField::longitude, "LONGITUDE"},
-        std::pair{PoseField::height, "ELLIPSOID HEIGHT"}, std::pair{PoseField::roll, "ROLL"},
-        std::pair{PoseField::pitch, "PITCH"}, std::pair{PoseField::heading, "HEADING"}}) {
-    if (!has_field(table.columns, field)) missing.push_back(name);
-  }
+  const auto missing = missing_fields(table.columns, {{PoseField::time, "TIME"},
+                                                      {PoseField::latitude, "LATITUDE"},
+                                                      {PoseField::longitude, "LONGITUDE"},
+                                                      {PoseField::height, "ELLIPSOID HEIGHT"},
+                                                      {PoseField::roll, "ROLL"},
+                                                      {PoseField::pitch, "PITCH"},
+                                                      {PoseField::heading, "HEADING"}});
   if (!missing.empty()) {
     throw FileError(path, {{}, names_line},
                     fmt::format("column {} is missing", fmt::join(missing, ", ")));

@@ -31,7 +31,7 @@ bool is_lidar_topic(const bags::Topic& topic) {
 
 std::vector<bags::Topic> pose_topics(const std::vector<bags::Topic>& topics) {
   std::vector<bags::Topic> found;
-  std::copy_if(topics.begin(), topics.end(), std::back_inserter(found), is_pose_topic);
+  std::ranges::copy_if(topics, std::back_inserter(found), is_pose_topic);
   return found;
 }
 
@@ -53,7 +53,7 @@ std::size_t chosen_topic(const bags::Bag& bag, const std::string& name) {
     return is_pose_topic(topic) && (name.empty() || topic.name == name);
   };
   const auto& topics = bag.topics();
-  const auto found = std::find_if(topics.begin(), topics.end(), is_meant);
+  const auto found = std::ranges::find_if(topics, is_meant);
   if (found == topics.end()) {
     throw InvalidArgument(fmt::format("option trajectory_topic = {}: {} holds the poses of {}",
                                       name, bag.path(), bags::words_of(poses)));
@@ -140,8 +140,7 @@ bool is_bag(const FileHead& head) { return bags::bag_kind(head.bytes).has_value(
 
 bool holds_poses_alone(const std::string& path, const Progress& progress) {
   const std::vector<bags::Topic> topics = bags::list_topics(path, progress);
-  return std::any_of(topics.begin(), topics.end(), is_pose_topic) &&
-         std::none_of(topics.begin(), topics.end(), is_lidar_topic);
+  return std::ranges::any_of(topics, is_pose_topic) && std::ranges::none_of(topics, is_lidar_topic);
 }
 
 Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,

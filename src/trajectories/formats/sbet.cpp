@@ -40,12 +40,6 @@ enum SbetField {
 
 using SbetNumbers = std::array<double, kSbetFields>;
 
-SbetNumbers sbet_numbers(const std::uint8_t* bytes) {
-  SbetNumbers numbers;
-  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = io::load<double>(bytes + 8 * i);
-  return numbers;
-}
-
 /// Whether numbers can be a record, in radians or, by mistake, in degrees.
 bool looks_like_sbet(const SbetNumbers& n) {
   const auto within = [](double value, double limit) { return std::abs(value) <= limit; };
@@ -68,7 +62,7 @@ bool is_sbet(const FileHead& head) {
   const auto* const bytes = reinterpret_cast<const std::uint8_t*>(head.bytes.data());
   double before = 0;
   for (std::size_t i = 0; i < records; ++i) {
-    const SbetNumbers numbers = sbet_numbers(bytes + i * kSbetRecord);
+    const SbetNumbers numbers = numbers_of<kSbetFields>(bytes + i * kSbetRecord);
     if (!looks_like_sbet(numbers)) return false;
     if (numbers[kSbetTime] == 0 && numbers[kSbetLatitude] == 0) return false;  // zeros are no pose
     const double step = numbers[kSbetTime] - before;
@@ -93,7 +87,7 @@ Trajectory read_sbet(const std::string& path, const Progress& progress) {
   contents.has_velocity = contents.has_wander = true;
   PoseRows rows(path, contents);
   for (std::uint64_t offset = 0; offset < file.size(); offset += kSbetRecord) {
-    const SbetNumbers n = sbet_numbers(file.at(offset, kSbetRecord));
+    const SbetNumbers n = numbers_of<kSbetFields>(file.at(offset, kSbetRecord));
     const auto time_ns = io::nanoseconds_from_seconds(n[kSbetTime]);
     constexpr double kMostWeeks = 20 * 604800.0;
     if (!time_ns || n[kSbetTime] < -1 || n[kSbetTime] > kMostWeeks) {
@@ -144,7 +138,7 @@ std::vector<std::string> write_sbet(const std::string& path, const Trajectory& t
     if (!trajectory.velocity.empty()) {
       const Eigen::Vector3d ned = geocentric_from_ned(place).transpose() * trajectory.velocity[i];
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        n[kSbetVelocity + axis] = ned[static_cast<Eigen::Index>(axis)];
+        n[kSbetVelocity + axis] = ned[axis];
       }
     }
     std::uint8_t* bytes = file.append(kSbetRecord);

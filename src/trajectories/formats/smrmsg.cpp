@@ -29,12 +29,6 @@ constexpr double kRadiansPerArcMinute = kRadiansPerDegree / 60;
 /// Largest standard deviations of a record: m, m/s, arc-minutes.
 constexpr double kWorstSmrmsgPosition = 1e5, kWorstSmrmsgVelocity = 1e4, kWorstSmrmsgAngle = 21600;
 
-SmrmsgNumbers smrmsg_numbers(const std::uint8_t* bytes) {
-  SmrmsgNumbers numbers;
-  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = io::load<double>(bytes + 8 * i);
-  return numbers;
-}
-
 /// What is wrong with a record; empty when nothing is.
 std::string smrmsg_fault(const SmrmsgNumbers& n) {
   constexpr std::array kNames{"time",          "north",         "east", "down",  "north velocity",
@@ -63,9 +57,9 @@ bool is_smrmsg(const FileHead& head) {
   const auto* const bytes = reinterpret_cast<const std::uint8_t*>(head.bytes.data());
   double before = 0;
   for (std::size_t i = 0; i < records; ++i) {
-    const SmrmsgNumbers n = smrmsg_numbers(bytes + i * kSmrmsgRecord);
+    const SmrmsgNumbers n = numbers_of<10>(bytes + i * kSmrmsgRecord);
     const auto is_normal = [](double value) { return value > 1e-9; };
-    if (!smrmsg_fault(n).empty() || !std::all_of(n.begin(), n.end(), is_normal)) return false;
+    if (!smrmsg_fault(n).empty() || !std::ranges::all_of(n, is_normal)) return false;
     if (i > 0 && std::abs(n[0] - before) > 604800) return false;
     before = n[0];
   }
@@ -82,7 +76,7 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
   }
   AccuracyRecords records;
   for (std::uint64_t offset = 0; offset < file.size(); offset += kSmrmsgRecord) {
-    const SmrmsgNumbers n = smrmsg_numbers(file.at(offset, kSmrmsgRecord));
+    const SmrmsgNumbers n = numbers_of<10>(file.at(offset, kSmrmsgRecord));
     if (const std::string fault = smrmsg_fault(n); !fault.empty()) {
       throw FileError(path, {offset, {}}, fault);
     }
@@ -114,17 +108,8 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
   const auto place_of = [](std::size_t row) {
     return FilePlace{static_cast<std::uint64_t>(row) * kSmrmsgRecord, {}};
   };
-  if (order.told.moved > 0) {
-    records.warnings.push_back(
-        {place_of(order.told.largest_back_at),
-         fmt::format("records that come after later ones: {} of {}; all were sorted by time",
-                     order.told.moved, records.time_ns.size())});
-  }
-  if (order.told.repeated > 0) {
-    records.warnings.push_back(
-        {place_of(order.told.repeated_at),
-         fmt::format("records that repeat the time of an earlier one: {}; they were left out",
-                     order.told.repeated)});
+  for (TrajectoryWarning& warning : order_warnings(order.told, records.time_ns.size(), place_of)) {
+    records.warnings.push_back(std::move(warning));
   }
   if (!order.rows.empty()) {
     reorder(records.accuracy, order.rows);
@@ -138,9 +123,9 @@ void add_accuracies(Trajectory& trajectory, const AccuracyRecords& accuracies,
                     const std::string& path) {
   require_trajectory(trajectory);
   const std::vector<std::int64_t>& times = accuracies.time_ns;
-  require_at_least("accuracies", static_cast<long long>(times.size()), 1);
+  require_at_least("accuracies", times.size(), 1);
   require_length("accuracy", accuracies.accuracy.size(), times.size());
-  if (!std::is_sorted(times.begin(), times.end())) {
+  if (!std::ranges::is_sorted(times)) {
     throw InvalidArgument("time_ns of the accuracies does not ascend");
   }
   if (accuracies.time_scale != trajectory.time_scale) {

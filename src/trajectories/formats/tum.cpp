@@ -22,19 +22,12 @@
 namespace risley::trajectories {
 namespace {
 
-/// The numbers of a line, where it has eight and the last four make a rotation.
+/// Whether a line has eight numbers of which the last four make a rotation.
 bool is_tum_row(std::string_view line) {
-  std::array<std::string_view, 8> fields;
-  if (io::split_fields(line, io::kBlanks, fields) != fields.size()) return false;
+  const auto n = numbers_in<8>(line, io::kBlanks);
+  if (!n) return false;
   double squares = 0;
-  try {
-    for (std::size_t i = 0; i < fields.size(); ++i) {
-      const double value = io::decimal_field(fields[i], "").value;
-      if (i >= 4) squares += value * value;
-    }
-  } catch (const io::BadRow&) {
-    return false;
-  }
+  for (std::size_t i = 4; i < 8; ++i) squares += (*n)[i] * (*n)[i];
   return std::abs(squares - 1) < 0.03;
 }
 
@@ -48,8 +41,8 @@ std::optional<Order> named_order(std::string_view line) {
                                      std::pair{"qw", PoseField::qw}};
   std::string text = lower_case(std::string(line));
   std::erase(text, '_');
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '#' || c == ','; }, ' ');
+  std::ranges::replace_if(
+      text, [](char c) { return c == '#' || c == ','; }, ' ');
   std::vector<PoseField> fields;
   for (const std::string_view word : io::fields_of(text, io::kBlanks)) {
     for (const auto& [name, field] : kNames) {
@@ -58,7 +51,7 @@ std::optional<Order> named_order(std::string_view line) {
   }
   Order order{};
   if (fields.size() != order.size()) return std::nullopt;
-  std::copy(fields.begin(), fields.end(), order.begin());
+  std::ranges::copy(fields, order.begin());
   const bool all = std::is_permutation(order.begin(), order.end(), kUsualOrder.begin());
   return all ? std::optional(order) : std::nullopt;
 }

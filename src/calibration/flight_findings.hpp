@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "risley/calibration/flight_calibration.hpp"
+
+namespace risley::calibration {
+
+/// A drift of the clock, or what is held or known and is off, counts from so many sigmas on.
+constexpr double kTestedSigmas = 5;
+
+/// Mount and sensor with the unknowns that were found. Unknowns and their covariance are known.
+/// @param held        [globals]
+/// @param considered  last so many globals: held, and may be off
+void fill_mount_and_sensor(const FlightCalibrationOptions& options, const FlightModel& model,
+                           const std::vector<bool>& held, std::size_t considered,
+                           FlightCalibration& c);
+
+// Each takes down whether an assumption fails, and warns of it.
+
+/// @param seconds  between the first shot and the last
+void judge_clock_drift(double value, double sigma, double seconds, FlightCalibration& c);
+void judge_attitude_delay(double value, double sigma, FlightCalibration& c);
+/// A clock offset that takes what it cannot be is an error of something else.
+void judge_clock_offset(FlightCalibration& c);
+void judge_held(HeldParameter held, const sensors::Sensor& sensor, FlightCalibration& c);
+
+void judge_control(const scenes::KnownGround& ground, SeenControl seen, FlightCalibration& c);
+
+/// Warns of what was mended of the trajectory, and of what was not.
+/// @param begin_ns  from which times count
+void warn_of_trajectory(std::int64_t begin_ns, FlightCalibration& c);
+
+/// The trajectory with what was found of its errors.
+/// @param sigma  of the corrections
+trajectories::Trajectory corrected(const trajectories::Trajectory& trajectory,
+                                   const FlightModel& model,
+                                   const trajectories::ErrorProcess& process,
+                                   const Eigen::MatrixXd& sigma);
+
+}  // namespace risley::calibration
