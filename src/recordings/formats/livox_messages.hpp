@@ -128,7 +128,6 @@ class MessageReader final : public Reader {
   void append_cloud(const LidarMessage& message, std::uint8_t device, Observations& rows) const;
   void append_imu(const LidarMessage& message, std::uint8_t device,
                   std::vector<ImuSample>& samples);
-  void warn(std::string message) { warnings_.push_back({{}, std::move(message), 0}); }
 
   std::unique_ptr<bags::Bag> bag_;
   std::vector<std::optional<std::uint8_t>> devices_;  ///< by topic; empty when it is not read

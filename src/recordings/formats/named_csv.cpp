@@ -221,7 +221,6 @@ const Format kNamedCsvFormat = {
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<NamedTextReader>(path, kNamedCsv, read_layout(path));
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

@@ -31,7 +31,7 @@ NamedTextReader::NamedTextReader(const std::string& path, std::string_view forma
     fail(layout_.names_line, bad.what());
   }
   for (std::string& warning : layout_.warnings) {
-    warnings_.push_back({{.byte_offset = {}, .line = layout_.names_line}, std::move(warning), 0});
+    warn({{}, layout_.names_line}, std::move(warning));
   }
 }
 

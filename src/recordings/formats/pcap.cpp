@@ -123,9 +123,6 @@ class PcapReader final : public Reader {
   void end();
   void say_what_is_missing();
   std::string name_of(std::size_t device) const;
-  void warn(std::string message, std::uint64_t lost_records = 0) {
-    warnings_.push_back({{}, std::move(message), lost_records});
-  }
 
   CaptureFile file_;
   std::map<Sender, std::size_t> devices_;  ///< by sender: row of the header's table
@@ -284,8 +281,8 @@ void PcapReader::add_device(const Seen& seen) {
             ? fmt::format("its type is unknown, too: by its packets it measures at {} kHz",
                           grid && grid->beams == 1 ? 100 : 240)
             : fmt::format("by its packets it is a {}", device_type_name(device.type));
-    warn(fmt::format("device {} is {}: no broadcast names its serial number; {}", row,
-                     to_string(endpoints_[row]), type));
+    warn({}, fmt::format("device {} is {}: no broadcast names its serial number; {}", row,
+                         to_string(endpoints_[row]), type));
   }
 }
 
@@ -347,29 +344,31 @@ void PcapReader::say_what_is_missing() {
   for (std::size_t row = 0; row < live_.size(); ++row) {
     const PacketCounts& counts = live_[row].order.counts();
     if (counts.lost > 0) {
-      warn(fmt::format("{}: {} packets are missing between others", name_of(row), counts.lost));
+      warn({}, fmt::format("{}: {} packets are missing between others", name_of(row), counts.lost));
     }
     if (counts.duplicates > 0) {
-      warn(fmt::format("{}: {} packets were captured twice; the second ones were left out",
-                       name_of(row), counts.duplicates));
+      warn({}, fmt::format("{}: {} packets were captured twice; the second ones were left out",
+                           name_of(row), counts.duplicates));
     }
     if (counts.rejected > 0) {
-      warn(fmt::format("{}: {} packets that no sensor sends were left out", name_of(row),
-                       counts.rejected));
+      warn({}, fmt::format("{}: {} packets that no sensor sends were left out", name_of(row),
+                           counts.rejected));
     }
   }
   if (cut_ > 0) {
-    warn(fmt::format("{} packets were not captured whole, because only {} bytes of each were kept; "
+    warn({},
+         fmt::format("{} packets were not captured whole, because only {} bytes of each were kept; "
                      "capture whole packets, as tcpdump -s 0 does",
                      cut_, file_.snap_length()),
          cut_rows_);
   }
   if (file_.fragments() > 0) {
-    warn(fmt::format("{} fragments of datagrams were left out; sensors send none",
-                     file_.fragments()));
+    warn({}, fmt::format("{} fragments of datagrams were left out; sensors send none",
+                         file_.fragments()));
   }
   if (strangers_ > 0) {
-    warn(fmt::format("{} packets were left out: of more than {} senders, or with impossible times",
+    warn({},
+         fmt::format("{} packets were left out: of more than {} senders, or with impossible times",
                      strangers_, kMostSenders));
   }
 }
@@ -427,7 +426,6 @@ const Format kPcapFormat = {
     [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
       return std::make_unique<PcapReader>(path, progress);
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

@@ -261,7 +261,6 @@ const Format kPcdFormat = {
       }
       return std::make_unique<BinaryTableReader>(path, kPcd, binary_table(path, std::move(header)));
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

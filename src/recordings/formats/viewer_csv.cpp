@@ -261,10 +261,7 @@ const Format kViewerCsvFormat = {
     "",
     "Livox Viewer table: points with the headers of their packets (read only)",
     [](std::string_view head) { return normalized_header(head) == kViewerHeader; },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<ViewerCsvReader>(path);
-    },
-    nullptr,
+    open_with<ViewerCsvReader>,
 };
 
 }  // namespace risley::recordings
