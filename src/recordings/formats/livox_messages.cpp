@@ -199,21 +199,30 @@ void MessageReader::choose_topics() {
   lidars_.assign(topics().size(), {});
 }
 
-void MessageReader::find_lidars() {
-  std::vector<std::set<std::uint8_t>> seen(topics().size());
-  std::size_t points = 0, messages = 0;
+template <class See>
+void MessageReader::look_at_first(std::size_t point_sources, const See& see) {
+  std::size_t points = 0, messages = 0, point_messages = 0;
   LidarMessage message;
   rewind();
   try {
-    while (points < kPointsLookedAt && messages < kPointMessagesLookedAt * header_.devices.size() &&
-           next(message)) {
+    while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
+           point_messages < kPointMessagesLookedAt * point_sources && next(message)) {
       ++messages;
+      if (!see(message)) continue;
+      ++point_messages;
       points += message.points.size();
-      seen[message.topic].insert(message.lidar);
     }
   } catch (const FileError&) {
     // Reported when the caller comes to it, behind the sound messages.
   }
+}
+
+void MessageReader::find_lidars() {
+  std::vector<std::set<std::uint8_t>> seen(topics().size());
+  look_at_first(header_.devices.size(), [&](const LidarMessage& message) {
+    seen[message.topic].insert(message.lidar);
+    return true;
+  });
   std::vector<Device> devices;
   for (std::size_t i = 0; i < topics().size(); ++i) {
     if (!devices_[i]) continue;
@@ -288,6 +297,33 @@ struct MessageReader::FirstMessages {
   std::vector<double> accelerations;
   /// Times, stamps and earliest offsets of messages.
   std::vector<std::int64_t> times_ns, stamps_ns, offsets_ns;
+
+  /// @param drivers  whether it is one of the driver's own messages
+  /// @param timed    whether its points have times
+  void add(const LidarMessage& message, bool drivers, bool timed) {
+    const std::vector<MessagePoint>& points = message.points;
+    if (last_time_ns && message.time_ns > *last_time_ns && last_points > 0) {
+      rates.push_back(static_cast<double>(last_points) * kSecond /
+                      static_cast<double>(message.time_ns - *last_time_ns));
+    }
+    last_time_ns = message.time_ns;
+    last_points = points.size();
+    if (drivers && !points.empty()) {
+      times_ns.push_back(message.time_ns);
+      stamps_ns.push_back(message.stamp_ns);
+      offsets_ns.push_back(std::ranges::min(points, {}, &MessagePoint::offset_ns).offset_ns);
+    }
+    for (std::size_t i = 0; i < points.size();) {
+      tagged = tagged || points[i].tag != 0;
+      several_lines = several_lines || points[i].line != 0;
+      const std::size_t run = timed ? run_length(points, i) : 1;
+      if (is_one_shot(points, i, run)) most_returns = std::max(most_returns, run);
+      if (i + run < points.size() && timed && points[i + run].offset_ns > points[i].offset_ns) {
+        intervals.push_back(static_cast<double>(points[i + run].offset_ns - points[i].offset_ns));
+      }
+      i += run;
+    }
+  }
 };
 
 void MessageReader::find_cloud_times() {
@@ -298,21 +334,11 @@ void MessageReader::find_cloud_times() {
   for (std::size_t i = 0; i < topics().size(); ++i) clouds += is_cloud(i) ? 1 : 0;
   if (clouds == 0) return;
   std::vector<CloudTimeSearch> searches(topics().size());
-  std::size_t points = 0, messages = 0, cloud_messages = 0;
-  LidarMessage message;
-  rewind();
-  try {
-    while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
-           cloud_messages < kPointMessagesLookedAt * clouds && next(message)) {
-      ++messages;
-      if (!is_cloud(message.topic)) continue;
-      ++cloud_messages;
-      points += message.points.size();
-      searches[message.topic].add(message.layout, message.data, message.time_ns);
-    }
-  } catch (const FileError&) {
-    // Reported when the caller comes to it, behind the sound messages.
-  }
+  look_at_first(clouds, [&](const LidarMessage& message) {
+    if (!is_cloud(message.topic)) return false;
+    searches[message.topic].add(message.layout, message.data, message.time_ns);
+    return true;
+  });
   for (std::size_t i = 0; i < topics().size(); ++i) {
     if (!is_cloud(i)) continue;
     cloud_times_[i] = searches[i].found();
@@ -331,64 +357,23 @@ void MessageReader::describe() {
   header_.cartesian = true;
   header_.has_intensity = false;
   find_cloud_times();
-  rewind();
   std::vector<FirstMessages> first(topics().size()), lidars(header_.devices.size());
-  std::size_t points = 0, messages = 0, point_messages = 0;
   std::optional<std::int64_t> first_time_ns;
-  LidarMessage message;
-  try {
-    while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
-           point_messages < kPointMessagesLookedAt * header_.devices.size() && next(message)) {
-      ++messages;
-      if (topics()[message.topic].kind == MessageKind::imu) {
-        const auto& a = message.acceleration;
-        first[message.topic].accelerations.push_back(std::hypot(a[0], a[1], a[2]));
-        continue;
-      }
-      const auto device = device_of(message);
-      if (!device) continue;
-      FirstMessages& topic = lidars[*device];
-      ++point_messages;
-      points += message.points.size();
-      header_.has_intensity = header_.has_intensity || message.has_intensity;
-      if (!first_time_ns) first_time_ns = message.time_ns;
-      if (topic.last_time_ns && message.time_ns > *topic.last_time_ns && topic.last_points > 0) {
-        topic.rates.push_back(static_cast<double>(topic.last_points) * kSecond /
-                              static_cast<double>(message.time_ns - *topic.last_time_ns));
-      }
-      topic.last_time_ns = message.time_ns;
-      topic.last_points = message.points.size();
-      if (topics()[message.topic].kind == MessageKind::points && !message.points.empty()) {
-        topic.times_ns.push_back(message.time_ns);
-        topic.stamps_ns.push_back(message.stamp_ns);
-        topic.offsets_ns.push_back(
-            std::min_element(message.points.begin(), message.points.end(),
-                             [](const MessagePoint& a, const MessagePoint& b) {
-                               return a.offset_ns < b.offset_ns;
-                             })
-                ->offset_ns);
-      }
-      const bool timed = has_times(message.topic);
-      for (std::size_t i = 0; i < message.points.size();) {
-        const MessagePoint& point = message.points[i];
-        topic.tagged = topic.tagged || point.tag != 0;
-        topic.several_lines = topic.several_lines || point.line != 0;
-        const std::size_t run = timed ? run_length(message.points, i) : 1;
-        if (is_one_shot(message.points, i, run)) {
-          topic.most_returns = std::max(topic.most_returns, run);
-        }
-        if (i + run < message.points.size() && timed &&
-            message.points[i + run].offset_ns > point.offset_ns) {
-          topic.intervals.push_back(
-              static_cast<double>(message.points[i + run].offset_ns - point.offset_ns));
-        }
-        i += run;
-      }
+  look_at_first(header_.devices.size(), [&](const LidarMessage& message) {
+    if (topics()[message.topic].kind == MessageKind::imu) {
+      const auto& a = message.acceleration;
+      first[message.topic].accelerations.push_back(std::hypot(a[0], a[1], a[2]));
+      return false;
     }
-  } catch (const FileError&) {
-    // Reported when the caller comes to it, behind the sound messages.
-  }
-  if (point_messages == 0) header_.has_intensity = true;
+    const auto device = device_of(message);
+    if (!device) return false;
+    header_.has_intensity = header_.has_intensity || message.has_intensity;
+    if (!first_time_ns) first_time_ns = message.time_ns;
+    lidars[*device].add(message, topics()[message.topic].kind == MessageKind::points,
+                        has_times(message.topic));
+    return true;
+  });
+  if (!first_time_ns) header_.has_intensity = true;
   if (first_time_ns) {
     header_.time_reference =
         *first_time_ns >= kYear2000 ? TimeReference::utc : TimeReference::power_on;

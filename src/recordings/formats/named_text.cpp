@@ -83,7 +83,7 @@ std::string_view HeaderLines::next() {
 }
 
 void HeaderLines::fail(const std::string& problem) const {
-  throw FileError(path_, {.byte_offset = {}, .line = line_}, problem);
+  throw FileError(path_, {{}, line_}, problem);
 }
 
 std::uint64_t count_field(std::string_view field, std::string_view name) {

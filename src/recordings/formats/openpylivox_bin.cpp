@@ -81,7 +81,7 @@ class OpenpylivoxBinReader final : public Reader {
 
  private:
   [[noreturn]] void fail(std::uint64_t offset, const std::string& problem) const {
-    throw FileError(input_.path(), {.byte_offset = offset, .line = {}}, problem);
+    throw FileError(input_.path(), {offset, {}}, problem);
   }
 
   OpenpylivoxLayout read_layout() {

@@ -63,26 +63,21 @@ struct Named {
   std::string firmware;
 };
 
-/// The broadcast of a datagram, if it is one.
-std::optional<wire::Broadcast> broadcast_of(const CapturedDatagram& datagram) {
+/// What a datagram says, if it says that. @tparam Whole  wire::Message or wire::Reply
+template <class What, class Whole, class Decode>
+std::optional<What> said_in(const CapturedDatagram& datagram, const Decode& decode) {
   const auto decoded = wire::decode_frame(datagram.bytes);
   const auto* frame = std::get_if<wire::Frame>(&decoded);
-  if (frame == nullptr || frame->type == wire::FrameType::reply) return std::nullopt;
-  const auto message = wire::decode_message(*frame);
-  const auto* said = std::get_if<wire::Message>(&message);
-  const auto* broadcast = said == nullptr ? nullptr : std::get_if<wire::Broadcast>(said);
-  return broadcast == nullptr ? std::nullopt : std::optional(*broadcast);
+  const bool replies = std::is_same_v<Whole, wire::Reply>;
+  if (frame == nullptr || (frame->type == wire::FrameType::reply) != replies) return std::nullopt;
+  const auto content = decode(*frame);
+  const auto* whole = std::get_if<Whole>(&content);
+  const auto* what = whole == nullptr ? nullptr : std::get_if<What>(whole);
+  return what == nullptr ? std::nullopt : std::optional(*what);
 }
 
-/// The firmware that a reply names, if it does.
-std::optional<std::string> firmware_of(const CapturedDatagram& datagram) {
-  const auto decoded = wire::decode_frame(datagram.bytes);
-  const auto* frame = std::get_if<wire::Frame>(&decoded);
-  if (frame == nullptr || frame->type != wire::FrameType::reply) return std::nullopt;
-  const auto reply = wire::decode_reply(*frame);
-  const auto* said = std::get_if<wire::Reply>(&reply);
-  const auto* info = said == nullptr ? nullptr : std::get_if<wire::DeviceInfo>(said);
-  return info == nullptr ? std::nullopt : std::optional(wire::firmware_text(info->firmware));
+std::optional<wire::Broadcast> broadcast_of(const CapturedDatagram& datagram) {
+  return said_in<wire::Broadcast, wire::Message>(datagram, wire::decode_message);
 }
 
 /// Reads captures. The first look at the file finds its sensors.
@@ -173,9 +168,10 @@ void PcapReader::look_through(const Progress& progress) {
           auto& known = named_[datagram->from.address].broadcast;
           if (!known) known = *broadcast;
         }
-      } else if (const auto firmware = firmware_of(*datagram);
-                 firmware && named_.contains(datagram->from.address)) {
-        named_[datagram->from.address].firmware = *firmware;
+      } else if (const auto info =
+                     said_in<wire::DeviceInfo, wire::Reply>(*datagram, wire::decode_reply);
+                 info && named_.contains(datagram->from.address)) {
+        named_[datagram->from.address].firmware = wire::firmware_text(info->firmware);
       }
     }
   } catch (const FileError& error) {  // who reads comes to it again

@@ -255,7 +255,7 @@ const Format kPcdFormat = {
         return std::make_unique<NamedTextReader>(path, kPcd, text_layout(std::move(header)));
       }
       if (header.data != "binary" && header.data != "binary_compressed") {
-        throw FileError(path, {.byte_offset = {}, .line = header.data_line - 1},
+        throw FileError(path, {{}, header.data_line - 1},
                         fmt::format("expected DATA ascii, binary or binary_compressed, found {}",
                                     printable(header.data)));
       }

@@ -36,7 +36,7 @@ TextTableReader::TextTableReader(const std::string& path, std::string format)
 }
 
 void TextTableReader::fail(std::uint64_t line, const std::string& problem) const {
-  throw FileError(path_, {.byte_offset = {}, .line = line}, problem);
+  throw FileError(path_, {{}, line}, problem);
 }
 
 void TextTableReader::refuse_header(const std::string& expected) const {
@@ -132,7 +132,7 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
       if (rows_left_) --*rows_left_;
     }
   } catch (const BadRow& bad) {
-    stop(FileError(path_, {.byte_offset = {}, .line = lines_.line_number()}, bad.what()));
+    stop(FileError(path_, {{}, lines_.line_number()}, bad.what()));
   } catch (const FileError& error) {
     stop(error);
   }
