@@ -50,6 +50,13 @@ RotorState state_of(const Start& start, double angle_sigma, const SpeedSigma& sp
   return state;
 }
 
+/// A start as a state that may be off by so much, rad and a share of the speeds.
+inline RotorState loose_state(const Start& start, double angle_sigma, double speed_share) {
+  return state_of(start, angle_sigma, [&](double speed) {
+    return std::max(speed_share * std::abs(speed), kStraightSigma);
+  });
+}
+
 /// Moves a state on to a time.
 inline void predict(RotorState& state, std::int64_t time_ns) {
   const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
@@ -111,13 +118,6 @@ class BlockFit {
     knot_.first_shot = {0};
     knot_.last_shot.resize(1);
     knot_.state.resize(static_cast<std::size_t>(knot_.states()));
-  }
-
-  /// A start as a state that may be off by so much, rad and a share of the speeds.
-  static RotorState loose_state(const Start& start, double angle_sigma, double speed_share) {
-    return state_of(start, angle_sigma, [&](double speed) {
-      return std::max(speed_share * std::abs(speed), kStraightSigma);
-    });
   }
 
   /// Residuals of the block and its normal equations about a state.
