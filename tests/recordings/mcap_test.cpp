@@ -94,17 +94,6 @@ TEST(Mcap, HoldsMessagesOfRos1) {
                                                   static_cast<std::int64_t>(kPowerOn) + 10'000));
 }
 
-TEST(Mcap, OpensByContentAndIsNotWritten) {
-  const TestFolder folder;
-  const std::string path = folder.file("without_ending");
-  small_file().write(path);
-  const Recording recording = load_recording(path);
-  EXPECT_EQ(recording.header.format, "mcap");
-  EXPECT_EQ(recording.data.observations.size(), 120U);
-  EXPECT_THROW(create_recording(folder.file("out.mcap"), recording.header), InvalidArgument);
-  EXPECT_EQ(folder.names().size(), 1U);
-}
-
 TEST(Mcap, OtherEncodingsAndVersionsAreNamed) {
   McapFile file = small_file();
   file.topics[0].encoding = "protobuf";

@@ -224,44 +224,6 @@ TEST(OpenpylivoxCsv, ReadsTheColumns) {
   EXPECT_EQ(nulls.rows().range[0], 0.0);
 }
 
-TEST(OpenpylivoxCsv, CutAtEveryByte) {
-  for (const auto& table : kTables) {
-    SCOPED_TRACE(table);
-    const auto columns = std::count(
-        table.begin(), table.begin() + static_cast<std::ptrdiff_t>(table.find('\n')), ',');
-    check_cuts(kOpenpylivoxCsvFormat, table, 1, [&](std::string_view head) {
-      const auto lines = static_cast<std::size_t>(std::count(head.begin(), head.end(), '\n'));
-      if (lines == 0) return std::pair{std::size_t{0}, true};
-      const auto tail = head.substr(head.rfind('\n') + 1);
-      if (tail.empty()) return std::pair{lines - 1, false};
-      const auto point = tail.rfind('.');
-      const bool whole = std::count(tail.begin(), tail.end(), ',') == columns && lines > 1 &&
-                         point != tail.npos && point > tail.rfind(',') &&
-                         tail.size() - point - 1 == 6;
-      return std::pair{whole ? lines : lines - 1, !whole};
-    });
-  }
-}
-
-TEST(OpenpylivoxCsv, AcceptsVariantsOfText) {
-  for (const auto& table : kTables) {
-    std::string windows, blanks;
-    for (const char c : table) {
-      windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
-      blanks += c == ',' ? std::string(", ") : std::string(1, c);
-    }
-    const Outcome plain = read_text(kOpenpylivoxCsvFormat, table);
-    for (const auto& variant : {windows, "\xEF\xBB\xBF" + windows, blanks, table + "\n"}) {
-      SCOPED_TRACE(variant);
-      EXPECT_TRUE(kOpenpylivoxCsvFormat.recognises(variant));
-      const Outcome outcome = read_text(kOpenpylivoxCsvFormat, variant);
-      EXPECT_FALSE(outcome.error);
-      EXPECT_TRUE(is_same(outcome.rows(), plain.rows()));
-      EXPECT_EQ(outcome.recording.data.imu.size(), plain.recording.data.imu.size());
-    }
-  }
-}
-
 TEST(OpenpylivoxCsv, NamesTheDamagedLine) {
   struct Case {
     std::size_t table;

@@ -432,28 +432,6 @@ TEST(Ros1Bag, OpeningAndReadingCanBeCancelled) {
   EXPECT_THROW(open_recording(path, {}, progress), Cancelled);
 }
 
-TEST(Ros1Bag, MessagesStayWhole) {
-  const TestFolder folder;
-  const std::string path = folder.file("input.bag");
-  small_bag().write(path);
-  const auto reader = kRos1BagFormat.open(path, {});
-  Chunk chunk;
-  std::size_t chunks = 0, rows = 0;
-  double fraction = 0.0;
-  while (reader->read(chunk, 30)) {
-    EXPECT_EQ(chunk.observations.size() % 20, 0U);
-    EXPECT_LE(chunk.observations.size(), 49U);
-    EXPECT_GE(reader->fraction_read(), fraction);
-    fraction = reader->fraction_read();
-    rows += chunk.observations.size();
-    ++chunks;
-  }
-  EXPECT_EQ(chunks, 4U);  // the last inertial sample stands alone
-  EXPECT_EQ(rows, 120U);
-  EXPECT_EQ(fraction, 1.0);
-  EXPECT_FALSE(reader->read(chunk, 30));
-}
-
 TEST(Ros1Bag, OpensByContentAndIsNotWritten) {
   const TestFolder folder;
   const std::string path = folder.file("without_ending");

@@ -75,19 +75,6 @@ TEST(Ros2Bag, ReadsEveryColumn) {
   }
 }
 
-TEST(Ros2Bag, ReturnsOfOneShotShareItsTime) {
-  Bag bag;
-  const std::size_t lidar = bag.topic(kTopic, kCustomType);
-  bag.add(lidar, custom(kPowerOn, {{0, 1.0F, 0.0F, 0.0F, 5, 0x10},
-                                   {0, 2.0F, 0.0F, 0.0F, 6, 0x20},
-                                   {10'000, 3.0F, 0.0F, 0.0F, 7, 0x10},
-                                   {10'000, 0.0F, 0.0F, 0.0F, 0, 0}}));
-  const Outcome outcome = bag.read();
-  EXPECT_EQ(outcome.recording.header.returns_per_shot, 2);
-  EXPECT_EQ(outcome.recording.header.time_reference, TimeReference::power_on);
-  EXPECT_THAT(outcome.rows().return_number, ElementsAre(1, 2, 1, 2));
-}
-
 TEST(Ros2Bag, Clouds) {
   Bag bag;
   const std::size_t lidar = bag.topic("/points", kCloudType);
@@ -132,26 +119,6 @@ TEST(Ros2Bag, InertialSamplesAndMessagesStayWhole) {
   EXPECT_THAT(samples[1].acceleration_g, ElementsAre(0.0625F, -0.03125F, 1.0F));
   EXPECT_EQ(folder.names().size(), 1U);  // nothing was written beside it
   EXPECT_THROW(create_recording(folder.file("out.db3"), reader->header()), InvalidArgument);
-}
-
-TEST(Ros2Bag, EachTopicIsADevice) {
-  Bag bag;
-  const std::size_t second = bag.topic("/livox/lidar_3GGDJ9600100401", kCustomType);
-  const std::size_t first = bag.topic("/livox/lidar_0TFDG3B006H2Z11", kCustomType);
-  const std::size_t inertia = bag.topic("/livox/imu_3GGDJ9600100401", kImuType);
-  bag.topic("/map", kCloudType);
-  bag.add(second, custom(kPowerOn, shots(2)));
-  bag.add(first, custom(kPowerOn, shots(1)));
-  bag.add(inertia, imu(kPowerOn));
-  bag.add(second, custom(kPowerOn + 20'000, shots(1)));
-  const Outcome outcome = bag.read();
-  ASSERT_EQ(outcome.recording.header.devices.size(), 2U);
-  EXPECT_EQ(outcome.recording.header.devices[0].serial, "0TFDG3B006H2Z11");
-  EXPECT_EQ(outcome.recording.header.devices[1].serial, "3GGDJ9600100401");
-  EXPECT_THAT(outcome.rows().device, ElementsAre(1, 1, 0, 1));
-  EXPECT_EQ(outcome.recording.data.imu.at(0).device, 1);
-  ASSERT_EQ(outcome.recording.warnings.size(), 1U);
-  EXPECT_THAT(outcome.recording.warnings[0].message, HasSubstr("/map"));
 }
 
 TEST(Ros2Bag, ReadsWhatIsStillInTheJournal) {
