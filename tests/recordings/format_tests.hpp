@@ -42,15 +42,17 @@ struct Outcome {
   const Observations& rows() const { return recording.data.observations; }
 };
 
-inline Outcome read_all(const Format& format, const std::string& path,
+using Opened = std::function<std::unique_ptr<Reader>(const std::string& path)>;
+
+inline Outcome read_all(const Opened& open, const std::string& path,
                         std::size_t chunk_rows = kDefaultChunkRows) {
   Outcome outcome;
   std::unique_ptr<Reader> reader;
+  Chunk chunk;
   try {
-    reader = format.open(path, {});
+    reader = open(path);
     outcome.opened = true;
     outcome.recording.header = reader->header();
-    Chunk chunk;
     while (reader->read(chunk, chunk_rows)) {
       auto& all = outcome.recording.data;
       all.observations.append(chunk.observations);
@@ -63,9 +65,17 @@ inline Outcome read_all(const Format& format, const std::string& path,
     outcome.error = error;
     EXPECT_EQ(error.path(), path);
     EXPECT_FALSE(error.problem().empty());
+    if (reader) {
+      EXPECT_THROW(reader->read(chunk, chunk_rows), FileError) << "forgot the damage";
+    }
   }
   if (reader) outcome.recording.warnings = reader->warnings();
   return outcome;
+}
+
+inline Outcome read_all(const Format& format, const std::string& path,
+                        std::size_t chunk_rows = kDefaultChunkRows) {
+  return read_all([&](const std::string& file) { return format.open(file, {}); }, path, chunk_rows);
 }
 
 inline Outcome read_text(const Format& format, std::string_view bytes,

@@ -13,66 +13,22 @@
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/writer.hpp"
 
+#include "recordings/format_tests.hpp"
 #include "recordings/lvx_bytes.hpp"
 
 namespace risley::recordings::lvx_test {
 
+using namespace format_tests;
 using namespace lvx_bytes;
 
 constexpr std::uint8_t kMid40 = 1, kHorizon = 3, kMid70 = 6, kAvia = 7;
 
-/// What came out of a file, and how reading it ended.
-struct ReadResult {
-  Chunk data;
-  std::vector<ReadWarning> warnings;
-  std::optional<FileError> open_error, read_error;
-};
-
-void append(Chunk& all, const Chunk& chunk) {
-  all.observations.append(chunk.observations);
-  all.packets.insert(all.packets.end(), chunk.packets.begin(), chunk.packets.end());
-  all.imu.insert(all.imu.end(), chunk.imu.begin(), chunk.imu.end());
-}
-
-/// Equality of the first rows, bit by bit, with NaN equal to NaN.
-void expect_prefix(const Observations& part, const Observations& whole) {
-  ASSERT_LE(part.size(), whole.size());
-  const auto same_bits = [&](const auto& a, const auto& b) {
-    return a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
-  };
-  EXPECT_TRUE(same_bits(part.time_ns, whole.time_ns));
-  EXPECT_TRUE(same_bits(part.azimuth, whole.azimuth));
-  EXPECT_TRUE(same_bits(part.zenith, whole.zenith));
-  EXPECT_TRUE(same_bits(part.range, whole.range));
-  EXPECT_TRUE(same_bits(part.intensity, whole.intensity));
-  EXPECT_TRUE(same_bits(part.return_number, whole.return_number));
-  EXPECT_TRUE(same_bits(part.tag, whole.tag));
-  EXPECT_TRUE(same_bits(part.beam, whole.beam));
-  EXPECT_TRUE(same_bits(part.device, whole.device));
-  EXPECT_TRUE(same_bits(part.valid, whole.valid));
-}
-
 class LvxTest : public ::testing::Test {
  protected:
-  ReadResult read(const std::string& bytes, std::size_t max_rows = kDefaultChunkRows) {
-    ReadResult result;
+  Outcome read(const std::string& bytes, std::size_t max_rows = kDefaultChunkRows) {
     save(folder_.file("in.lvx"), bytes);
-    std::unique_ptr<Reader> reader;
-    try {
-      reader = open_recording(folder_.file("in.lvx"));
-    } catch (const FileError& error) {
-      result.open_error = error;
-      return result;
-    }
-    Chunk chunk;
-    try {
-      while (reader->read(chunk, max_rows)) append(result.data, chunk);
-    } catch (const FileError& error) {
-      result.read_error = error;
-      EXPECT_THROW(reader->read(chunk, max_rows), FileError) << "forgot the damage";
-    }
-    result.warnings = reader->warnings();
-    return result;
+    return read_all([](const std::string& path) { return open_recording(path); },
+                    folder_.file("in.lvx"), max_rows);
   }
 
   /// Copies a recording in chunks of so many rows. @return the bytes of the copy
@@ -190,9 +146,9 @@ TEST_F(LvxTest, TheSmallestFileIsWrittenAsDescribed) {
 }
 
 TEST_F(LvxTest, TheDeviceTableAndPacketsAreRead) {
-  const ReadResult result = read(rich_file());
-  ASSERT_FALSE(result.open_error || result.read_error);
-  EXPECT_TRUE(result.warnings.empty());
+  const Outcome result = read(rich_file());
+  ASSERT_FALSE(result.error);
+  EXPECT_TRUE(result.recording.warnings.empty());
   const auto reader = open_recording(folder_.file("in.lvx"));
   const RecordingHeader& header = reader->header();
   EXPECT_EQ(header.format, "lvx-1.1");
@@ -209,7 +165,7 @@ TEST_F(LvxTest, TheDeviceTableAndPacketsAreRead) {
 
   std::vector<int> types, devices;
   std::vector<std::uint64_t> frames;
-  for (const Packet& packet : result.data.packets) {
+  for (const Packet& packet : result.recording.data.packets) {
     types.push_back(packet.data_type);
     devices.push_back(packet.device_index);
     frames.push_back(packet.frame);
@@ -217,24 +173,24 @@ TEST_F(LvxTest, TheDeviceTableAndPacketsAreRead) {
   EXPECT_THAT(types, ::testing::ElementsAre(8, 6, 1, 5, 7, 0, 6));
   EXPECT_THAT(devices, ::testing::ElementsAre(9, 9, 2, 9, 9, 2, 9));
   EXPECT_THAT(frames, ::testing::ElementsAre(0, 0, 0, 0, 1, 2, 2));
-  const Observations& o = result.data.observations;
+  const Observations& o = result.rows();
   ASSERT_EQ(o.size(), 90U + 100 + 96 + 90 + 100);
   EXPECT_EQ(o.device[0], 0);  // row of the table, not the index
   EXPECT_EQ(o.device[90], 1);
   EXPECT_EQ(o.time_ns[90 + 99], 500 + 990'000);
-  ASSERT_EQ(result.data.imu.size(), 2U);
-  EXPECT_EQ(result.data.imu[1].time_ns, 51'050'000);
+  ASSERT_EQ(result.recording.data.imu.size(), 2U);
+  EXPECT_EQ(result.recording.data.imu[1].time_ns, 51'050'000);
 }
 
 TEST_F(LvxTest, ChunksStayWithinTheirSizeAndTogetherAreTheWhole) {
   const std::string file = rich_file();
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   for (const std::size_t max_rows : {1U, 90U, 100U, 250U}) {
     SCOPED_TRACE(max_rows);
-    const ReadResult pieces = read(file, max_rows);
-    EXPECT_EQ(pieces.data.packets.size(), whole.data.packets.size());
-    ASSERT_EQ(pieces.data.observations.size(), whole.data.observations.size());
-    expect_prefix(pieces.data.observations, whole.data.observations);
+    const Outcome pieces = read(file, max_rows);
+    EXPECT_EQ(pieces.recording.data.packets.size(), whole.recording.data.packets.size());
+    ASSERT_EQ(pieces.rows().size(), whole.rows().size());
+    EXPECT_TRUE(is_prefix(pieces.rows(), whole.rows()));
     const auto reader = open_recording(folder_.file("in.lvx"));
     Chunk chunk;
     while (reader->read(chunk, max_rows)) {
@@ -309,17 +265,17 @@ TEST_F(LvxTest, RowsWithoutPacketsAreWrittenExactlyAndStayTheSame) {
     const RecordingHeader header = header_for(c.type, c.cartesian, c.returns);
     const Chunk chunk = rows_at(grid_times(20'000, c.rate_hz, 123'000), c.returns);
     const std::string bytes = write(header, chunk);
-    const ReadResult result = read(bytes);
-    ASSERT_FALSE(result.open_error || result.read_error);
-    EXPECT_TRUE(result.warnings.empty());
-    EXPECT_EQ(result.data.packets.size(), c.packets);
-    EXPECT_EQ(result.data.packets[0].data_type, c.data_type);
-    if (!c.cartesian) expect_same_shots(chunk.observations, result.data.observations);
-    ASSERT_GE(result.data.observations.size(), chunk.observations.size());
+    const Outcome result = read(bytes);
+    ASSERT_FALSE(result.error);
+    EXPECT_TRUE(result.recording.warnings.empty());
+    EXPECT_EQ(result.recording.data.packets.size(), c.packets);
+    EXPECT_EQ(result.recording.data.packets[0].data_type, c.data_type);
+    if (!c.cartesian) expect_same_shots(chunk.observations, result.rows());
+    ASSERT_GE(result.rows().size(), chunk.observations.size());
     for (std::size_t row = 0; c.cartesian && row < chunk.observations.size(); ++row) {
       // Without gaps in time the rows stand in the same order.
-      ASSERT_EQ(result.data.observations.time_ns[row], chunk.observations.time_ns[row]);
-      ASSERT_NEAR(result.data.observations.range[row], chunk.observations.range[row], 0.9e-3);
+      ASSERT_EQ(result.rows().time_ns[row], chunk.observations.time_ns[row]);
+      ASSERT_NEAR(result.rows().range[row], chunk.observations.range[row], 0.9e-3);
     }
     EXPECT_TRUE(copy(bytes, 1000) == bytes);
   }
@@ -358,9 +314,9 @@ TEST_F(LvxTest, FormedPacketsGoIntoFramesOfTheirDuration) {
   std::vector<std::int64_t> times = grid_times(10'000, 1e5);
   for (const std::int64_t t : grid_times(100, 1e5, 1'100'000'000)) times.push_back(t);
   const std::string bytes = write(header, rows_at(times));
-  const ReadResult result = read(bytes);
+  const Outcome result = read(bytes);
   std::vector<int> packets_of_frame(6);
-  for (const Packet& packet : result.data.packets) ++packets_of_frame.at(packet.frame);
+  for (const Packet& packet : result.recording.data.packets) ++packets_of_frame.at(packet.frame);
   EXPECT_THAT(packets_of_frame, ::testing::ElementsAre(20, 20, 20, 20, 20, 1));
   // The last frame ends with the file.
   std::uint64_t next = 0;
@@ -375,8 +331,8 @@ TEST_F(LvxTest, ShotsWithoutReturnKeepTheirPlaceAndTheirAngles) {
   o.valid[40] = 0;
   o.azimuth[41] = o.zenith[41] = o.range[41] = std::numeric_limits<double>::quiet_NaN();
   o.valid[41] = 0;
-  const ReadResult result = read(write(header_for(kMid40), chunk));
-  const Observations& again = result.data.observations;
+  const Outcome result = read(write(header_for(kMid40), chunk));
+  const Observations& again = result.rows();
   ASSERT_EQ(again.size(), 100U);
   EXPECT_EQ(again.range[40], 0.0);
   EXPECT_NEAR(again.azimuth[40], o.azimuth[40], 1e-12);
@@ -391,10 +347,10 @@ TEST_F(LvxTest, TagsAndFurtherReturnsThatAppearLateAreKept) {
   chunk.observations.tag[50] = 0x10;  // from here on records with a tag
   Chunk second = rows_at({3'000'000, 3'010'000}, 2);
   chunk.observations.append(second.observations);
-  const ReadResult result = read(write(header_for(kMid40), chunk));
-  expect_same_shots(chunk.observations, result.data.observations);
-  EXPECT_EQ(result.data.packets.front().data_type, 1);
-  EXPECT_EQ(result.data.packets.back().data_type, 5);
+  const Outcome result = read(write(header_for(kMid40), chunk));
+  expect_same_shots(chunk.observations, result.rows());
+  EXPECT_EQ(result.recording.data.packets.front().data_type, 1);
+  EXPECT_EQ(result.recording.data.packets.back().data_type, 5);
 }
 
 TEST_F(LvxTest, SeveralDevicesAndInertialSamplesAreWritten) {
@@ -416,15 +372,14 @@ TEST_F(LvxTest, SeveralDevicesAndInertialSamplesAreWritten) {
     chunk.imu.push_back(sample);
   }
   const std::string bytes = write(header, chunk);
-  const ReadResult result = read(bytes);
-  ASSERT_EQ(result.data.imu.size(), 3U);
-  EXPECT_EQ(result.data.imu[1].time_ns, 1'500'000);
-  EXPECT_EQ(result.data.imu[1].device, 1);
+  const Outcome result = read(bytes);
+  ASSERT_EQ(result.recording.data.imu.size(), 3U);
+  EXPECT_EQ(result.recording.data.imu[1].time_ns, 1'500'000);
+  EXPECT_EQ(result.recording.data.imu[1].device, 1);
   std::vector<std::int64_t> first, second;
-  for (std::size_t row = 0; row < result.data.observations.size(); ++row) {
-    if (!result.data.observations.valid[row]) continue;
-    (result.data.observations.device[row] == 0 ? first : second)
-        .push_back(result.data.observations.time_ns[row]);
+  for (std::size_t row = 0; row < result.rows().size(); ++row) {
+    if (!result.rows().valid[row]) continue;
+    (result.rows().device[row] == 0 ? first : second).push_back(result.rows().time_ns[row]);
   }
   EXPECT_EQ(first, times);
   ASSERT_EQ(second.size(), times.size());
@@ -453,12 +408,12 @@ TEST_F(LvxTest, TimesKeepTheirReference) {
     header.time_reference = c.reference;
     Chunk chunk = rows_at(grid_times(250'000, 1e5, c.start));
     const std::string bytes = write(header, chunk);
-    const ReadResult result = read(bytes);
+    const Outcome result = read(bytes);
     const auto reader = open_recording(folder_.file("in.lvx"));
     EXPECT_EQ(reader->header().time_reference, c.read_as);
     for (std::int64_t& t : chunk.observations.time_ns) t += c.read_start - c.start;
-    ASSERT_GE(result.data.observations.size(), chunk.observations.size());
-    expect_same_shots(chunk.observations, result.data.observations);
+    ASSERT_GE(result.rows().size(), chunk.observations.size());
+    expect_same_shots(chunk.observations, result.rows());
     EXPECT_TRUE(copy(bytes) == bytes);
   }
 }
@@ -516,22 +471,22 @@ TEST_F(LvxTest, WhatLvxCannotHoldIsRefused) {
   EXPECT_THAT(message(header_for(kMid40, false, 4), good), HasSubstr("1 to 3"));
 
   // Packets that do not belong to their rows.
-  const ReadResult result = read(rich_file());
+  const Outcome result = read(rich_file());
   header = open_recording(folder_.file("in.lvx"))->header();
-  chunk = result.data;
+  chunk = result.recording.data;
   EXPECT_EQ(message(header, chunk), "was written");
   chunk.packets.pop_back();
   EXPECT_THAT(message(header, chunk), HasSubstr("Chunk::packets"));
-  chunk = result.data;
+  chunk = result.recording.data;
   chunk.imu.pop_back();
   EXPECT_THAT(message(header, chunk), HasSubstr("Chunk::packets"));
-  chunk = result.data;
+  chunk = result.recording.data;
   chunk.packets[0].rows = 89;
   EXPECT_THAT(message(header, chunk), HasSubstr("Chunk::packets"));
-  chunk = result.data;
+  chunk = result.recording.data;
   chunk.packets[0].device_index = 3;
   EXPECT_THAT(message(header, chunk), HasSubstr("device index"));
-  chunk = result.data;
+  chunk = result.recording.data;
   chunk.observations.time_ns[0] += 2000;
   EXPECT_THAT(message(header, chunk), HasSubstr("timestamp"));
 }
@@ -550,7 +505,7 @@ TEST_F(LvxTest, NothingIsLeftWithoutClose) {
 TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
   std::vector<std::size_t> frames;
   const std::string file = rich_file(&frames);
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   // What stands before the cut is known from the file's description alone.
   const std::size_t sizes[] = {679, 43, 919, 787, 1279, 1319, 43};
   const std::size_t rows[] = {90, 0, 100, 96, 90, 100, 0};
@@ -564,28 +519,28 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
   ASSERT_EQ(ends.back(), file.size());
   for (std::size_t cut = 0; cut <= file.size(); ++cut) {
     SCOPED_TRACE(cut);
-    const ReadResult result = read(file.substr(0, cut));
+    const Outcome result = read(file.substr(0, cut));
     if (cut < frames[0]) {
-      ASSERT_TRUE(result.open_error);
+      ASSERT_FALSE(result.opened);
       // Without the whole name it is no LVX file that can be told.
       if (cut >= 16) {
-        ASSERT_TRUE(result.open_error->place().byte_offset);
-        EXPECT_LE(*result.open_error->place().byte_offset, cut);
+        ASSERT_TRUE(result.error->place().byte_offset);
+        EXPECT_LE(*result.error->place().byte_offset, cut);
       }
       continue;
     }
-    ASSERT_FALSE(result.open_error);
-    ASSERT_FALSE(result.read_error);
+    ASSERT_TRUE(result.opened);
+    ASSERT_FALSE(result.error);
     std::size_t expected = 0, packets = 0;
     while (packets < 7 && ends[packets] <= cut) expected += rows[packets++];
-    ASSERT_EQ(result.data.observations.size(), expected);
-    ASSERT_EQ(result.data.packets.size(), packets);
-    expect_prefix(result.data.observations, whole.data.observations);
+    ASSERT_EQ(result.rows().size(), expected);
+    ASSERT_EQ(result.recording.data.packets.size(), packets);
+    EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
     // A cut between two frames leaves a file that is whole.
     const bool between = cut == file.size() || cut == frames[1] || cut == frames[2];
-    ASSERT_EQ(result.warnings.size(), between ? 0U : 1U);
+    ASSERT_EQ(result.recording.warnings.size(), between ? 0U : 1U);
     if (between) continue;
-    const ReadWarning& warning = result.warnings[0];
+    const ReadWarning& warning = result.recording.warnings[0];
     ASSERT_TRUE(warning.place.byte_offset);
     EXPECT_LE(*warning.place.byte_offset, cut);
     // Eleven bytes of a package tell how many records it had.
@@ -606,7 +561,7 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
 TEST_F(LvxTest, AFlippedHeaderBitInventsNoPoint) {
   std::vector<std::size_t> frames;
   const std::string file = rich_file(&frames);
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   std::vector<std::size_t> bytes;
   for (std::size_t i = 0; i < 24; ++i) bytes.push_back(i);
   bytes.push_back(28);
@@ -619,20 +574,21 @@ TEST_F(LvxTest, AFlippedHeaderBitInventsNoPoint) {
       SCOPED_TRACE(::testing::Message() << "byte " << at << " bit " << bit);
       std::string damaged = file;
       damaged[at] = static_cast<char>(damaged[at] ^ (1 << bit));
-      const ReadResult result = read(damaged);
+      const Outcome result = read(damaged);
       if (at < 24) {
-        EXPECT_TRUE(result.open_error);
+        EXPECT_FALSE(result.opened);
         continue;
       }
-      if (result.open_error) continue;
-      expect_prefix(result.data.observations, whole.data.observations);
-      const bool complete = result.data.packets.size() == whole.data.packets.size();
-      EXPECT_TRUE(complete || result.read_error || !result.warnings.empty());
+      if (!result.opened) continue;
+      EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
+      const bool complete =
+          result.recording.data.packets.size() == whole.recording.data.packets.size();
+      EXPECT_TRUE(complete || result.error || !result.recording.warnings.empty());
       const bool is_current = std::any_of(frames.begin(), frames.end(), [&](std::size_t frame) {
         return at >= frame && at < frame + 8;
       });
       if (is_current) {
-        EXPECT_TRUE(result.read_error);
+        EXPECT_TRUE(result.error);
       }
     }
   }
@@ -641,8 +597,8 @@ TEST_F(LvxTest, AFlippedHeaderBitInventsNoPoint) {
 TEST_F(LvxTest, DamagedHeadersAreNamed) {
   const std::string file = rich_file();
   const auto message = [this](const std::string& bytes) -> std::string {
-    const ReadResult result = read(bytes);
-    return result.open_error ? result.open_error->what() : "was opened";
+    const Outcome result = read(bytes);
+    return result.opened ? "was opened" : result.error->what();
   };
   using ::testing::AllOf;
   using ::testing::HasSubstr;
@@ -667,7 +623,7 @@ TEST_F(LvxTest, DamagedHeadersAreNamed) {
 TEST_F(LvxTest, DamageInTheBodyIsReportedAfterTheSoundRows) {
   std::vector<std::size_t> frames;
   const std::string file = rich_file(&frames);
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   struct Case {
     const char* name;
     std::size_t at;
@@ -688,13 +644,13 @@ TEST_F(LvxTest, DamageInTheBodyIsReportedAfterTheSoundRows) {
     std::string damaged = file;
     damaged[c.at] = static_cast<char>(c.value);
     for (const std::size_t max_rows : {std::size_t{1}, kDefaultChunkRows}) {
-      const ReadResult result = read(damaged, max_rows);
-      ASSERT_FALSE(result.open_error);
-      ASSERT_TRUE(result.read_error);
-      EXPECT_EQ(result.read_error->place().byte_offset, c.offset);
-      EXPECT_THAT(result.read_error->what(), ::testing::HasSubstr(c.message));
-      EXPECT_EQ(result.data.packets.size(), c.packets);
-      expect_prefix(result.data.observations, whole.data.observations);
+      const Outcome result = read(damaged, max_rows);
+      ASSERT_TRUE(result.opened);
+      ASSERT_TRUE(result.error);
+      EXPECT_EQ(result.error->place().byte_offset, c.offset);
+      EXPECT_THAT(result.error->what(), ::testing::HasSubstr(c.message));
+      EXPECT_EQ(result.recording.data.packets.size(), c.packets);
+      EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
     }
   }
 }
@@ -704,44 +660,45 @@ TEST_F(LvxTest, UnknownDataTypesAreSteppedOverToTheNextFrame) {
   std::string file = rich_file(&frames);
   const std::size_t second = frames[0] + 24 + 679;
   file[second + 10] = 9;
-  ReadResult result = read(file);
-  ASSERT_FALSE(result.read_error);
+  Outcome result = read(file);
+  ASSERT_FALSE(result.error);
   std::vector<int> types;
-  for (const Packet& packet : result.data.packets) types.push_back(packet.data_type);
+  for (const Packet& packet : result.recording.data.packets) types.push_back(packet.data_type);
   EXPECT_THAT(types, ::testing::ElementsAre(8, 7, 0, 6));
-  ASSERT_EQ(result.warnings.size(), 1U);
-  EXPECT_EQ(result.warnings[0].place.byte_offset, second);
-  EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("data type 9"));
+  ASSERT_EQ(result.recording.warnings.size(), 1U);
+  EXPECT_EQ(result.recording.warnings[0].place.byte_offset, second);
+  EXPECT_THAT(result.recording.warnings[0].message, ::testing::HasSubstr("data type 9"));
   file[frames[1] + 24 + 10] = 9;
   result = read(file);
-  EXPECT_EQ(result.warnings.size(), 1U);
-  EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("its frame and of 1 more"));
+  EXPECT_EQ(result.recording.warnings.size(), 1U);
+  EXPECT_THAT(result.recording.warnings[0].message,
+              ::testing::HasSubstr("its frame and of 1 more"));
 }
 
 TEST_F(LvxTest, TheLastFrameMayBeLeftOpen) {
   std::vector<std::size_t> frames;
   const std::string file = rich_file(&frames);
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   for (const std::uint64_t next :
        {std::uint64_t{0}, std::uint64_t{frames[2]}, std::uint64_t{frames[2] - 5},
         std::uint64_t{file.size() + 1}, ~std::uint64_t{0}}) {
     SCOPED_TRACE(next);
     std::string open = file;
     put_at(open, frames[2] + 8, next);
-    ReadResult result = read(open);
-    ASSERT_FALSE(result.read_error);
-    ASSERT_EQ(result.data.observations.size(), whole.data.observations.size());
-    expect_prefix(result.data.observations, whole.data.observations);
-    EXPECT_EQ(result.data.imu.size(), 2U);
-    ASSERT_EQ(result.warnings.size(), 1U);
-    EXPECT_EQ(result.warnings[0].place.byte_offset, file.size());
+    Outcome result = read(open);
+    ASSERT_FALSE(result.error);
+    ASSERT_EQ(result.rows().size(), whole.rows().size());
+    EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
+    EXPECT_EQ(result.recording.data.imu.size(), 2U);
+    ASSERT_EQ(result.recording.warnings.size(), 1U);
+    EXPECT_EQ(result.recording.warnings[0].place.byte_offset, file.size());
     // An open frame in the middle does not hide the frames behind it.
     open = file;
     put_at(open, frames[0] + 8, next == frames[2] || next == frames[2] - 5 ? 0 : next);
     result = read(open);
-    ASSERT_FALSE(result.read_error);
-    EXPECT_EQ(result.data.packets.size(), whole.data.packets.size());
-    EXPECT_EQ(result.warnings.size(), 1U);
+    ASSERT_FALSE(result.error);
+    EXPECT_EQ(result.recording.data.packets.size(), whole.recording.data.packets.size());
+    EXPECT_EQ(result.recording.warnings.size(), 1U);
   }
 }
 
@@ -751,11 +708,11 @@ TEST_F(LvxTest, EmptyFramesAreRead) {
   put_frame(file, {}, 0);
   put_frame(file, {package(0, 0, 1, 0, random)}, 1);
   put_frame(file, {}, 2);
-  const ReadResult result = read(file);
-  EXPECT_FALSE(result.read_error);
-  EXPECT_TRUE(result.warnings.empty());
-  ASSERT_EQ(result.data.packets.size(), 1U);
-  EXPECT_EQ(result.data.packets[0].frame, 1U);
+  const Outcome result = read(file);
+  EXPECT_FALSE(result.error);
+  EXPECT_TRUE(result.recording.warnings.empty());
+  ASSERT_EQ(result.recording.data.packets.size(), 1U);
+  EXPECT_EQ(result.recording.data.packets[0].frame, 1U);
 }
 
 // --- what the packets themselves tell ------------------------------------------------------------
@@ -769,10 +726,10 @@ TEST_F(LvxTest, TheRateOfAnUnknownDeviceIsTakenFromItsPackets) {
       packages.push_back(package(0, 0, 3, static_cast<std::uint64_t>(i) * period, random));
     }
     put_frame(file, packages, 0);
-    const ReadResult result = read(file);
-    EXPECT_EQ(result.data.observations.time_ns[95], last);
-    ASSERT_EQ(result.warnings.size(), 1U);
-    EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("type 99"));
+    const Outcome result = read(file);
+    EXPECT_EQ(result.rows().time_ns[95], last);
+    ASSERT_EQ(result.recording.warnings.size(), 1U);
+    EXPECT_THAT(result.recording.warnings[0].message, ::testing::HasSubstr("type 99"));
     EXPECT_TRUE(copy(file) == file);
   }
 }
@@ -806,8 +763,8 @@ TEST_F(LvxTest, SeveralReturnsInSingleReturnRecordsAreToldByPeriodAndIntensity) 
       packages.push_back(one);
     }
     put_frame(file, packages, 0);
-    const ReadResult result = read(file);
-    const Observations& o = result.data.observations;
+    const Outcome result = read(file);
+    const Observations& o = result.rows();
     EXPECT_EQ(o.time_ns[99], c.last_ns);
     EXPECT_EQ(o.return_number[1], c.returns == 1 ? 1 : 2);
     EXPECT_EQ(o.return_number[c.returns], 1);
@@ -843,15 +800,15 @@ TEST_F(LvxTest, Lvx10IsReadWithBothSizesOfFrameHeaders) {
     for (const bool empty_first : {false, true}) {
       SCOPED_TRACE(::testing::Message() << header_bytes << " " << empty_first);
       const std::string file = lvx10_file(header_bytes, empty_first);
-      const ReadResult result = read(file);
-      ASSERT_FALSE(result.open_error || result.read_error);
-      EXPECT_TRUE(result.warnings.empty());
+      const Outcome result = read(file);
+      ASSERT_FALSE(result.error);
+      EXPECT_TRUE(result.recording.warnings.empty());
       const RecordingHeader header = open_recording(folder_.file("in.lvx"))->header();
       EXPECT_EQ(header.format, "lvx-1.0");
       EXPECT_TRUE(header.cartesian);
       ASSERT_EQ(header.devices.size(), 2U);
       EXPECT_THAT(header.devices[1].translation_m, ::testing::ElementsAre(0.1F, 0.2F, -0.3F));
-      const Observations& o = result.data.observations;
+      const Observations& o = result.rows();
       ASSERT_EQ(o.size(), 300U);
       EXPECT_NEAR(o.range[0], std::sqrt(4 + 1.5625 + 0.25), 1e-7);
       EXPECT_NEAR(o.azimuth[0], std::atan2(1.25, 2.0), 1e-7);
@@ -862,11 +819,11 @@ TEST_F(LvxTest, Lvx10IsReadWithBothSizesOfFrameHeaders) {
       EXPECT_EQ(o.device[100], 1);
 
       // As LVX 1.1 the points are whole millimetres.
-      const ReadResult converted = read(copy(file));
-      ASSERT_EQ(converted.data.observations.size(), 300U);
-      EXPECT_EQ(converted.data.observations.time_ns, o.time_ns);
+      const Outcome converted = read(copy(file));
+      ASSERT_EQ(converted.rows().size(), 300U);
+      EXPECT_EQ(converted.rows().time_ns, o.time_ns);
       for (std::size_t row = 0; row < 300; ++row) {
-        ASSERT_NEAR(converted.data.observations.range[row], o.range[row], 1e-6);
+        ASSERT_NEAR(converted.rows().range[row], o.range[row], 1e-6);
       }
     }
   }
@@ -875,24 +832,25 @@ TEST_F(LvxTest, Lvx10IsReadWithBothSizesOfFrameHeaders) {
 TEST_F(LvxTest, Lvx10CutsAndDamageLoseOnlyTheTail) {
   for (const std::size_t header_bytes : {24U, 32U}) {
     const std::string file = lvx10_file(header_bytes, false);
-    const ReadResult whole = read(file);
+    const Outcome whole = read(file);
     const std::size_t first = 25 + 2 * 58;
     for (std::size_t cut = first + header_bytes + 1319; cut < file.size(); ++cut) {
-      const ReadResult result = read(file.substr(0, cut));
-      ASSERT_FALSE(result.open_error || result.read_error) << cut;
-      ASSERT_GE(result.data.observations.size(), 100U);
-      expect_prefix(result.data.observations, whole.data.observations);
-      ASSERT_EQ(result.warnings.size(), cut == first + header_bytes + 2 * 1319 ? 0U : 1U) << cut;
+      const Outcome result = read(file.substr(0, cut));
+      ASSERT_FALSE(result.error) << cut;
+      ASSERT_GE(result.rows().size(), 100U);
+      EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
+      ASSERT_EQ(result.recording.warnings.size(), cut == first + header_bytes + 2 * 1319 ? 0U : 1U)
+          << cut;
     }
     for (std::size_t cut = 0; cut < first; ++cut) {
-      ASSERT_TRUE(read(file.substr(0, cut)).open_error) << cut;
+      ASSERT_FALSE(read(file.substr(0, cut)).opened) << cut;
     }
     std::string damaged = file;
     put_at(damaged, first + header_bytes + 1319 + 19 + 13, std::numeric_limits<float>::quiet_NaN());
-    const ReadResult result = read(damaged);
-    ASSERT_TRUE(result.read_error);
-    EXPECT_EQ(result.read_error->place().byte_offset, first + header_bytes + 1319 + 19 + 13);
-    EXPECT_EQ(result.data.observations.size(), 100U);
+    const Outcome result = read(damaged);
+    ASSERT_TRUE(result.error);
+    EXPECT_EQ(result.error->place().byte_offset, first + header_bytes + 1319 + 19 + 13);
+    EXPECT_EQ(result.rows().size(), 100U);
   }
 }
 

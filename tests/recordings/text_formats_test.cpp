@@ -189,17 +189,6 @@ TEST(ScanSequence, NamesTheDamagedLine) {
        {"whole last line without end", two + "0.00003,nan,90.00000", 4, 2, "nan"}});
 }
 
-TEST(ScanSequence, DamageIsReportedAgain) {
-  const TestFolder folder;
-  const std::string path = folder.file("damaged.csv");
-  put_bytes(path, kHead + "0.00001,1.00000,2.00000\nx\n");
-  auto reader = kScanSequenceCsvFormat.open(path, {});
-  Chunk chunk;
-  EXPECT_TRUE(reader->read(chunk));
-  EXPECT_THROW(reader->read(chunk), FileError);
-  EXPECT_THROW(reader->read(chunk), FileError);
-}
-
 TEST(ScanSequence, RefusesOtherHeaders) {
   for (const std::string header :
        {"", "\n", "Time,Azimuth,Zenith\n", "Time/s,Zenith/deg,Azimuth/deg\n",
