@@ -276,7 +276,9 @@ TEST(Entries, TheBatchEstimatorAsksForAStartOfEveryRotorAndSoundOptions) {
 }
 
 TEST(Entries, TheFilterAsksForAStartOfEveryRotorAndSoundOptions) {
-  using Ekf = EstimatorCall<EkfOptions>;
+  struct Ekf : EstimatorCall<EkfOptions> {
+    Ekf() { options.angle_noise = 1e-4; }
+  };
   expect_refusals<Ekf>({
       {"angle noise = nan deg, allowed above 0", [](Ekf& e) { e.options.angle_noise = kNan; }},
       {"parameter walk = -1 rad/sqrt(s), allowed 0 and above",
