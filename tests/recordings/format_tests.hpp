@@ -10,6 +10,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
@@ -84,6 +85,29 @@ inline Outcome read_text(const Format& format, std::string_view bytes,
   const std::string path = folder.file("input");
   put_bytes(path, bytes);
   return read_all(format, path, chunk_rows);
+}
+
+/// The words of a recording's warnings.
+inline std::vector<std::string> warnings_of(const Outcome& outcome) {
+  std::vector<std::string> texts;
+  for (const ReadWarning& warning : outcome.recording.warnings) texts.push_back(warning.message);
+  return texts;
+}
+
+/// Reading ended at damage that is described in these words, after these rows, at this byte or
+/// line.
+inline void expect_damage(const Outcome& outcome, const ::testing::Matcher<std::string>& problem,
+                          std::optional<std::size_t> rows = {},
+                          std::optional<std::uint64_t> place = {}) {
+  ASSERT_TRUE(outcome.error);
+  EXPECT_THAT(outcome.error->problem(), problem);
+  if (rows) {
+    EXPECT_EQ(outcome.rows().size(), *rows);
+  }
+  if (place) {
+    const FilePlace& found = outcome.error->place();
+    EXPECT_EQ(found.byte_offset ? found.byte_offset : found.line, place);
+  }
 }
 
 inline void write_all(const Format& format, const std::string& path, const RecordingHeader& header,

@@ -15,6 +15,7 @@
 namespace risley::recordings::openpylivox_test {
 
 using namespace format_tests;
+using ::testing::_;
 using ::testing::HasSubstr;
 
 template <class T>
@@ -162,9 +163,7 @@ TEST(OpenpylivoxBin, SaysWhereItIsDamaged) {
     for (const std::size_t chunk_rows : {std::size_t{1}, kDefaultChunkRows}) {
       SCOPED_TRACE(c.name);
       const Outcome outcome = read_text(kOpenpylivoxBinFormat, c.bytes, chunk_rows);
-      ASSERT_TRUE(outcome.error);
-      EXPECT_EQ(outcome.error->place().byte_offset, c.offset);
-      EXPECT_EQ(outcome.rows().size(), c.sound_rows);
+      expect_damage(outcome, _, c.sound_rows, c.offset);
     }
   }
 }
@@ -250,10 +249,8 @@ TEST(OpenpylivoxCsv, NamesTheDamagedLine) {
     const std::string text = kTables[c.table] + c.row + "\n" + "more\n";
     const auto rows = static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')) - 3;
     const Outcome outcome = read_text(kOpenpylivoxCsvFormat, text);
-    ASSERT_TRUE(outcome.error);
-    EXPECT_EQ(outcome.error->place().line, rows + 2);
+    expect_damage(outcome, HasSubstr(c.problem), {}, rows + 2);
     EXPECT_EQ(outcome.rows().size() + outcome.recording.data.imu.size(), rows);
-    EXPECT_THAT(outcome.error->problem(), HasSubstr(c.problem));
   }
   for (const std::string header : {"//X,Y,Z\n", "X,Y,Z,Inten-sity,Time\n", ""}) {
     EXPECT_FALSE(kOpenpylivoxCsvFormat.recognises(header));
