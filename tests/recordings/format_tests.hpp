@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "risley/core/error.hpp"
 
@@ -108,6 +109,20 @@ inline void expect_damage(const Outcome& outcome, const ::testing::Matcher<std::
     const FilePlace& found = outcome.error->place();
     EXPECT_EQ(found.byte_offset ? found.byte_offset : found.line, place);
   }
+}
+
+/// Expects reading to take less than 200 MiB, whatever a file claims.
+inline void expect_little_memory(const std::function<void()>& reading) {
+  const auto peak_kib = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const auto before = peak_kib();
+  reading();
+#if !defined(__SANITIZE_THREAD__)  // it touches its own notes of every allocation
+  EXPECT_LT(peak_kib() - before, 200 << 10);
+#endif
 }
 
 inline void write_all(const Format& format, const std::string& path, const RecordingHeader& header,
