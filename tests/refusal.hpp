@@ -14,11 +14,11 @@
 namespace risley {
 
 /// The message of the error that a call throws, "" without one.
-template <class Thrown = InvalidArgument, class Call>
+template <class Exception = InvalidArgument, class Call>
 std::string refusal(Call&& call) {
   try {
     call();
-  } catch (const Thrown& error) {
+  } catch (const Exception& error) {
     return error.what();
   }
   return {};
