@@ -38,9 +38,7 @@ struct RotorCurves {
   /// The first of the degree + 1 coefficients that act in a segment.
   int first_coefficient(int segment) const { return smooth ? segment : segment * (degree + 1); }
   /// rad, not wrapped
-  double angle(int rotor, double time) const {
-    return weighted(rotor, time, &CurveWeights::value);
-  }
+  double angle(int rotor, double time) const { return weighted(rotor, time, &CurveWeights::value); }
   /// rad/s
   double angular_velocity(int rotor, double time) const {
     return weighted(rotor, time, &CurveWeights::rate);
