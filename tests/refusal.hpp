@@ -3,7 +3,10 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -38,6 +41,42 @@ inline std::string replaced(std::string text, const std::string& what, const std
   const std::size_t at = text.find(what);
   EXPECT_NE(at, std::string::npos) << what;
   return at == std::string::npos ? text : text.replace(at, what.size(), by);
+}
+
+/// Expects a call to be refused with these words, or, if they end with "...", with words that begin
+/// so; "" is no refusal.
+inline void expect_refusal(std::string_view words, const std::function<void()>& call) {
+  const std::string said = refusal(call);
+  if (words.ends_with("...")) {
+    words.remove_suffix(3);
+    EXPECT_TRUE(said.starts_with(words)) << said << "\nexpected " << words;
+  } else {
+    EXPECT_EQ(said, words);
+  }
+}
+
+/// Calls, each with the words that it is refused with, as expect_refusal().
+struct Refused {
+  std::string_view words;
+  std::function<void()> call;
+};
+inline void expect_refusals(const std::vector<Refused>& all) {
+  for (const Refused& one : all) expect_refusal(one.words, one.call);
+}
+
+/// As above, of subject.run() after each change of a new subject.
+template <class Subject>
+struct RefusedAfter {
+  std::string_view words;
+  std::function<void(Subject& subject)> change;
+};
+template <class Subject>
+void expect_refusals(const std::vector<RefusedAfter<Subject>>& all) {
+  for (const RefusedAfter<Subject>& one : all) {
+    Subject subject;
+    one.change(subject);
+    expect_refusal(one.words, [&] { subject.run(); });
+  }
 }
 
 }  // namespace risley

@@ -349,71 +349,12 @@ Eigen::MatrixXd mean_angle_sensitivity(const SmootherSolution& solution,
   return mean / static_cast<double>(knots.size());
 }
 
-}  // namespace
-
-Solution run_batch_map(const PackedSeries& series, const Start& start,
-                       const sensors::Sensor& sensor, const BatchMapOptions& options,
-                       const Progress& progress) {
-  if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
-  if (options.angle_noise) check_noise(*options.angle_noise);
-  require_between("knot interval", options.knot_interval, 1e-9, kMostSeconds, "s");
-  require_not_below("frame sigma", options.frame_sigma, 0, "rad");
-  require_threshold("outlier chi2", options.outlier_chi2);
-  require_at_least("most iterations", options.most_iterations, 1);
-  const int prisms = sensor.prisms();
-  require_start(start, prisms);
-  require_process(options.rotor_process, prisms);
-  const auto rotors = static_cast<std::size_t>(prisms);
-  const bool choose = options.rotor_process.empty();
-  Solution result;
-  std::vector<RotorProcess> process =
-      choose ? std::vector<RotorProcess>(rotors, kSettlingProcess) : options.rotor_process;
-
-  // Coarse: tracked phases, then robust steps.
-  const Constants constants(options, prisms);
-  const std::vector<ShotRange> all_stretches = stretches(series);
-  std::vector<ShotRange> coarse_stretches = all_stretches;
-  const PackedSeries coarse_shots =
-      thinned(series, coarse_rate(series, all_stretches), coarse_stretches);
-  const AngleSeries coarse_series = coarse_shots.rows();
-  const AngleNoise first_noise =
-      options.angle_noise.value_or(equal_noise(std::max(start.residual_rms, kLeastAngleNoise)));
-  const auto starts =
-      find_stretch_starts(coarse_series, coarse_stretches, start, sensor, first_noise.rms());
-  std::vector<ShotRange> coarse_used, used;
-  for (std::size_t s = 0; s < starts.size(); ++s) {
-    if (starts[s].start) {
-      coarse_used.push_back(coarse_stretches[s]);
-      used.push_back(all_stretches[s]);
-    } else {
-      result.unused_shots += all_stretches[s].size();
-    }
-  }
-  if (used.empty()) throw EstimationError("no stretch of the recording has a start");
-  // The shots of the pass between the coarse one and that of all are picked out during the coarse
-  // one.
-  const double thinning =
-      static_cast<double>(series.size()) / static_cast<double>(coarse_series.size());
-  PackedSeries some;
-  std::vector<ShotRange> some_ranges = used;
-  parallel::TaskGroup picking;
-  if (thinning >= kStrongThinning) {
-    picking.run([&, rate = coarse_rate(series, all_stretches) * thinning * kSomeShots] {
-      some = thinned(series, rate, some_ranges);
-    });
-  }
-  Iteration coarse(coarse_shots, options, constants, sensor.train, start.train,
-                   make_knots(coarse_shots, coarse_used, prisms, options.knot_interval),
-                   Eigen::Matrix3d::Identity());
-  coarse.weights().angle_noise = first_noise;
-  for (std::size_t s = 0, stretch = 0; s < starts.size(); ++s) {
-    if (!starts[s].start) continue;
-    track_rotors(coarse_series, starts[s].shots, *starts[s].start, first_noise, coarse.knots(),
-                 coarse.knots().stretch_begin[stretch], coarse.knots().stretch_end(stretch));
-    ++stretch;
-  }
-  progress.report(0.05);
-  bool chosen = !choose;
+/// Robust steps from tracked phases, until neither scale nor constants move any more.
+/// @param process  of the rotors, chosen on the way where it is not given
+/// @return level of the residuals
+double settle(Iteration& coarse, const BatchMapOptions& options, std::vector<RotorProcess>& process,
+              std::size_t& iterations, const Progress& progress) {
+  bool chosen = !options.rotor_process.empty();
   double level = 0, scale = 0, moved = std::numeric_limits<double>::infinity();
   const auto rescale = [&] {
     level = coarse.level();
@@ -435,32 +376,17 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
       chosen = true;
     }
     moved = coarse.move(coarse.solve(process, false));
-    ++result.iterations;
+    ++iterations;
   }
-  progress.report(0.4);
+  return level;
+}
 
-  // Some of the shots, and then all: the same stretches, starting where the pass before ended. What
-  // that one had in memory is as much as the next one needs.
-  const auto go_on = [&](Iteration from, const PackedSeries& shots,
-                         const std::vector<ShotRange>& ranges) {
-    Iteration next(shots, options, constants, sensor.train, from.train(),
-                   make_knots(shots, ranges, prisms, options.knot_interval), from.frame());
-    interpolate(from.knots(), next.knots());
-    next.weights().angle_noise = from.weights().angle_noise;
-    next.weights().cut = options.outlier_chi2 * level * level;
-    return next;
-  };
-  const auto go_on_with_all = [&] {
-    if (thinning < kStrongThinning) return go_on(std::move(coarse), series, used);
-    picking.wait();
-    Iteration middle = go_on(std::move(coarse), some, some_ranges);
-    middle.evaluate();
-    level = middle.level();
-    middle.move(middle.solve(process, false));
-    return go_on(std::move(middle), series, used);
-  };
-  Iteration full = go_on_with_all();
-  some = {};
+/// Passes over all shots until they settle, with noise and covariances.
+/// @param level  of the residuals so far
+void refine(Iteration& full, const BatchMapOptions& options, const Constants& constants,
+            double level, std::vector<RotorProcess>& process, Solution& result,
+            const Progress& progress) {
+  const bool choose = options.rotor_process.empty();
   full.watch_autocorrelation();
   const bool noise_is_held = options.angle_noise.has_value();
   double used_share = 0, first_factor = 1;
@@ -506,7 +432,7 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
         used_share, std::clamp(used_observations(full.equations(), solution) /
                                    static_cast<double>(std::max<std::size_t>(1, angles)),
                                0.0, 0.9));
-    moved = full.move(solution);
+    const double moved = full.move(solution);
     ++result.iterations;
     progress.report(0.4 + 0.6 * (pass + 1) / kMostFullPasses);
     // The noise was found with what the pass before used up; where that was another share, a third
@@ -527,6 +453,98 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
                             shared_angle_information(full.equations())};
     break;
   }
+}
+
+}  // namespace
+
+Solution run_batch_map(const PackedSeries& series, const Start& start,
+                       const sensors::Sensor& sensor, const BatchMapOptions& options,
+                       const Progress& progress) {
+  if (series.size() == 0) throw EstimationError("no valid shot to estimate from");
+  if (options.angle_noise) check_noise(*options.angle_noise);
+  require_between("knot interval", options.knot_interval, 1e-9, kMostSeconds, "s");
+  require_not_below("frame sigma", options.frame_sigma, 0, "rad");
+  require_threshold("outlier chi2", options.outlier_chi2);
+  require_at_least("most iterations", options.most_iterations, 1);
+  const int prisms = sensor.prisms();
+  require_start(start, prisms);
+  require_process(options.rotor_process, prisms);
+  const auto rotors = static_cast<std::size_t>(prisms);
+  Solution result;
+  std::vector<RotorProcess> process = options.rotor_process.empty()
+                                          ? std::vector<RotorProcess>(rotors, kSettlingProcess)
+                                          : options.rotor_process;
+
+  // Coarse: tracked phases, then robust steps.
+  const Constants constants(options, prisms);
+  const std::vector<ShotRange> all_stretches = stretches(series);
+  std::vector<ShotRange> coarse_stretches = all_stretches;
+  const PackedSeries coarse_shots =
+      thinned(series, coarse_rate(series, all_stretches), coarse_stretches);
+  const AngleSeries coarse_series = coarse_shots.rows();
+  const AngleNoise first_noise =
+      options.angle_noise.value_or(equal_noise(std::max(start.residual_rms, kLeastAngleNoise)));
+  const auto starts =
+      find_stretch_starts(coarse_series, coarse_stretches, start, sensor, first_noise.rms());
+  std::vector<ShotRange> coarse_used, used;
+  for (std::size_t s = 0; s < starts.size(); ++s) {
+    if (starts[s].start) {
+      coarse_used.push_back(coarse_stretches[s]);
+      used.push_back(all_stretches[s]);
+    } else {
+      result.unused_shots += all_stretches[s].size();
+    }
+  }
+  if (used.empty()) throw EstimationError("no stretch of the recording has a start");
+  // The shots of the pass between the coarse one and that of all are picked out during the coarse
+  // one.
+  const double thinning =
+      static_cast<double>(series.size()) / static_cast<double>(coarse_series.size());
+  PackedSeries some;
+  std::vector<ShotRange> some_ranges = used;
+  parallel::TaskGroup picking;
+  if (thinning >= kStrongThinning) {
+    picking.run([&, rate = coarse_rate(series, all_stretches) * thinning * kSomeShots] {
+      some = thinned(series, rate, some_ranges);
+    });
+  }
+  Iteration coarse(coarse_shots, options, constants, sensor.train, start.train,
+                   make_knots(coarse_shots, coarse_used, prisms, options.knot_interval),
+                   Eigen::Matrix3d::Identity());
+  coarse.weights().angle_noise = first_noise;
+  for (std::size_t s = 0, stretch = 0; s < starts.size(); ++s) {
+    if (!starts[s].start) continue;
+    track_rotors(coarse_series, starts[s].shots, *starts[s].start, first_noise, coarse.knots(),
+                 coarse.knots().stretch_begin[stretch], coarse.knots().stretch_end(stretch));
+    ++stretch;
+  }
+  progress.report(0.05);
+  double level = settle(coarse, options, process, result.iterations, progress);
+  progress.report(0.4);
+
+  // Some of the shots, and then all: the same stretches, starting where the pass before ended. What
+  // that one had in memory is as much as the next one needs.
+  const auto go_on = [&](Iteration from, const PackedSeries& shots,
+                         const std::vector<ShotRange>& ranges) {
+    Iteration next(shots, options, constants, sensor.train, from.train(),
+                   make_knots(shots, ranges, prisms, options.knot_interval), from.frame());
+    interpolate(from.knots(), next.knots());
+    next.weights().angle_noise = from.weights().angle_noise;
+    next.weights().cut = options.outlier_chi2 * level * level;
+    return next;
+  };
+  const auto go_on_with_all = [&] {
+    if (thinning < kStrongThinning) return go_on(std::move(coarse), series, used);
+    picking.wait();
+    Iteration middle = go_on(std::move(coarse), some, some_ranges);
+    middle.evaluate();
+    level = middle.level();
+    middle.move(middle.solve(process, false));
+    return go_on(std::move(middle), series, used);
+  };
+  Iteration full = go_on_with_all();
+  some = {};
+  refine(full, options, constants, level, process, result, progress);
   result.train = full.train();
   result.frame = full.frame();
   result.constants = constants.all;

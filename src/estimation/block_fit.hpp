@@ -20,12 +20,69 @@
 
 namespace risley::estimation {
 
+/// Sigma, rad/s and rad/s^2, of speeds and accelerations that are not looked for.
+inline constexpr double kStraightSigma = 1e-3;
+
 /// Angle, speed and acceleration of every rotor at a time.
 struct RotorState {
   std::int64_t time_ns = 0;
   KnotVector<Eigen::Dynamic> mean;
   KnotSquare<Eigen::Dynamic> covariance;
 };
+
+/// A start as a state that may be off by so much, rad and, of a speed, what a function says, rad/s.
+template <class SpeedSigma>
+RotorState state_of(const Start& start, double angle_sigma, const SpeedSigma& speed_sigma) {
+  const auto prisms = static_cast<Eigen::Index>(start.rotation_angle.size());
+  RotorState state;
+  state.time_ns = start.time_ns;
+  state.mean.setZero(3 * prisms);
+  state.covariance.setZero(3 * prisms, 3 * prisms);
+  for (Eigen::Index k = 0; k < prisms; ++k) {
+    const double speed = start.angular_velocity[static_cast<std::size_t>(k)];
+    const double sigma[] = {angle_sigma, speed_sigma(speed), kStraightSigma};
+    state.mean[3 * k] = start.rotation_angle[static_cast<std::size_t>(k)];
+    state.mean[3 * k + 1] = speed;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      state.covariance(3 * k + i, 3 * k + i) = sigma[i] * sigma[i];
+    }
+  }
+  return state;
+}
+
+/// A start as a state that may be off by so much, rad and a share of the speeds.
+inline RotorState loose_state(const Start& start, double angle_sigma, double speed_share) {
+  return state_of(start, angle_sigma, [&](double speed) {
+    return std::max(speed_share * std::abs(speed), kStraightSigma);
+  });
+}
+
+/// Moves a state on to a time.
+inline void predict(RotorState& state, std::int64_t time_ns) {
+  const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
+  state.time_ns = time_ns;
+  for (Eigen::Index k = 0; k < state.mean.size(); k += 3) advance_rows(state.mean, k, dt);
+  predict_covariance(state.covariance, dt, [](std::size_t) { return kSettlingProcess; });
+}
+
+/// One Gauss-Newton step from a state to some shots and a prior together.
+/// @param equations  of one knot with these shots, at the state
+/// @return false, and the state as it was, where there is none
+inline bool step_towards(const NormalEquations& equations, const RotorState& prior,
+                         RotorState& state) {
+  const KnotSquare<Eigen::Dynamic> curvature = knot_curvature<Eigen::Dynamic>(equations, 0);
+  const KnotVector<Eigen::Dynamic> pull = prior.mean - state.mean;
+  KnotSquare<Eigen::Dynamic> covariance = prior.covariance;
+  if (!add_information(covariance, curvature)) return false;
+  // (P^-1 + H)^-1 (g + P^-1 pull), without P^-1.
+  const Eigen::Map<const KnotVector<Eigen::Dynamic>> gradient(equations.gradient.data(),
+                                                              pull.size());
+  const KnotVector<Eigen::Dynamic> step = pull + covariance * (gradient - curvature * pull);
+  if (!step.allFinite()) return false;
+  state.mean += step;
+  state.covariance = covariance;
+  return true;
+}
 
 /// A state as a start of other rotors.
 inline void set_rotors(Start& start, const RotorState& state) {
@@ -64,34 +121,6 @@ class BlockFit {
     knot_.state.resize(static_cast<std::size_t>(knot_.states()));
   }
 
-  /// A start as a state that may be off by so much, rad and a share of the speeds.
-  static RotorState loose_state(const Start& start, double angle_sigma, double speed_share) {
-    // Of speeds and accelerations that are not looked for.
-    constexpr double kStraightSpeedSigma = 1e-3;
-    const auto prisms = static_cast<Eigen::Index>(start.rotation_angle.size());
-    RotorState state;
-    state.time_ns = start.time_ns;
-    state.mean.resize(3 * prisms);
-    state.covariance.setZero(3 * prisms, 3 * prisms);
-    for (Eigen::Index k = 0; k < prisms; ++k) {
-      const double speed = start.angular_velocity[static_cast<std::size_t>(k)];
-      state.mean[3 * k] = start.rotation_angle[static_cast<std::size_t>(k)];
-      state.mean[3 * k + 1] = speed;
-      state.mean[3 * k + 2] = 0;
-      state.covariance(3 * k, 3 * k) = angle_sigma * angle_sigma;
-      state.covariance(3 * k + 1, 3 * k + 1) =
-          std::pow(std::max(speed_share * std::abs(speed), kStraightSpeedSigma), 2);
-      state.covariance(3 * k + 2, 3 * k + 2) = kStraightSpeedSigma * kStraightSpeedSigma;
-    }
-    return state;
-  }
-
-  static void predict(RotorState& state, std::int64_t time_ns) {
-    const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
-    predict_rotors(state.mean, state.covariance, kSettlingProcess, dt);
-    state.time_ns = time_ns;
-  }
-
   /// Residuals of the block and its normal equations about a state.
   void evaluate(const RotorState& state) {
     knot_.time_ns[0] = state.time_ns;
@@ -105,16 +134,7 @@ class BlockFit {
   /// One Gauss-Newton step from a state to the block and a prior together.
   void improve(RotorState& state, const RotorState& prior) {
     evaluate(state);
-    const KnotSquare<Eigen::Dynamic> curvature = knot_curvature<Eigen::Dynamic>(equations_, 0);
-    const KnotVector<Eigen::Dynamic> pull = prior.mean - state.mean;
-    KnotSquare<Eigen::Dynamic> covariance = prior.covariance;
-    if (!add_information(covariance, curvature)) return;
-    const Eigen::Map<const KnotVector<Eigen::Dynamic>> gradient(equations_.gradient.data(),
-                                                                pull.size());
-    const KnotVector<Eigen::Dynamic> step = pull + covariance * (gradient - curvature * pull);
-    if (!step.allFinite()) return;
-    state.mean += step;
-    state.covariance = covariance;
+    step_towards(equations_, prior, state);
   }
 
   static void clear(AngleSeries& series) {

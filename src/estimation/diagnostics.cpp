@@ -135,34 +135,34 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   const std::int64_t step = median_step_ns(time_ns);
   if (step <= 0) return result;  // a clock that stands still tells no lags
   // Blocks spread over the recording, left-out shots as zeros with weight zero.
-  struct Block {
+  struct EvenRun {
     std::vector<double> azimuth, zenith, weight;
   };
-  std::vector<Block> blocks;
+  std::vector<EvenRun> runs;
   double variance = 0, used = 0;
   for (const auto& [begin, end] : autocorrelation_windows(time_ns.size())) {
-    Block block;
+    EvenRun run;
     for (std::size_t i = begin; i < end; ++i) {
-      if (i > begin) {  // missing shots take their places; behind a long gap a new block begins
+      if (i > begin) {  // missing shots take their places; behind a long gap a new run begins
         const std::int64_t missing = (time_ns[i] - time_ns[i - 1] + step / 2) / step - 1;
         if (missing < 0 || missing > 1000) {
-          blocks.push_back(std::exchange(block, {}));
+          runs.push_back(std::exchange(run, {}));
         } else if (missing > 0) {
-          const std::size_t size = block.azimuth.size() + static_cast<std::size_t>(missing);
-          for (auto* column : {&block.azimuth, &block.zenith, &block.weight}) {
+          const std::size_t size = run.azimuth.size() + static_cast<std::size_t>(missing);
+          for (auto* column : {&run.azimuth, &run.zenith, &run.weight}) {
             column->resize(size, 0.0);
           }
         }
       }
       const bool good =
           (skip.empty() || skip[i] == 0) && std::isfinite(azimuth[i]) && std::isfinite(zenith[i]);
-      block.azimuth.push_back(good ? azimuth[i] : 0.0);
-      block.zenith.push_back(good ? zenith[i] : 0.0);
-      block.weight.push_back(good ? 1.0 : 0.0);
+      run.azimuth.push_back(good ? azimuth[i] : 0.0);
+      run.zenith.push_back(good ? zenith[i] : 0.0);
+      run.weight.push_back(good ? 1.0 : 0.0);
       variance += good ? azimuth[i] * azimuth[i] + zenith[i] * zenith[i] : 0.0;
       used += good;
     }
-    blocks.push_back(std::move(block));
+    runs.push_back(std::move(run));
   }
   if (!(used > 0) || !(variance > 0)) return result;
   variance /= used;
@@ -175,15 +175,15 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     double fewest_pairs = std::numeric_limits<double>::infinity(), sum = 0;
     for (std::size_t lag = first; lag < first + group; ++lag) {
       double products = 0, pairs = 0;
-      for (const Block& block : blocks) {
-        if (block.azimuth.size() <= lag) continue;
-        const auto shared = static_cast<Eigen::Index>(block.azimuth.size() - lag);
+      for (const EvenRun& run : runs) {
+        if (run.azimuth.size() <= lag) continue;
+        const auto shared = static_cast<Eigen::Index>(run.azimuth.size() - lag);
         const auto product = [&](const std::vector<double>& column) {
           return Eigen::VectorXd::Map(column.data(), shared)
               .dot(Eigen::VectorXd::Map(column.data() + lag, shared));
         };
-        products += product(block.azimuth) + product(block.zenith);
-        pairs += product(block.weight);
+        products += product(run.azimuth) + product(run.zenith);
+        pairs += product(run.weight);
       }
       fewest_pairs = std::min(fewest_pairs, pairs);
       rho.push_back(pairs > 0 ? products / pairs / variance : 0.0);

@@ -88,10 +88,8 @@ Vector motion_offset(const Vector& from, const Vector& to, double dt) {
 /// columns := columns F^T
 template <class Matrix>
 void advance_columns(Matrix& m, Eigen::Index first, double dt) {
-  for (Eigen::Index i = 0; i < m.rows(); ++i) {
-    m(i, first) += dt * m(i, first + 1) + (0.5 * dt * dt) * m(i, first + 2);
-    m(i, first + 1) += dt * m(i, first + 2);
-  }
+  Eigen::Transpose<Matrix> turned(m);
+  advance_rows(turned, first, dt);
 }
 /// rows := F^T rows
 template <class Matrix>
@@ -104,10 +102,8 @@ void retreat_rows(Matrix& m, Eigen::Index first, double dt) {
 /// columns := columns F
 template <class Matrix>
 void retreat_columns(Matrix& m, Eigen::Index first, double dt) {
-  for (Eigen::Index i = 0; i < m.rows(); ++i) {
-    m(i, first + 2) += dt * m(i, first + 1) + (0.5 * dt * dt) * m(i, first);
-    m(i, first + 1) += dt * m(i, first);
-  }
+  Eigen::Transpose<Matrix> turned(m);
+  retreat_rows(turned, first, dt);
 }
 
 /// Process noise of one rotor over dt.
@@ -120,17 +116,14 @@ inline Eigen::Matrix3d step_noise(const RotorProcess& process, double dt) {
   return noise;
 }
 
-/// States of all rotors and their covariance, moved on by dt.
-template <class Vector, class Square>
-void predict_rotors(Vector& mean, Square& covariance, const RotorProcess& process, double dt) {
-  const Eigen::Index states = mean.size();
-  for (Eigen::Index k = 0; k < states; k += 3) {
-    advance_rows(mean, k, dt);
-    advance_rows(covariance, k, dt);
-  }
-  for (Eigen::Index k = 0; k < states; k += 3) advance_columns(covariance, k, dt);
-  for (Eigen::Index k = 0; k < states; k += 3) {
-    covariance.template block<3, 3>(k, k) += step_noise(process, dt);
+/// The covariance of the states of all rotors, moved on by dt.
+/// @param process_of  of a rotor
+template <class Square, class ProcessOf>
+void predict_covariance(Square& p, double dt, const ProcessOf& process_of) {
+  for (Eigen::Index k = 0; k < p.rows(); k += 3) advance_rows(p, k, dt);
+  for (Eigen::Index k = 0; k < p.rows(); k += 3) {
+    advance_columns(p, k, dt);
+    p.template block<3, 3>(k, k) += step_noise(process_of(static_cast<std::size_t>(k / 3)), dt);
   }
 }
 
@@ -155,11 +148,7 @@ void add_product(const A& a, const B& b, Out& out) {
 /// out -= a b
 template <class A, class B, class Out>
 void subtract_product(const A& a, const B& b, Out& out) {
-  for (Eigen::Index j = 0; j < b.cols(); ++j) {
-    HeldColumn<Out> column = out.col(j);
-    for (Eigen::Index k = 0; k < a.cols(); ++k) column -= a.col(k) * b(k, j);
-    out.col(j) = column;
-  }
+  add_product(a, -b, out);
 }
 
 /// Lower Cholesky factor, in place. Whole columns are worked on: what stands above the diagonal is

@@ -71,13 +71,6 @@ Eigen::Index row_of(const FreeParameter& parameter, const std::vector<FreeParame
   return found == all.end() ? -1 : found - all.begin();
 }
 
-/// Rows of an information matrix, inverted; none where they lack information.
-std::optional<Eigen::MatrixXd> restricted_covariance(const Eigen::MatrixXd& information,
-                                                     const Eigen::VectorXd& scale,
-                                                     const std::vector<Eigen::Index>& rows) {
-  return bound_covariance(information(rows, rows), scale(rows));
-}
-
 /// Parameters and the rotors' states in the middle of a recording, as one linear model: the states
 /// are s = S p + rest, where the rest has a covariance of its own.
 struct Middle {
@@ -185,8 +178,9 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
     const auto at = std::find(rows.begin(), rows.end(), quantity);
     found.free = !parameter || at != rows.end();
     if (parameter && at == rows.end()) rows.push_back(quantity);
+    const Eigen::MatrixXd& information = solution.parameter_information;
     const std::optional<Eigen::MatrixXd> covariance =
-        restricted_covariance(solution.parameter_information, scale, rows);
+        bound_covariance(information(rows, rows), scale(rows));
     if (!covariance) {
       found.sigma = std::numeric_limits<double>::infinity();
       // Whom it cannot be told from shows under the wide priors.
@@ -241,16 +235,11 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
 }  // namespace
 
 Observability observability_of_plan(const ObservabilityPlan& plan, const Progress& progress) {
-  const auto positive = [](double value, const char* name, const char* unit) {
-    if (!(value > 0) || !std::isfinite(value)) {
-      throw InvalidArgument(fmt::format("{} = {} {}, allowed above 0", name, value, unit));
-    }
-  };
-  positive(plan.duration, "duration", "s");
-  positive(plan.rate, "rate", "Hz");
+  require_above("duration", plan.duration, 0, "s");
+  require_above("rate", plan.rate, 0, "Hz");
   const double variance =
       plan.angle_noise * plan.angle_noise + plan.angle_resolution * plan.angle_resolution / 12.0;
-  positive(variance, "noise and rounding", "rad^2");
+  require_above("noise and rounding", variance, 0, "rad^2");
   const PrismTrain& train = plan.sensor.train;
   require_length("angular_velocity of the sensor", plan.sensor.angular_velocity.size(),
                  static_cast<std::size_t>(train.prisms()));

@@ -191,26 +191,32 @@ std::vector<std::size_t> PackedSeries::shots_of_beams() const {
   return shots;
 }
 
-void PackedSeries::times(ShotRange range, std::vector<std::int64_t>& out) const {
+template <class T, class Put>
+void PackedSeries::put_column(ShotRange range, const std::vector<T>& tail, const Put& put,
+                              std::vector<T>& out) const {
   out.resize(range.size());
   visit(range, [&](const Block* block, std::size_t first, std::size_t rows, std::size_t at) {
     if (block != nullptr) {
-      block->time.put(first, rows, out.data() + at);
+      put(*block, first, rows, out.data() + at);
     } else {
-      std::copy_n(tail_.time_ns.data() + first, rows, out.data() + at);
+      std::copy_n(tail.data() + first, rows, out.data() + at);
     }
   });
 }
 
-void PackedSeries::beams(ShotRange range, std::vector<std::uint8_t>& out) const {
-  out.resize(range.size());
-  visit(range, [&](const Block* block, std::size_t first, std::size_t rows, std::size_t at) {
-    if (block != nullptr) {
-      block->beam.put(first, rows, out.data() + at);
-    } else {
-      std::copy_n(tail_.beam.data() + first, rows, out.data() + at);
-    }
-  });
+template <class T, class Column>
+void PackedSeries::put_column(ShotRange range, const std::vector<T>& tail, Column Block::*column,
+                              std::vector<T>& out) const {
+  put_column(
+      range, tail,
+      [column](const Block& block, std::size_t first, std::size_t rows, T* to) {
+        (block.*column).put(first, rows, to);
+      },
+      out);
+}
+
+void PackedSeries::times(ShotRange range, std::vector<std::int64_t>& out) const {
+  put_column(range, tail_.time_ns, &Block::time, out);
 }
 
 AngleSeries PackedSeries::rows(ShotRange range) const {
@@ -220,38 +226,33 @@ AngleSeries PackedSeries::rows(ShotRange range) const {
 }
 
 void PackedSeries::rows(ShotRange range, AngleSeries& out) const {
+  const auto put_angles = [&](const Grid& grid, const std::vector<double>& tail,
+                              Angles Block::*column, std::vector<double>& to) {
+    put_column(
+        range, tail,
+        [&grid, column](const Block& block, std::size_t first, std::size_t rows, double* at) {
+          (block.*column).put(first, rows, grid, at);
+        },
+        to);
+  };
   times(range, out.time_ns);
-  beams(range, out.beam);
-  out.azimuth.resize(range.size());
-  out.zenith.resize(range.size());
-  out.azimuth_rounding_variance.resize(range.size());
-  out.zenith_rounding_variance.resize(range.size());
-  out.range.resize(has_ranges_ ? range.size() : 0);
-  out.intensity.resize(has_ranges_ ? range.size() : 0);
-  visit(range, [&](const Block* block, std::size_t first, std::size_t rows, std::size_t at) {
-    const auto copy = [&](const auto& from, auto& to) {
-      std::copy_n(from.data() + first, rows, to.data() + at);
-    };
-    if (block != nullptr) {
-      block->azimuth.put(first, rows, azimuth_grid_, out.azimuth.data() + at);
-      block->zenith.put(first, rows, zenith_grid_, out.zenith.data() + at);
-      block->azimuth_variance.put(first, rows, out.azimuth_rounding_variance.data() + at);
-      block->zenith_variance.put(first, rows, out.zenith_rounding_variance.data() + at);
-      if (has_ranges_) {
-        copy(block->range, out.range);
-        block->intensity.put(first, rows, out.intensity.data() + at);
-      }
-    } else {
-      copy(tail_.azimuth, out.azimuth);
-      copy(tail_.zenith, out.zenith);
-      copy(tail_.azimuth_rounding_variance, out.azimuth_rounding_variance);
-      copy(tail_.zenith_rounding_variance, out.zenith_rounding_variance);
-      if (has_ranges_) {
-        copy(tail_.range, out.range);
-        copy(tail_.intensity, out.intensity);
-      }
-    }
-  });
+  put_angles(azimuth_grid_, tail_.azimuth, &Block::azimuth, out.azimuth);
+  put_angles(zenith_grid_, tail_.zenith, &Block::zenith, out.zenith);
+  put_column(range, tail_.beam, &Block::beam, out.beam);
+  put_column(range, tail_.azimuth_rounding_variance, &Block::azimuth_variance,
+             out.azimuth_rounding_variance);
+  put_column(range, tail_.zenith_rounding_variance, &Block::zenith_variance,
+             out.zenith_rounding_variance);
+  out.range.clear();
+  out.intensity.clear();
+  if (!has_ranges_) return;
+  put_column(
+      range, tail_.range,
+      [](const Block& block, std::size_t first, std::size_t rows, double* to) {
+        std::copy_n(block.range.data() + first, rows, to);
+      },
+      out.range);
+  put_column(range, tail_.intensity, &Block::intensity, out.intensity);
 }
 
 void PackedSeries::append(const AngleSeries& series) {

@@ -65,7 +65,6 @@ class PacketFitter : private BlockFit {
     for (const std::size_t packet : shots.packet) ++first_[packet + 1];
     for (std::size_t i = 0; i + 1 < first_.size(); ++i) first_[i + 1] += first_[i];
   }
-  using BlockFit::loose_state;
 
   std::size_t begin(std::size_t packet) const { return first_[packet]; }
   std::size_t size(std::size_t packet) const { return first_[packet + 1] - first_[packet]; }
@@ -309,8 +308,8 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
           for (std::size_t k = 0; k < late.rotation_angle.size(); ++k) {
             late.rotation_angle[k] += shift * late.angular_velocity[k];
           }
-          RotorState prior = fitter.predicted(PacketFitter::loose_state(late, 0.0, 0.0), packet);
-          const RotorState loose = PacketFitter::loose_state(late, kLooseAngle, kSpeedShare);
+          RotorState prior = fitter.predicted(loose_state(late, 0.0, 0.0), packet);
+          const RotorState loose = loose_state(late, kLooseAngle, kSpeedShare);
           prior.covariance = loose.covariance;
           fits.push_back(fitter.fit(packet, prior, kCoarse));
         }
@@ -320,7 +319,7 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
         double best = std::numeric_limits<double>::infinity();
         for (const PacketFit& one : fits) {
           RotorState prior = one.state;
-          prior.covariance = PacketFitter::loose_state(*start, kLooseAngle, kSpeedShare).covariance;
+          prior.covariance = loose_state(*start, kLooseAngle, kSpeedShare).covariance;
           const PacketFit refined = fitter.fit(packet, prior, fine);
           best = std::min(best, refined.scale);
           if (refined.scale >= least) continue;
@@ -459,8 +458,7 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
   for (const int direction : {1, -1}) {
     double noise = std::max(least_noise, anchor.start.residual_rms);
     RotorState state =
-        direction > 0 ? PacketFitter::loose_state(anchor.start, kAnchorAngle, anchor.speed_share)
-                      : result.anchor;
+        direction > 0 ? loose_state(anchor.start, kAnchorAngle, anchor.speed_share) : result.anchor;
     std::size_t packet = anchor.packet + (direction > 0 ? 0 : 1);
     const std::size_t end = direction > 0 ? shots.packets.size() : 0;
     while (direction > 0 ? packet < end : packet > end) {

@@ -7,11 +7,10 @@
 #include <limits>
 #include <optional>
 
-#include <fmt/format.h>
-
 #include "risley/algebra/products.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 #include "risley/estimation/batch_map.hpp"
 #include "risley/parallel/parallel.hpp"
 
@@ -83,7 +82,7 @@ void fill_chi2(const std::vector<Piece>& pieces, PiecewiseEstimate& result) {
 
 PiecewiseEstimate estimate_piecewise(const Estimate& estimate, const sensors::Sensor& sensor,
                                      std::size_t pieces, const Progress& progress) {
-  if (pieces < 1) throw InvalidArgument(fmt::format("pieces = {}, allowed 1 or more", pieces));
+  require_at_least("pieces", static_cast<long long>(pieces), 1);
   std::vector<std::optional<Piece>> all(pieces);
   const std::size_t shots = estimate.series.size();
   parallel::for_each_job(

@@ -10,6 +10,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/require.hpp"
 
 #include "estimation/used_shots.hpp"
 
@@ -20,10 +21,7 @@ namespace {
 class MapMaker {
  public:
   explicit MapMaker(double cell) : cell_(cell) {
-    if (!(cell > 0)) {
-      throw InvalidArgument(
-          fmt::format("cell = {} deg, allowed above 0", degrees_from_radians(cell)));
-    }
+    require_above("cell", degrees_from_radians(cell), 0, "deg");
   }
 
   void add(double x, double y, double azimuth_residual, double zenith_residual) {

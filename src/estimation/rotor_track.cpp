@@ -15,8 +15,8 @@
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/normal_equations.hpp"
 
+#include "estimation/block_fit.hpp"
 #include "estimation/entry_checks.hpp"
-#include "estimation/knot_model.hpp"
 
 namespace risley::estimation {
 namespace {
@@ -25,8 +25,6 @@ constexpr double kTrackStep = 0.025;  // s, a window of the tracker
 /// Of the start about the truth, where only few shots decided it.
 constexpr double kStartAngleSigma = radians_from_degrees(5.0);
 constexpr double kStartSpeedSigma = radians_from_degrees(100.0);
-/// Windows do not bend: what a rotor's speed changes within one is noise of the next.
-constexpr double kStraightSigma = 1e-3;
 /// A prediction this uncertain may lie in a neighbouring minimum: then a grid of angles is tried.
 constexpr double kLostSigma = radians_from_degrees(8.0);
 constexpr int kGridHalf = 12;  // steps to half a turn
@@ -36,16 +34,7 @@ constexpr double kGridStep = radians_from_degrees(15.0);
 constexpr std::size_t kFewestShots = 12;
 
 class Tracker {
-  using Square = KnotSquare<Eigen::Dynamic>;
-  using Vector = KnotVector<Eigen::Dynamic>;
-
  public:
-  struct State {
-    std::int64_t time_ns = 0;
-    Vector mean;
-    Square covariance;
-  };
-
   Tracker(const AngleSeries& series, const Start& start, const AngleNoise& noise)
       : series_(series), start_(start), prisms_(start.train.prisms()) {
     weights_.angle_noise = noise;
@@ -55,33 +44,10 @@ class Tracker {
     usual_level_ = std::max(1.0, start.residual_rms / noise.rms());
   }
 
-  State first() const {
-    State state;
-    state.time_ns = start_.time_ns;
-    state.mean.resize(3 * prisms_);
-    state.covariance.setZero(3 * prisms_, 3 * prisms_);
-    for (Eigen::Index k = 0; k < prisms_; ++k) {
-      const Eigen::Index at = 3 * k;
-      state.mean[at] = start_.rotation_angle[static_cast<std::size_t>(k)];
-      state.mean[at + 1] = start_.angular_velocity[static_cast<std::size_t>(k)];
-      state.mean[at + 2] = 0;
-      state.covariance(at, at) = kStartAngleSigma * kStartAngleSigma;
-      state.covariance(at + 1, at + 1) = kStartSpeedSigma * kStartSpeedSigma;
-      state.covariance(at + 2, at + 2) = kStraightSigma * kStraightSigma;
-    }
-    return state;
-  }
-
-  void predict(State& state, std::int64_t time_ns) const {
-    const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
-    state.time_ns = time_ns;
-    predict_rotors(state.mean, state.covariance, kSettlingProcess, dt);
-  }
-
   /// Takes the shots of some rows into a state. @return whether there were any
-  bool update(State& state, ShotRange rows) {
+  bool update(RotorState& state, ShotRange rows) {
     if (rows.size() == 0) return false;
-    const State predicted = state;
+    const RotorState predicted = state;
     double uncertain = 0;
     for (int k = 0; k < prisms_; ++k) {
       uncertain = std::max(uncertain, std::sqrt(state.covariance(3 * k, 3 * k)));
@@ -90,16 +56,16 @@ class Tracker {
     if (!improve(state, predicted, rows)) return false;
     if (!lost(rows)) return true;
     // Nothing of the prediction is true, such as that of a piece whose times came again.
-    State anew = predicted;
+    RotorState anew = predicted;
     for (int k = 0; k < prisms_; ++k) anew.covariance(3 * k, 3 * k) = kPi * kPi;
-    const State loose = anew;
+    const RotorState loose = anew;
     look_around(anew, rows, kPi);
     if (improve(anew, loose, rows) && !lost(rows)) state = anew;
     return true;
   }
 
  private:
-  void accumulate_at(const State& state, ShotRange rows) {
+  void accumulate_at(const RotorState& state, ShotRange rows) {
     knot_.time_ns = {state.time_ns};
     knot_.first_shot = {rows.begin};
     knot_.last_shot = {rows.end};
@@ -113,27 +79,16 @@ class Tracker {
   }
 
   /// Gauss-Newton steps from a state to the shots and the prediction together.
-  bool improve(State& state, const State& predicted, ShotRange rows) {
+  bool improve(RotorState& state, const RotorState& predicted, ShotRange rows) {
     constexpr int kRounds = 4;
     for (int round = 0; round < kRounds; ++round) {
       accumulate_at(state, rows);
       weights_.softening = softening_at(level());
       accumulate_at(state, rows);
-      const Square curvature = knot_curvature<Eigen::Dynamic>(equations_, 0);
-      const Vector pull = predicted.mean - state.mean;
-      Square covariance = predicted.covariance;
-      Vector step = Vector::Constant(pull.size(), std::numeric_limits<double>::quiet_NaN());
-      if (add_information(covariance, curvature)) {
-        // (P^-1 + H)^-1 (g + P^-1 pull), without P^-1.
-        const Eigen::Map<const Vector> gradient(equations_.gradient.data(), pull.size());
-        step = pull + covariance * (gradient - curvature * pull);
-      }
-      if (!step.allFinite()) {
+      if (!step_towards(equations_, predicted, state)) {
         state = predicted;
         return false;
       }
-      state.mean += step;
-      state.covariance = covariance;
     }
     return true;
   }
@@ -157,14 +112,14 @@ class Tracker {
   }
 
   /// Moves the angles to the best of a grid about the prediction.
-  void look_around(State& state, ShotRange rows, double reach) {
+  void look_around(RotorState& state, ShotRange rows, double reach) {
     const double softening = std::exchange(weights_.softening, softening_at(10.0 * usual_level_));
     const int half = std::clamp(static_cast<int>(std::ceil(reach / kGridStep)), 1, kGridHalf);
     std::vector<int> offset(static_cast<std::size_t>(prisms_), -half);
-    State best = state;
+    RotorState best = state;
     double least = std::numeric_limits<double>::infinity();
     for (;;) {
-      State trial = state;
+      RotorState trial = state;
       for (int k = 0; k < prisms_; ++k) {
         trial.mean[3 * k] += kGridStep * offset[static_cast<std::size_t>(k)];
       }
@@ -204,7 +159,6 @@ void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start
   require_start(start, knots.prisms);
   check_noise(noise);
   Tracker tracker(series, start, noise);
-  using State = Tracker::State;
   const auto step_ns = static_cast<std::int64_t>(kTrackStep * 1e9);
   const auto rows_about = [&](std::int64_t middle) {
     const auto begin = series.time_ns.begin();
@@ -214,23 +168,24 @@ void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start
         static_cast<std::size_t>(std::lower_bound(from, to, middle - step_ns / 2) - begin),
         static_cast<std::size_t>(std::lower_bound(from, to, middle + step_ns / 2) - begin)};
   };
-  State at_start = tracker.first();
+  // Windows do not bend: what a rotor's speed changes within one is noise of the next.
+  RotorState at_start = state_of(start, kStartAngleSigma, [](double) { return kStartSpeedSigma; });
   tracker.update(at_start, rows_about(start.time_ns));
   const auto follow = [&](std::int64_t direction) {
-    std::vector<State> states{at_start};
+    std::vector<RotorState> states{at_start};
     const std::int64_t end =
         direction > 0 ? series.time_ns[shots.end - 1] : series.time_ns[shots.begin];
-    State now = at_start;
+    RotorState now = at_start;
     while (direction * (end - now.time_ns) > 0) {
-      tracker.predict(now, now.time_ns + direction * step_ns);
+      predict(now, now.time_ns + direction * step_ns);
       if (tracker.update(now, rows_about(now.time_ns))) states.push_back(now);
     }
     if (now.time_ns != states.back().time_ns) states.push_back(now);  // only predicted
     return states;
   };
-  std::vector<State> points = follow(-1);
+  std::vector<RotorState> points = follow(-1);
   std::reverse(points.begin(), points.end());
-  const std::vector<State> ahead = follow(1);
+  const std::vector<RotorState> ahead = follow(1);
   points.insert(points.end(), ahead.begin() + 1, ahead.end());
   std::size_t near = 0;
   for (std::size_t knot = first; knot < last; ++knot) {

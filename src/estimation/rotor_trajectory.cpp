@@ -99,13 +99,10 @@ void interpolate(const RotorTrajectory& from, RotorTrajectory& to) {
         "trajectories of {} and {} stretches and of {} and {} rotors, expected the same",
         from.stretch_begin.size(), to.stretch_begin.size(), from.prisms, to.prisms));
   }
-  const auto end_of = [](const RotorTrajectory& t, std::size_t stretch) {
-    return stretch + 1 < t.stretch_begin.size() ? t.stretch_begin[stretch + 1] : t.size();
-  };
   for (std::size_t s = 0; s < to.stretch_begin.size(); ++s) {
     std::size_t near = from.stretch_begin[s];
-    const std::size_t last = end_of(from, s) - 1;
-    for (std::size_t knot = to.stretch_begin[s]; knot < end_of(to, s); ++knot) {
+    const std::size_t last = from.stretch_end(s) - 1;
+    for (std::size_t knot = to.stretch_begin[s]; knot < to.stretch_end(s); ++knot) {
       const std::int64_t time = to.time_ns[knot];
       while (near < last &&
              std::llabs(from.time_ns[near + 1] - time) <= std::llabs(from.time_ns[near] - time)) {

@@ -74,9 +74,11 @@ const char* to_string(RunningState::Phase phase) {
   return "watching";
 }
 
-class RunningEstimate::Work {
+/// Pieces of a recording on their way.
+class RunningEstimate::Watcher {
  public:
-  explicit Work(RunningOptions options) : options_(std::move(options)), ticks_(options_.most_rate) {
+  explicit Watcher(RunningOptions options)
+      : options_(std::move(options)), ticks_(options_.most_rate) {
     require_between("option piece", options_.piece, 0.1, 60, "s");
     require_between("option most_rate", options_.most_rate, 1000, 1e6, "Hz");
     require_between("option false_alarms_per_hour", options_.false_alarms_per_hour, 1e-9, 10);
@@ -130,12 +132,12 @@ class RunningEstimate::Work {
   int agreeing_ = 0;
 };
 
-void RunningEstimate::Work::begin_series() {
+void RunningEstimate::Watcher::begin_series() {
   series_ = {};
   last_ns_.reset();
 }
 
-bool RunningEstimate::Work::add(const recordings::Observations& rows, const Progress& progress) {
+bool RunningEstimate::Watcher::add(const recordings::Observations& rows, const Progress& progress) {
   const auto piece_ns = static_cast<std::int64_t>(1e9 * options_.piece);
   const auto variance = [](float step) { return step * step / 12.0F; };
   bool any = false;
@@ -167,7 +169,7 @@ bool RunningEstimate::Work::add(const recordings::Observations& rows, const Prog
 }
 
 /// @return whether the piece was looked at
-bool RunningEstimate::Work::end_piece(const Progress& progress) {
+bool RunningEstimate::Watcher::end_piece(const Progress& progress) {
   AngleSeries series = std::exchange(series_, {});
   if (series.size() < kFewestRunningShots ||
       series.duration() < kLeastPieceFilled * options_.piece) {
@@ -192,8 +194,8 @@ bool RunningEstimate::Work::end_piece(const Progress& progress) {
   return true;
 }
 
-Estimate RunningEstimate::Work::estimate_first(const AngleSeries& series,
-                                               const Progress& progress) const {
+Estimate RunningEstimate::Watcher::estimate_first(const AngleSeries& series,
+                                                  const Progress& progress) const {
   EstimateOptions options;
   options.sensor = options_.sensor;
   options.cartesian = options_.cartesian;
@@ -205,7 +207,7 @@ Estimate RunningEstimate::Work::estimate_first(const AngleSeries& series,
 }
 
 /// Keeps what later pieces have in common with the first.
-void RunningEstimate::Work::prepare(const Estimate& first) {
+void RunningEstimate::Watcher::prepare(const Estimate& first) {
   start_ = first.start;
   if (first.frame_turn) start_->frame = first.frame_turn->turn;
   free_ = first.free;
@@ -251,7 +253,7 @@ void RunningEstimate::Work::prepare(const Estimate& first) {
                        scale_.cwiseInverse().asDiagonal();
 }
 
-Start RunningEstimate::Work::go_on_from_last(std::int64_t time_ns) const {
+Start RunningEstimate::Watcher::go_on_from_last(std::int64_t time_ns) const {
   Start start = *start_;
   const RotorTrajectory& knots = last_.trajectory;
   const std::size_t knot = knots.size() - 1;
@@ -265,15 +267,16 @@ Start RunningEstimate::Work::go_on_from_last(std::int64_t time_ns) const {
   return start;
 }
 
-Solution RunningEstimate::Work::solve(const AngleSeries& series, const Start& start,
-                                      const Progress& progress) const {
+Solution RunningEstimate::Watcher::solve(const AngleSeries& series, const Start& start,
+                                         const Progress& progress) const {
   BatchMapOptions options;
   options.free = free_;
   if (start_->frame) options.frame_sigma = kFrameSigma;
   return run_batch_map(series, start, options_.sensor, options, progress.silent());
 }
 
-std::string RunningEstimate::Work::unfit_reason(const Solution& solution, std::size_t shots) const {
+std::string RunningEstimate::Watcher::unfit_reason(const Solution& solution,
+                                                   std::size_t shots) const {
   if (!solution.settled) return "the estimate did not settle";
   const double outliers =
       static_cast<double>(solution.outliers + solution.unused_shots) / static_cast<double>(shots);
@@ -287,7 +290,7 @@ std::string RunningEstimate::Work::unfit_reason(const Solution& solution, std::s
   return {};
 }
 
-void RunningEstimate::Work::estimate_piece(AngleSeries& series, const Progress& progress) {
+void RunningEstimate::Watcher::estimate_piece(AngleSeries& series, const Progress& progress) {
   state_.reason.clear();
   const double duration = series.duration();
   if (!start_) {
@@ -328,14 +331,14 @@ void RunningEstimate::Work::estimate_piece(AngleSeries& series, const Progress& 
 }
 
 /// In units of the priors, whose mean is the sensor.
-ConstantsEstimate RunningEstimate::Work::scaled(const Solution& solution) const {
+ConstantsEstimate RunningEstimate::Watcher::scaled(const Solution& solution) const {
   const Eigen::VectorXd nominal = free_values(options_.sensor.train, free_);
   const Eigen::VectorXd inverse = scale_.cwiseInverse();
   return {inverse.cwiseProduct(solution.parameters - nominal),
           inverse.asDiagonal() * solution.covariance * inverse.asDiagonal()};
 }
 
-void RunningEstimate::Work::take(const Solution& solution) {
+void RunningEstimate::Watcher::take(const Solution& solution) {
   state_.speeds = speeds_of(solution.trajectory);
   state_.angle_noise = solution.noise.value.rms();
   pieces_.push_back(scaled(solution));
@@ -364,14 +367,14 @@ void RunningEstimate::Work::take(const Solution& solution) {
 
 /// The oldest piece is no longer compared: it becomes one of those that others are compared with,
 /// up to a fixed number, so that slow changes are not followed.
-void RunningEstimate::Work::lengthen_beginning() {
+void RunningEstimate::Watcher::lengthen_beginning() {
   if (beginning_pieces_ >= kMostBeginning || agreeing_ > 0 || state_.alarm) return;
   beginning_ = pooled({*beginning_, pieces_.front()}, 2);
   ++beginning_pieces_;
 }
 
 /// Compares the last pieces with the beginning, and with the sensor.
-void RunningEstimate::Work::look() {
+void RunningEstimate::Watcher::look() {
   const Index n = scale_.size();
   const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(n, n);
   const ConstantsEstimate sensor{Eigen::VectorXd::Zero(n), none};
@@ -415,7 +418,7 @@ void RunningEstimate::Work::look() {
 }
 
 /// Parameters over the last pieces.
-void RunningEstimate::Work::describe() {
+void RunningEstimate::Watcher::describe() {
   if (pieces_.empty()) return;  // those of the beginning stay until there are others
   const ConstantsEstimate recent = pooled(pieces_, kMostPooled);
   const double factor = scatter_.variance_factor;
@@ -444,15 +447,15 @@ void RunningEstimate::Work::describe() {
 }
 
 RunningEstimate::RunningEstimate(RunningOptions options)
-    : work_(std::make_unique<Work>(std::move(options))) {}
+    : watcher_(std::make_unique<Watcher>(std::move(options))) {}
 RunningEstimate::~RunningEstimate() = default;
 RunningEstimate::RunningEstimate(RunningEstimate&&) noexcept = default;
 RunningEstimate& RunningEstimate::operator=(RunningEstimate&&) noexcept = default;
 
 bool RunningEstimate::add(const recordings::Observations& rows, const Progress& progress) {
-  return work_->add(rows, progress);
+  return watcher_->add(rows, progress);
 }
-const RunningState& RunningEstimate::state() const { return work_->state(); }
-const RunningOptions& RunningEstimate::options() const { return work_->options(); }
+const RunningState& RunningEstimate::state() const { return watcher_->state(); }
+const RunningOptions& RunningEstimate::options() const { return watcher_->options(); }
 
 }  // namespace risley::estimation

@@ -162,7 +162,11 @@ class Smoother {
         knots, blocks,
         [&](AheadBlock& block) {
           for (std::size_t knot = block.begin; knot < block.end; ++knot) {
-            begins_stretch(knot) ? begin_covariance(p) : predict_covariance(knot, p);
+            if (begins_stretch(knot)) {
+              begin_covariance(p);
+            } else {
+              predict_covariance(p, step_before(knot), [&](std::size_t k) { return process_[k]; });
+            }
             if (!add_information(p, knot_curvature<N>(equations_, knot))) throw not_definite(knot);
             keep_covariance(knot, p);
           }
@@ -249,14 +253,6 @@ class Smoother {
     return motion_offset(state(knot - 1), state(knot), step_before(knot));
   }
 
-  void predict_covariance(std::size_t knot, Square& p) const {
-    const double dt = step_before(knot);
-    for (int k = 0; k < prisms(); ++k) advance_rows(p, 3 * k, dt);
-    for (int k = 0; k < prisms(); ++k) {
-      advance_columns(p, 3 * k, dt);
-      p.template block<3, 3>(3 * k, 3 * k) += step_noise(process_[static_cast<std::size_t>(k)], dt);
-    }
-  }
   void predict_means(std::size_t knot, Affine& x) const {
     const double dt = step_before(knot);
     for (int k = 0; k < prisms(); ++k) advance_rows(x, 3 * k, dt);

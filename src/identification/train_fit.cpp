@@ -154,9 +154,9 @@ struct NormalEquations {
   Eigen::VectorXd right;
 };
 
-class Fit {
+class TrainEquations {
  public:
-  Fit(const ShotGrid& grid, const TrainModel& start, const TrainFreedom& freedom)
+  TrainEquations(const ShotGrid& grid, const TrainModel& start, const TrainFreedom& freedom)
       : grid_(grid), unknowns_(unknowns_of(start.train, freedom)), used_(grid.size(), 1) {
     require_length("start.lag", start.lag.size(), static_cast<std::size_t>(grid.emitters));
     require_length("start.rotors.coefficient",
@@ -510,96 +510,6 @@ void add_covariance(const NormalEquations& equations, const std::vector<Unknown>
 
 }  // namespace
 
-RotorCurves::RotorCurves(int prisms, double begin_, double end_, int segments_, int degree_,
-                         bool smooth_)
-    : begin(begin_), end(end_), segments(segments_), degree(degree_), smooth(smooth_) {
-  require_above("end", end, begin, "s");
-  require_at_least("segments", segments, 1);
-  require_between("degree", degree, 0, kMaxCurveDegree);
-  coefficient = Eigen::MatrixXd::Zero(prisms, coefficients());
-}
-
-int RotorCurves::segment_of(double time) const {
-  const double segment = std::floor((time - begin) / segment_length());
-  return static_cast<int>(std::clamp(segment, 0.0, static_cast<double>(segments - 1)));
-}
-
-double RotorCurves::angle(int rotor, double time) const {
-  const int segment = segment_of(time), first = first_coefficient(segment);
-  const CurveWeights weights = curve_weights(*this, segment, time);
-  double angle = 0;
-  for (int m = 0; m <= degree; ++m) {
-    angle += weights.value[static_cast<std::size_t>(m)] * coefficient(rotor, first + m);
-  }
-  return angle;
-}
-
-double RotorCurves::angular_velocity(int rotor, double time) const {
-  const int segment = segment_of(time), first = first_coefficient(segment);
-  const CurveWeights weights = curve_weights(*this, segment, time);
-  double speed = 0;
-  for (int m = 0; m <= degree; ++m) {
-    speed += weights.rate[static_cast<std::size_t>(m)] * coefficient(rotor, first + m);
-  }
-  return speed;
-}
-
-double RotorCurves::mean_angular_velocity(int rotor) const {
-  return (angle(rotor, end) - angle(rotor, begin)) / (end - begin);
-}
-
-CurveWeights curve_weights(const RotorCurves& curves, int segment, double time) {
-  CurveWeights weights;
-  const double length = curves.segment_length();
-  const double u = (time - curves.begin) / length - segment;
-  if (!curves.smooth) {  // powers of a variable that runs from -1 to 1
-    const double tau = 2 * u - 1;
-    double power = 1;
-    for (int m = 0; m <= curves.degree; ++m) {
-      const auto at = static_cast<std::size_t>(m);
-      weights.value[at] = power;
-      power *= tau;
-      if (m > 0) weights.rate[at] = m * weights.value[at - 1] * 2 / length;
-    }
-    return weights;
-  }
-  // De Boor's recursion on uniform knots; the rate comes from the degree below.
-  auto& value = weights.value;
-  value[0] = 1;
-  for (int d = 1; d <= curves.degree; ++d) {
-    const auto below = value;
-    for (int m = 0; m <= d; ++m) {
-      const double left = m > 0 ? below[static_cast<std::size_t>(m - 1)] : 0.0;
-      const double right = m < d ? below[static_cast<std::size_t>(m)] : 0.0;
-      value[static_cast<std::size_t>(m)] = ((u + d - m) * left + (m + 1 - u) * right) / d;
-      if (d == curves.degree) weights.rate[static_cast<std::size_t>(m)] = (left - right) / length;
-    }
-  }
-  return weights;
-}
-
-RotorCurves resampled(const RotorCurves& curves, RotorCurves shape) {
-  const int prisms = static_cast<int>(curves.coefficient.rows());
-  const int samples = 4 * (shape.degree + 1) * shape.segments;
-  const Eigen::Index count = shape.coefficients();
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(count, count);
-  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(count, prisms);
-  for (int i = 0; i < samples; ++i) {
-    const double time = shape.begin + (shape.end - shape.begin) * (i + 0.5) / samples;
-    const int segment = shape.segment_of(time), first = shape.first_coefficient(segment);
-    const CurveWeights weights = curve_weights(shape, segment, time);
-    for (int a = 0; a <= shape.degree; ++a) {
-      const double weight = weights.value[static_cast<std::size_t>(a)];
-      for (int b = 0; b <= shape.degree; ++b) {
-        normal(first + a, first + b) += weight * weights.value[static_cast<std::size_t>(b)];
-      }
-      for (int k = 0; k < prisms; ++k) right(first + a, k) += weight * curves.angle(k, time);
-    }
-  }
-  shape.coefficient = algebra::SymmetricSolver(normal, 1e-12).solve_columns(right).transpose();
-  return shape;
-}
-
 double outlier_limit(const TrainFit& fit) {
   std::vector<double> size;
   for (std::size_t i = 0; i < fit.azimuth_residual.size(); ++i) {
@@ -620,7 +530,7 @@ double mean_square(const TrainFit& fit, double limit) {
 
 TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFreedom& freedom,
                    const TrainFitOptions& options, const Progress& progress) {
-  Fit fit(grid, start, freedom);
+  TrainEquations fit(grid, start, freedom);
   TrainFit result;
   result.model = start;
   if (freedom.glass && freedom.one_glass) make_one_glass(result.model.train);

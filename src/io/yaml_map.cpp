@@ -186,13 +186,12 @@ YamlMap::YamlMap(const YamlNode& node, std::string path, std::string field)
   }
 }
 
-void YamlMap::allow_only(std::initializer_list<std::string_view> keys) const {
+void YamlMap::allow_only(const std::vector<std::string>& keys) const {
   for (const Entry& entry : entries_) {
     if (std::find(keys.begin(), keys.end(), entry.key) != keys.end()) continue;
-    const std::vector<std::string> known(keys.begin(), keys.end());
     fail_at(path_, entry.line,
             fmt::format("unknown field {}{}, allowed here: {}", field(entry.key),
-                        did_you_mean(entry.key, known), fmt::join(known, ", ")));
+                        did_you_mean(entry.key, keys), fmt::join(keys, ", ")));
   }
 }
 

@@ -16,14 +16,14 @@ namespace risley {
 namespace {
 
 /// What all kernels need, checked.
-struct Call {
+struct KernelColumns {
   BatchArguments arguments;
   std::vector<const double*> angle_columns;
   std::vector<double*> d_azimuth, d_zenith;
   std::vector<double> face_position;
 
-  Call(const PrismTrain& train, std::span<const std::span<const double>> rotation_angles,
-       std::span<const std::uint8_t> beam) {
+  KernelColumns(const PrismTrain& train, std::span<const std::span<const double>> rotation_angles,
+                std::span<const std::uint8_t> beam) {
     check_shape(train.shape());
     require_length("rotation_angles", rotation_angles.size(),
                    static_cast<std::size_t>(train.prisms()));
@@ -76,19 +76,19 @@ std::size_t observe_batch(const PrismTrain& train,
                           std::span<const std::span<const double>> rotation_angles,
                           const DirectionColumns& out, std::span<const std::uint8_t> beam,
                           InstructionSet set) {
-  Call call(train, rotation_angles, beam);
-  BatchArguments& a = call.arguments;
-  a.direction[0] = call.column("x", out.x, false);
-  a.direction[1] = call.column("y", out.y, false);
-  a.direction[2] = call.column("z", out.z, false);
-  a.azimuth = call.column("azimuth", out.azimuth, false);
-  a.zenith = call.column("zenith", out.zenith, false);
+  KernelColumns own(train, rotation_angles, beam);
+  BatchArguments& a = own.arguments;
+  a.direction[0] = own.column("x", out.x, false);
+  a.direction[1] = own.column("y", out.y, false);
+  a.direction[2] = own.column("z", out.z, false);
+  a.azimuth = own.column("azimuth", out.azimuth, false);
+  a.zenith = own.column("zenith", out.zenith, false);
   if (!out.origin_x.empty() || !out.origin_y.empty() || !out.origin_z.empty()) {
-    call.face_position = face_positions(train.face_order(), out.geometry);
-    a.face_position = call.face_position.data();
-    a.origin[0] = call.column("origin_x", out.origin_x, true);
-    a.origin[1] = call.column("origin_y", out.origin_y, true);
-    a.origin[2] = call.column("origin_z", out.origin_z, true);
+    own.face_position = face_positions(train.face_order(), out.geometry);
+    a.face_position = own.face_position.data();
+    a.origin[0] = own.column("origin_x", out.origin_x, true);
+    a.origin[1] = own.column("origin_y", out.origin_y, true);
+    a.origin[2] = own.column("origin_z", out.origin_z, true);
   }
   return RISLEY_KERNEL_COPIES(observe).at(set)(a);
 }
@@ -97,20 +97,20 @@ std::size_t linearise_batch(const PrismTrain& train,
                             std::span<const std::span<const double>> rotation_angles,
                             const LinearisationColumns& out, std::span<const std::uint8_t> beam,
                             InstructionSet set) {
-  Call call(train, rotation_angles, beam);
-  BatchArguments& a = call.arguments;
+  KernelColumns own(train, rotation_angles, beam);
+  BatchArguments& a = own.arguments;
   const auto gradient = [&](std::string_view name, const std::vector<std::span<double>>& columns,
                             std::vector<double*>& pointers) {
     const auto expected = static_cast<std::size_t>(parameter_count(train.shape()) + train.prisms());
     require_length(name, columns.size(), expected);
     const std::string one = fmt::format("a column of {}", name);
-    for (const auto column : columns) pointers.push_back(call.column(one, column, false));
+    for (const auto column : columns) pointers.push_back(own.column(one, column, false));
     return pointers.data();
   };
-  a.azimuth = call.column("azimuth", out.azimuth, true);
-  a.zenith = call.column("zenith", out.zenith, true);
-  a.d_azimuth = gradient("d_azimuth", out.d_azimuth, call.d_azimuth);
-  a.d_zenith = gradient("d_zenith", out.d_zenith, call.d_zenith);
+  a.azimuth = own.column("azimuth", out.azimuth, true);
+  a.zenith = own.column("zenith", out.zenith, true);
+  a.d_azimuth = gradient("d_azimuth", out.d_azimuth, own.d_azimuth);
+  a.d_zenith = gradient("d_zenith", out.d_zenith, own.d_zenith);
   return RISLEY_KERNEL_COPIES(linearise).at(set)(a);
 }
 

@@ -24,9 +24,9 @@ constexpr std::size_t kGroups = 8;
 constexpr std::size_t kBlock = kGroups * kLanes;
 
 /// The columns of one block of shots. The last one is filled up with copies of its last shot.
-class Block {
+class ShotBlock {
  public:
-  Block(std::size_t begin, std::size_t shots)
+  ShotBlock(std::size_t begin, std::size_t shots)
       : begin_(begin), count_(shots - begin < kBlock ? shots - begin : kBlock) {}
 
   std::size_t begin() const { return begin_; }
@@ -82,7 +82,7 @@ class Directions {
   }
 
   /// @return shots that are not valid
-  [[gnu::flatten]] std::size_t compute(const Block& block) {
+  [[gnu::flatten]] std::size_t compute(const ShotBlock& block) {
     turn(block);
     if (a_.face_position) {
       trace_with_origins(block);
@@ -115,7 +115,7 @@ class Directions {
   }
 
  private:
-  void turn(const Block& block) {
+  void turn(const ShotBlock& block) {
     for (std::size_t prism = 0; prism < N; ++prism) {
       for (std::size_t g = 0; g < block.groups(); ++g) {
         const auto [sine, cosine] = sin_cos(block.load(a_.rotation_angles[prism], g));
@@ -134,7 +134,7 @@ class Directions {
     trace.cosine[prism] = cosine_[prism][g];
     trace.beam[prism] = beam_[g];
   }
-  void trace_with_origins(const Block& block) {
+  void trace_with_origins(const ShotBlock& block) {
     for (std::size_t g = 0; g < block.groups(); ++g) {
       Trace<Batch, N> trace;
 #pragma GCC unroll 4
@@ -164,7 +164,7 @@ std::size_t observe_shots(const BatchArguments& a) {
   Directions<N> directions(a);
   std::size_t invalid = 0;
   for (std::size_t shot = 0; shot < a.shots; shot += kBlock) {
-    invalid += directions.compute(Block(shot, a.shots));
+    invalid += directions.compute(ShotBlock(shot, a.shots));
   }
   return invalid;
 }
@@ -182,7 +182,7 @@ class Linearisations {
         })) {}
 
   /// @return shots that are not valid
-  [[gnu::flatten]] std::size_t compute(const Block& block) {
+  [[gnu::flatten]] std::size_t compute(const ShotBlock& block) {
     const std::size_t groups = block.groups();
     for (std::size_t g = 0; g < groups; ++g) {
       emitters_.select(block.first_shot(g), a_.shots);
@@ -216,7 +216,7 @@ class Linearisations {
   }
 
  private:
-  void store_gradient(const Block& block, std::size_t g, const Gradient<Batch, N>& gradient,
+  void store_gradient(const ShotBlock& block, std::size_t g, const Gradient<Batch, N>& gradient,
                       double* const* columns) const {
     Batch storage[EmitterLanes<Batch, N>::kPlaces];
     const Batch* by_place = emitters_.by_place(gradient, storage);
@@ -241,7 +241,7 @@ std::size_t linearise_shots(const BatchArguments& a) {
   Linearisations<N> linearisations(a);
   std::size_t invalid = 0;
   for (std::size_t shot = 0; shot < a.shots; shot += kBlock) {
-    invalid += linearisations.compute(Block(shot, a.shots));
+    invalid += linearisations.compute(ShotBlock(shot, a.shots));
   }
   return invalid;
 }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <numbers>
 
@@ -14,14 +13,11 @@
 
 #include "risley/core/require.hpp"
 #include "risley/core/text.hpp"
-#include "risley/io/text_file.hpp"
 #include "risley/io/yaml_covariance.hpp"
 #include "risley/io/yaml_map.hpp"
 #include "risley/io/yaml_output.hpp"
 #include "risley/sensors/prism_sizes.hpp"
 #include "risley/sensors/range_values.hpp"
-
-#include "sensors/builtin_presets.hpp"
 
 namespace risley::sensors {
 namespace {
@@ -216,30 +212,25 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
 void read_range_values(const YamlMap& root, Sensor& sensor) {
   if (root.find("range") == nullptr) return;
   const YamlMap map = root.section("range");
-  const std::vector<RangeValue> values = range_values(sensor.train.emitters());
-  for (const YamlMap::Entry& entry : map.entries()) {
-    const auto known = std::find_if(values.begin(), values.end(),
-                                    [&](const RangeValue& v) { return v.name == entry.key; });
-    if (known == values.end()) {
-      fail_at(map.path(), entry.line, fmt::format("unknown field {}", map.field(entry.key)));
-    }
+  std::vector<std::string> names;
+  for (const RangeValue& known : range_values(sensor.train.emitters())) {
+    names.push_back(known.name);
+    if (map.find(known.name) == nullptr) continue;
     const Quantity quantity =
-        read_quantity(map, known->name, known->unit, sensor, known->lower, known->upper);
-    set_range_value(sensor, known->name, static_cast<double>(quantity.value));
+        read_quantity(map, known.name, known.unit, sensor, known.lower, known.upper);
+    set_range_value(sensor, known.name, static_cast<double>(quantity.value));
   }
+  map.allow_only(names);
 }
 
 void read_specifications(const YamlMap& root, Sensor& sensor) {
   for (const std::string_view section : section_names()) {
     const YamlMap map = root.section(section);
-    for (const YamlMap::Entry& entry : map.entries()) {
-      const bool known = std::any_of(
-          kSpecifications.begin(), kSpecifications.end(),
-          [&](const Specification& s) { return s.section == section && s.name == entry.key; });
-      if (!known) {
-        fail_at(map.path(), entry.line, fmt::format("unknown field {}", map.field(entry.key)));
-      }
+    std::vector<std::string> names;
+    for (const Specification& s : kSpecifications) {
+      if (s.section == section) names.emplace_back(s.name);
     }
+    map.allow_only(names);
     for (const Specification& s : kSpecifications) {
       if (s.section != section || (s.optional && map.find(s.name) == nullptr)) continue;
       const Quantity quantity = read_quantity(map, s.name, s.unit, sensor, s.lower, s.upper);
@@ -373,11 +364,7 @@ void read_sequence(const YamlMap& root, Sensor& sensor) {
     const Quantity quantity = read_quantity(map, known.back(), "deg", sensor, -360, 360);
     sequence.rotation_angle.push_back(si_from_file(quantity.value, scale_of("deg")));
   }
-  for (const YamlMap::Entry& entry : map.entries()) {
-    if (std::find(known.begin(), known.end(), entry.key) == known.end()) {
-      fail_at(map.path(), entry.line, fmt::format("unknown field {}", map.field(entry.key)));
-    }
-  }
+  map.allow_only(known);
   sequence.first_shot = map.integer("first_shot", 0, 1);
   const std::string firing = map.text("firing");
   if (firing == to_string(Firing::together)) {
@@ -529,82 +516,6 @@ std::string sequence_text(const Sensor& sensor, const ScanSequence& sequence) {
 }
 
 }  // namespace
-
-std::vector<std::string> builtin_preset_names() {
-  std::vector<std::string> names;
-  for (const BuiltinPreset& preset : builtin_presets()) names.emplace_back(preset.name);
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-namespace {
-
-/// Text of a preset and how messages call it.
-struct PresetSource {
-  std::string text, path;
-};
-
-[[noreturn]] void fail_unknown(const std::string& name, const char* is_neither) {
-  const std::vector<std::string> known = builtin_preset_names();
-  throw InvalidArgument(fmt::format("sensor \"{}\" {}{}; known presets: {}", name, is_neither,
-                                    did_you_mean(name, known), fmt::join(known, ", ")));
-}
-
-const BuiltinPreset* find_builtin(const std::string& name) {
-  const auto& presets = builtin_presets();
-  const auto found = std::find_if(presets.begin(), presets.end(),
-                                  [&](const BuiltinPreset& preset) { return preset.name == name; });
-  return found == presets.end() ? nullptr : &*found;
-}
-
-PresetSource source_of(const std::string& name_or_path) {
-  if (const BuiltinPreset* preset = find_builtin(name_or_path)) {
-    return {preset->text, fmt::format("built-in preset {}", preset->name)};
-  }
-  const std::filesystem::path path(name_or_path);
-  if (path.extension() == ".yaml" || path.extension() == ".yml" || std::filesystem::exists(path)) {
-    return {io::read_text_file(name_or_path), name_or_path};
-  }
-  fail_unknown(name_or_path, "is neither a file nor a known preset");
-}
-
-}  // namespace
-
-std::string builtin_preset_text(const std::string& name) {
-  const BuiltinPreset* preset = find_builtin(name);
-  if (preset == nullptr) fail_unknown(name, "is not a known preset");
-  return preset->text;
-}
-
-std::string copied_preset_text(const std::string& name_or_path, const std::string& new_name) {
-  constexpr std::string_view kAllowed =
-      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
-  constexpr std::size_t kLongest = 64;
-  if (new_name.empty() || new_name.size() > kLongest ||
-      new_name.find_first_not_of(kAllowed) != std::string::npos) {
-    throw InvalidArgument(fmt::format(
-        "name \"{}\" of a preset, allowed 1 to {} letters, digits, hyphens, underscores and points",
-        new_name, kLongest));
-  }
-  PresetSource source = source_of(name_or_path);
-  parse_preset(source.text, source.path);
-  const std::string& text = source.text;
-  std::size_t line = 0;
-  while (line < text.size() && text.compare(line, 5, "name:") != 0) {
-    const std::size_t end = text.find('\n', line);
-    line = end == std::string::npos ? text.size() : end + 1;
-  }
-  if (line >= text.size()) {
-    fail_at(source.path, 0, "expected a line that begins with name:");
-  }
-  const std::size_t end = std::min(text.find('\n', line), text.size());
-  return text.substr(0, line) + "name: " + yaml_quoted(new_name) + text.substr(end);
-}
-
-Sensor load_sensor(const std::string& name_or_path) {
-  const PresetSource source = source_of(name_or_path);
-  return parse_preset(source.text, source.path);
-}
 
 Sensor parse_preset(const std::string& text, const std::string& path) {
   const YamlMap root(io::parse_yaml(text, path), path, "");

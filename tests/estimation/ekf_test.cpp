@@ -146,9 +146,6 @@ TEST(Ekf, PoliteRefusals) {
   EkfOptions options;
   options.angle_noise = kNoise;
   EXPECT_THROW(run_ekf({}, {}, options), EstimationError);
-  const auto series = testing::constant_speed_series(bent_sensor(), 0, 0, 0.2, 1000.0);
-  options.rotor_process = {{1, 0, 0}};
-  EXPECT_THROW(run(series, options), InvalidArgument);
   EXPECT_THROW(free_parameters({"refractive_index", "refractive_index_a"}, {2}), InvalidArgument);
   EXPECT_THROW(free_parameters({"angular_velocity_a_deg_per_s"}, {2}), InvalidArgument);
 }

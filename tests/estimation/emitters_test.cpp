@@ -217,16 +217,4 @@ INSTANTIATE_TEST_SUITE_P(Trains, NormalEquationsOfEmitters,
                            return parameter_name(one.param.order + std::to_string(one.param.count));
                          });
 
-TEST(NormalEquations, RefuseABeamThatTheTrainDoesNotHave) {
-  const PrismTrain train = testing::imperfect_train("PA-AP", 0.5, 1, 6);
-  Recording r = record(train, {20}, 3);
-  r.series.beam[7] = 6;
-  NormalEquations equations;
-  EXPECT_THROW(accumulate(r.series, r.knots, train, {}, {{kNoise, kNoise}}, equations),
-               InvalidArgument);
-  r.series.beam.pop_back();
-  EXPECT_THROW(accumulate(r.series, r.knots, train, {}, {{kNoise, kNoise}}, equations),
-               InvalidArgument);
-}
-
 }  // namespace risley::estimation::emitters_test

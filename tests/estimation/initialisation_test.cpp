@@ -5,6 +5,7 @@
 #include <random>
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
@@ -12,6 +13,7 @@
 #include "risley/estimation/spectral_lines.hpp"
 
 #include "estimation/series.hpp"
+#include "refusal.hpp"
 
 namespace risley::estimation::initialisation_test {
 
@@ -334,12 +336,8 @@ TEST(Initialisation, TrackedPhasesFollowAWanderingRotorOverAGap) {
 TEST(Initialisation, TooLittleDataIsSaidInNumbers) {
   const auto sensor = sensors::load_sensor("mid-40");
   const auto series = testing::constant_speed_series(sensor, 0, 0, 0.019, 10000.0);
-  try {
-    const LineSearch search(series);
-    FAIL() << "accepted 19 ms";
-  } catch (const EstimationError& error) {
-    EXPECT_NE(std::string(error.what()).find("0.0190 s"), std::string::npos) << error.what();
-  }
+  EXPECT_THAT(refusal<EstimationError>([&] { const LineSearch search(series); }),
+              ::testing::HasSubstr("0.0190 s"));
 }
 
 TEST(Initialisation, SpeedsOfAnotherSensorAreRefused) {

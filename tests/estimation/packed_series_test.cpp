@@ -51,12 +51,9 @@ void expect_kept(const AngleSeries& series) {
   const std::size_t begin = PackedSeries::kBlockRows - 3, end = series.size() - 5;
   expect_same(packed.rows({begin, end}), series, begin);
   std::vector<std::int64_t> times;
-  std::vector<std::uint8_t> beams;
   packed.times({begin, end}, times);
-  packed.beams({begin, end}, beams);
   const AngleSeries part = rows_of(series, begin, end);
   EXPECT_EQ(times, part.time_ns);
-  EXPECT_EQ(beams, part.beam);
   PackedSeries single, all;
   std::vector<std::size_t> rows(series.size());
   std::iota(rows.begin(), rows.end(), 0);

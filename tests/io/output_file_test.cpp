@@ -18,6 +18,7 @@
 #include "risley/io/text_file.hpp"
 
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 
 namespace risley::io::output_file_test {
 
@@ -87,12 +88,7 @@ TEST(OutputFile, PlantedLinksAreNotFollowed) {
   OutputFile output(path);
   fs::remove(output.temporary_path());
   fs::create_symlink(victim, output.temporary_path());
-  try {
-    output.commit();
-    FAIL() << "a file that another put there became the output";
-  } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("replaced"));
-  }
+  EXPECT_THAT(refusal<FileError>([&] { output.commit(); }), HasSubstr("replaced"));
   EXPECT_EQ(read_text_file(path), "new");
   EXPECT_EQ(read_text_file(victim), "precious");
 }

@@ -72,9 +72,4 @@ TEST(BeamOriginMap, AgreesWithSingleRaysForAnyNumberOfPrisms) {
   }
 }
 
-TEST(BeamOriginMap, RefusesWhatMakesNoMap) {
-  EXPECT_THROW(beam_origin_map(ideal_mid_40(), kMid40, 1, kCell), InvalidArgument);
-  EXPECT_THROW(beam_origin_map(ideal_mid_40(), kMid40, 10, 0.0), InvalidArgument);
-}
-
 }  // namespace risley::beam_origin_map_test

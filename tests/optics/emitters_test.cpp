@@ -75,21 +75,6 @@ TEST(TrainShape, EmittersAreNamedByTheirNumberFromOne) {
   EXPECT_EQ(find_parameter_of_any_train("incident_beam_9_vertical_deg"), nullptr);
 }
 
-TEST(TrainShape, OtherNumbersAreRefused) {
-  for (const int prisms : {-1, 0, kMaxPrisms + 1}) {
-    EXPECT_THAT(refusal([&] {
-                  parameter_list({prisms, 1});
-                }),
-                HasSubstr("number of prisms = " + std::to_string(prisms) + ", allowed 1 to 4"));
-    EXPECT_THAT(refusal([&] { with_prism_count(prisms, []<int N>() { return N; }); }),
-                HasSubstr("allowed 1 to 4"));
-  }
-  for (const int emitters : {-1, 0, kMaxEmitters + 1}) {
-    EXPECT_THAT(refusal([&] { PrismTrain(parse_face_order("PA-AP"), emitters); }),
-                HasSubstr("number of emitters = " + std::to_string(emitters) + ", allowed 1 to 8"));
-  }
-}
-
 TEST(PrismTrain, OneThatWasNotSetIsRefusedEverywhere) {
   const PrismTrain train;
   EXPECT_EQ(train.prisms(), 0);
@@ -288,26 +273,6 @@ INSTANTIATE_TEST_SUITE_P(Trains, EveryEmitter, ::testing::ValuesIn(every_kind())
                          [](const auto& one) {
                            return parameter_name(one.param.order + std::to_string(one.param.count));
                          });
-
-TEST(Beams, WrongColumnsAreRefused) {
-  const PrismTrain train = imperfect_train("PA-AP", 0.5, 1, 6);
-  const std::vector<double> column(5, 0.1);
-  const std::vector<std::span<const double>> angles{column, column};
-  std::vector<double> zenith(5);
-  DirectionColumns out;
-  out.zenith = zenith;
-  using Column = std::vector<std::uint8_t>;
-  EXPECT_THAT(refusal([&] { observe_batch(train, angles, out, Column(4)); }),
-              HasSubstr("beam has 4 values, expected 5"));
-  EXPECT_THAT(refusal([&] {
-                observe_batch(train, angles, out, Column{0, 1, 5, 6, 0});
-              }),
-              HasSubstr("beam = 6 in row 3, allowed 0 to 5"));
-  EXPECT_THAT(refusal([&] {
-                observe_batch(imperfect_train("PA-AP", 0.5, 1), angles, out, Column{0, 0, 0, 0, 1});
-              }),
-              HasSubstr("beam = 1 in row 4, allowed 0 to 0"));
-}
 
 TEST(Beams, EveryValueInEveryRowIsChecked) {
   for (const int emitters : {1, 2, 3, kMaxEmitters}) {

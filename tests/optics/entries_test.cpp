@@ -48,14 +48,6 @@ TEST(Entries, TrainsAskForPlacesOfTheirFlatVector) {
   EXPECT_EQ(refusal([] { return PrismTrain()[0]; }), "number of prisms = 0, allowed 1 to 4");
 }
 
-TEST(Entries, ParametersAskForNumbersWithinTheirBounds) {
-  PrismTrain train = two_prisms();
-  EXPECT_EQ(refusal([&] { train.set("refractive_index_b", kNan); }),
-            "refractive_index_b = nan 1, allowed 1 to 4");
-  EXPECT_EQ(refusal([&] { train.set("wedge_angle_deg", kInfinite); }),
-            "wedge_angle_deg = inf deg, allowed 0 to 60");
-}
-
 TEST(Entries, OneShotAsksForOneAnglePerPrismAndAnEmitter) {
   const PrismTrain train = two_prisms(3);
   const std::array angles{0.1, 0.2, 0.3};
@@ -176,20 +168,6 @@ TEST(Entries, LinearisedBatchesAskForThePlaceOfEveryColumn) {
   EXPECT_EQ(run(out), "d_azimuth has 18 values, expected 19");
   out.azimuth = {};
   EXPECT_EQ(run(out), "azimuth has 0 values, expected 3");
-}
-
-TEST(Entries, BatchesAskForAnInstructionSetOfTheProcessor) {
-  Shots shots;
-  const auto begins =
-      ::testing::StartsWith("instruction set = unknown, this processor and binary allow baseline");
-  EXPECT_THAT(refusal([&] { observe_batch(shots.train, shots.angles(), {}, {}, kUnknownSet); }),
-              begins);
-  EXPECT_THAT(refusal([&] {
-                linearise_batch(shots.train, shots.angles(),
-                                {shots.three, shots.three, shots.gradient(), shots.gradient()}, {},
-                                kUnknownSet);
-              }),
-              begins);
 }
 
 }  // namespace risley::entries_test

@@ -166,15 +166,6 @@ TEST(ObservationModel, PositiveRotationRaisesTheBeamFromTheLeft) {
   EXPECT_NEAR(left.direction.z, 0.0, 1e-15);
 }
 
-TEST(ObservationModel, WrongNumbersOfAnglesAreRefused) {
-  const PrismTrain train(parse_face_order("PA-AP"));
-  EXPECT_THROW(observe(train, std::array{0.0}), InvalidArgument);
-  const std::vector<double> a(3), b(4);
-  EXPECT_THROW(observe_batch(train, std::vector<std::span<const double>>{a, b}, {}),
-               InvalidArgument);
-  EXPECT_THROW(observe_batch(train, std::vector<std::span<const double>>{a}, {}), InvalidArgument);
-}
-
 TEST(Parameters, NamesBoundsAndUnitsAreChecked) {
   PrismTrain train(parse_face_order("PA-AP"));
   try {

@@ -255,7 +255,7 @@ TEST(Extrinsics, PacketsAreLeftOutUnlessNothingIsTurned) {
       bytes,
       {lvx_bytes::package(0, 1, 0, 500, random), lvx_bytes::package(0, 1, 6, 1'000'500, random)},
       0);
-  lvx_bytes::save(path, bytes);
+  format_tests::put_bytes(path, bytes);
   const Recording as_it_is = load_recording(path);
   ASSERT_EQ(as_it_is.data.packets.size(), 2U);
   const auto pose = stored_extrinsics(as_it_is.header.devices.front());
@@ -304,7 +304,7 @@ TEST(Extrinsics, PosesThatMakeNoSenseAreRefused) {
   std::string bytes = lvx_bytes::header_lvx11({{"0TFDG3B006H2Z11", 0, 1}, {"other", 1, 1}});
   std::mt19937 random(2);
   lvx_bytes::put_frame(bytes, {lvx_bytes::package(0, 1, 0, 500, random)}, 0);
-  lvx_bytes::save(two, bytes);
+  format_tests::put_bytes(two, bytes);
   EXPECT_THROW(open_recording(two, {.extrinsics = pose_deg(1, 0, 0)}), InvalidArgument);
 }
 

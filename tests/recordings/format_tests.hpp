@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
@@ -10,7 +11,9 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "risley/core/error.hpp"
 
@@ -22,7 +25,8 @@ namespace risley::recordings::format_tests {
 using io::TestFolder;
 
 inline void put_bytes(const std::string& path, std::string_view bytes) {
-  std::ofstream stream(path, std::ios::binary | std::ios::trunc);
+  std::filesystem::remove(path);  // much faster on most disks than to overwrite
+  std::ofstream stream(path, std::ios::binary);
   stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   ASSERT_TRUE(stream.good());
 }
@@ -42,15 +46,17 @@ struct Outcome {
   const Observations& rows() const { return recording.data.observations; }
 };
 
-inline Outcome read_all(const Format& format, const std::string& path,
+using Opened = std::function<std::unique_ptr<Reader>(const std::string& path)>;
+
+inline Outcome read_all(const Opened& open, const std::string& path,
                         std::size_t chunk_rows = kDefaultChunkRows) {
   Outcome outcome;
   std::unique_ptr<Reader> reader;
+  Chunk chunk;
   try {
-    reader = format.open(path, {});
+    reader = open(path);
     outcome.opened = true;
     outcome.recording.header = reader->header();
-    Chunk chunk;
     while (reader->read(chunk, chunk_rows)) {
       auto& all = outcome.recording.data;
       all.observations.append(chunk.observations);
@@ -63,9 +69,17 @@ inline Outcome read_all(const Format& format, const std::string& path,
     outcome.error = error;
     EXPECT_EQ(error.path(), path);
     EXPECT_FALSE(error.problem().empty());
+    if (reader) {
+      EXPECT_THROW(reader->read(chunk, chunk_rows), FileError) << "forgot the damage";
+    }
   }
   if (reader) outcome.recording.warnings = reader->warnings();
   return outcome;
+}
+
+inline Outcome read_all(const Format& format, const std::string& path,
+                        std::size_t chunk_rows = kDefaultChunkRows) {
+  return read_all([&](const std::string& file) { return format.open(file, {}); }, path, chunk_rows);
 }
 
 inline Outcome read_text(const Format& format, std::string_view bytes,
@@ -74,6 +88,43 @@ inline Outcome read_text(const Format& format, std::string_view bytes,
   const std::string path = folder.file("input");
   put_bytes(path, bytes);
   return read_all(format, path, chunk_rows);
+}
+
+/// The words of a recording's warnings.
+inline std::vector<std::string> warnings_of(const Outcome& outcome) {
+  std::vector<std::string> texts;
+  for (const ReadWarning& warning : outcome.recording.warnings) texts.push_back(warning.message);
+  return texts;
+}
+
+/// Reading ended at damage that is described in these words, after these rows, at this byte or
+/// line.
+inline void expect_damage(const Outcome& outcome, const ::testing::Matcher<std::string>& problem,
+                          std::optional<std::size_t> rows = {},
+                          std::optional<std::uint64_t> place = {}) {
+  ASSERT_TRUE(outcome.error);
+  EXPECT_THAT(outcome.error->problem(), problem);
+  if (rows) {
+    EXPECT_EQ(outcome.rows().size(), *rows);
+  }
+  if (place) {
+    const FilePlace& found = outcome.error->place();
+    EXPECT_EQ(found.byte_offset ? found.byte_offset : found.line, place);
+  }
+}
+
+/// Expects reading to take less than 200 MiB, whatever a file claims.
+inline void expect_little_memory(const std::function<void()>& reading) {
+  const auto peak_kib = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const auto before = peak_kib();
+  reading();
+#if !defined(__SANITIZE_THREAD__)  // it touches its own notes of every allocation
+  EXPECT_LT(peak_kib() - before, 200 << 10);
+#endif
 }
 
 inline void write_all(const Format& format, const std::string& path, const RecordingHeader& header,

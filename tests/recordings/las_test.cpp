@@ -19,6 +19,7 @@ using las_bytes::descriptor;
 using las_bytes::LasFile;
 using las_bytes::LasPoint;
 using las_bytes::put;
+using ::testing::_;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -47,12 +48,6 @@ Outcome read_las(const std::string& bytes, std::size_t chunk_rows = kDefaultChun
   return read_text(kLasFormat, bytes, chunk_rows);
 }
 
-std::vector<std::string> warnings_of(const Outcome& outcome) {
-  std::vector<std::string> texts;
-  for (const ReadWarning& warning : outcome.recording.warnings) texts.push_back(warning.message);
-  return texts;
-}
-
 Vector3<double> position(const Observations& rows, std::size_t row) {
   const double horizontal = rows.range[row] * std::sin(rows.zenith[row]);
   return {horizontal * std::cos(rows.azimuth[row]), horizontal * std::sin(rows.azimuth[row]),
@@ -75,10 +70,8 @@ void expect_positions(const Observations& rows, const LasFile& file) {
 /// A file that is refused: where and with which words.
 void expect_refused(const std::string& bytes, std::uint64_t byte, const std::string& words) {
   const Outcome outcome = read_las(bytes);
-  ASSERT_TRUE(outcome.error) << words;
   EXPECT_FALSE(outcome.opened) << words;
-  EXPECT_EQ(outcome.error->place().byte_offset, byte) << outcome.error->what();
-  EXPECT_THAT(outcome.error->problem(), HasSubstr(words));
+  expect_damage(outcome, HasSubstr(words), 0, byte);
 }
 
 class PointFormatTest : public ::testing::TestWithParam<int> {};
@@ -348,11 +341,8 @@ TEST(LasTest, ATimeThatIsNoneIsDamageAfterTheRowsBefore) {
     for (const std::size_t chunk_rows : {std::size_t{4}, std::size_t{1000}}) {
       LasFile file = some_file(40);
       file.points[25].gps_time = time;
-      const Outcome outcome = read_las(file.bytes(), chunk_rows);
-      EXPECT_EQ(outcome.rows().size(), 25U);
-      ASSERT_TRUE(outcome.error);
-      EXPECT_EQ(outcome.error->place().byte_offset, 227U + 25 * 28 + 20);
-      EXPECT_THAT(outcome.error->problem(), HasSubstr("GPS time of point 26"));
+      expect_damage(read_las(file.bytes(), chunk_rows), HasSubstr("GPS time of point 26"), 25,
+                    227U + 25 * 28 + 20);
     }
   }
 }
@@ -425,10 +415,7 @@ TEST(LasTest, ExtendedRecordsAreNoPoints) {
   EXPECT_EQ(outcome.rows().beam[5], 7);  // described behind the points
   file.count = 41;                       // would reach into them
   outcome = read_las(file.bytes());
-  EXPECT_EQ(outcome.rows().size(), 40U);
-  ASSERT_TRUE(outcome.error);
-  EXPECT_EQ(outcome.error->place().byte_offset, 375U + 40 * 31);
-  EXPECT_THAT(outcome.error->problem(), HasSubstr("other records begin"));
+  expect_damage(outcome, HasSubstr("other records begin"), 40, 375U + 40 * 31);
 }
 
 TEST(LasTest, BrokenExtendedRecordsAreAWarning) {
@@ -468,10 +455,7 @@ TEST(LasTest, ACutFileGivesItsPointsAndThenTheByte) {
   const std::string bytes = file.bytes();
   const Outcome outcome = read_las(bytes.substr(0, 227 + 17 * 28 + 5), 5);
   EXPECT_TRUE(outcome.opened);
-  EXPECT_EQ(outcome.rows().size(), 17U);
-  ASSERT_TRUE(outcome.error);
-  EXPECT_EQ(outcome.error->place().byte_offset, 227U + 17 * 28);
-  EXPECT_THAT(outcome.error->problem(), HasSubstr("expected 40 points of 28 bytes"));
+  expect_damage(outcome, HasSubstr("expected 40 points of 28 bytes"), 17, 227U + 17 * 28);
 }
 
 TEST(LasTest, SurvivesACutBehindAnyByte) {
@@ -532,10 +516,7 @@ TEST(LasTest, CountsFarBeyondTheFileTakeNoMemory) {
   for (const std::uint64_t count : {std::uint64_t{1} << 40, ~std::uint64_t{0}}) {
     LasFile file = some_file(40, 4, 6);
     file.count = count;
-    const Outcome outcome = read_las(file.bytes());
-    EXPECT_EQ(outcome.rows().size(), 40U);
-    ASSERT_TRUE(outcome.error);
-    EXPECT_EQ(outcome.error->place().byte_offset, 375U + 40 * 30);
+    expect_damage(read_las(file.bytes()), _, 40, 375U + 40 * 30);
   }
 }
 

@@ -4,10 +4,7 @@
 
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <random>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -17,17 +14,6 @@
 namespace risley::recordings::lvx_bytes {
 
 using io::TestFolder;
-
-inline void save(const std::string& path, const std::string& bytes) {
-  std::filesystem::remove(path);  // much faster on most disks than to overwrite
-  std::ofstream(path, std::ios::binary) << bytes;
-}
-
-inline std::string contents(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream(path, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 template <class T>
 void put(std::string& bytes, T value) {

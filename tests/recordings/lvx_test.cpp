@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 
 #include <gmock/gmock.h>
@@ -13,85 +14,45 @@
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/writer.hpp"
 
+#include "recordings/format_tests.hpp"
 #include "recordings/lvx_bytes.hpp"
+#include "refusal.hpp"
 
 namespace risley::recordings::lvx_test {
 
+using namespace format_tests;
+using ::testing::_;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using namespace lvx_bytes;
 
 constexpr std::uint8_t kMid40 = 1, kHorizon = 3, kMid70 = 6, kAvia = 7;
 
-/// What came out of a file, and how reading it ended.
-struct ReadResult {
-  Chunk data;
-  std::vector<ReadWarning> warnings;
-  std::optional<FileError> open_error, read_error;
-};
-
-void append(Chunk& all, const Chunk& chunk) {
-  all.observations.append(chunk.observations);
-  all.packets.insert(all.packets.end(), chunk.packets.begin(), chunk.packets.end());
-  all.imu.insert(all.imu.end(), chunk.imu.begin(), chunk.imu.end());
-}
-
-/// Equality of the first rows, bit by bit, with NaN equal to NaN.
-void expect_prefix(const Observations& part, const Observations& whole) {
-  ASSERT_LE(part.size(), whole.size());
-  const auto same_bits = [&](const auto& a, const auto& b) {
-    return a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0;
-  };
-  EXPECT_TRUE(same_bits(part.time_ns, whole.time_ns));
-  EXPECT_TRUE(same_bits(part.azimuth, whole.azimuth));
-  EXPECT_TRUE(same_bits(part.zenith, whole.zenith));
-  EXPECT_TRUE(same_bits(part.range, whole.range));
-  EXPECT_TRUE(same_bits(part.intensity, whole.intensity));
-  EXPECT_TRUE(same_bits(part.return_number, whole.return_number));
-  EXPECT_TRUE(same_bits(part.tag, whole.tag));
-  EXPECT_TRUE(same_bits(part.beam, whole.beam));
-  EXPECT_TRUE(same_bits(part.device, whole.device));
-  EXPECT_TRUE(same_bits(part.valid, whole.valid));
-}
-
 class LvxTest : public ::testing::Test {
  protected:
-  ReadResult read(const std::string& bytes, std::size_t max_rows = kDefaultChunkRows) {
-    ReadResult result;
-    save(folder_.file("in.lvx"), bytes);
-    std::unique_ptr<Reader> reader;
-    try {
-      reader = open_recording(folder_.file("in.lvx"));
-    } catch (const FileError& error) {
-      result.open_error = error;
-      return result;
-    }
-    Chunk chunk;
-    try {
-      while (reader->read(chunk, max_rows)) append(result.data, chunk);
-    } catch (const FileError& error) {
-      result.read_error = error;
-      EXPECT_THROW(reader->read(chunk, max_rows), FileError) << "forgot the damage";
-    }
-    result.warnings = reader->warnings();
-    return result;
+  Outcome read(const std::string& bytes, std::size_t max_rows = kDefaultChunkRows) {
+    put_bytes(folder_.file("in.lvx"), bytes);
+    return read_all([](const std::string& path) { return open_recording(path); },
+                    folder_.file("in.lvx"), max_rows);
   }
 
   /// Copies a recording in chunks of so many rows. @return the bytes of the copy
   std::string copy(const std::string& bytes, std::size_t max_rows = kDefaultChunkRows) {
-    save(folder_.file("in.lvx"), bytes);
+    put_bytes(folder_.file("in.lvx"), bytes);
     std::filesystem::remove(folder_.file("out.lvx"));
     const auto reader = open_recording(folder_.file("in.lvx"));
     const auto writer = create_recording(folder_.file("out.lvx"), reader->header());
     Chunk chunk;
     while (reader->read(chunk, max_rows)) writer->write(chunk);
     writer->close();
-    return contents(folder_.file("out.lvx"));
+    return get_bytes(folder_.file("out.lvx"));
   }
 
   std::string write(const RecordingHeader& header, const Chunk& chunk) {
     const auto writer = create_recording(folder_.file("rows.lvx"), header);
     writer->write(chunk);
     writer->close();
-    return contents(folder_.file("rows.lvx"));
+    return get_bytes(folder_.file("rows.lvx"));
   }
 
   TestFolder folder_;
@@ -190,9 +151,9 @@ TEST_F(LvxTest, TheSmallestFileIsWrittenAsDescribed) {
 }
 
 TEST_F(LvxTest, TheDeviceTableAndPacketsAreRead) {
-  const ReadResult result = read(rich_file());
-  ASSERT_FALSE(result.open_error || result.read_error);
-  EXPECT_TRUE(result.warnings.empty());
+  const Outcome result = read(rich_file());
+  ASSERT_FALSE(result.error);
+  EXPECT_TRUE(result.recording.warnings.empty());
   const auto reader = open_recording(folder_.file("in.lvx"));
   const RecordingHeader& header = reader->header();
   EXPECT_EQ(header.format, "lvx-1.1");
@@ -201,40 +162,40 @@ TEST_F(LvxTest, TheDeviceTableAndPacketsAreRead) {
   EXPECT_EQ(header.devices[0].index, 9);
   EXPECT_EQ(header.devices[1].type, kMid40);
   EXPECT_TRUE(header.devices[0].extrinsic_enabled);
-  EXPECT_THAT(header.devices[1].roll_pitch_yaw_deg, ::testing::ElementsAre(1.5F, -2.25F, 90.0F));
-  EXPECT_THAT(header.devices[1].translation_m, ::testing::ElementsAre(0.1F, 0.2F, -0.3F));
+  EXPECT_THAT(header.devices[1].roll_pitch_yaw_deg, ElementsAre(1.5F, -2.25F, 90.0F));
+  EXPECT_THAT(header.devices[1].translation_m, ElementsAre(0.1F, 0.2F, -0.3F));
   EXPECT_EQ(header.time_reference, TimeReference::ptp);
   EXPECT_EQ(header.returns_per_shot, 3);
   EXPECT_FALSE(header.cartesian);
 
   std::vector<int> types, devices;
   std::vector<std::uint64_t> frames;
-  for (const Packet& packet : result.data.packets) {
+  for (const Packet& packet : result.recording.data.packets) {
     types.push_back(packet.data_type);
     devices.push_back(packet.device_index);
     frames.push_back(packet.frame);
   }
-  EXPECT_THAT(types, ::testing::ElementsAre(8, 6, 1, 5, 7, 0, 6));
-  EXPECT_THAT(devices, ::testing::ElementsAre(9, 9, 2, 9, 9, 2, 9));
-  EXPECT_THAT(frames, ::testing::ElementsAre(0, 0, 0, 0, 1, 2, 2));
-  const Observations& o = result.data.observations;
+  EXPECT_THAT(types, ElementsAre(8, 6, 1, 5, 7, 0, 6));
+  EXPECT_THAT(devices, ElementsAre(9, 9, 2, 9, 9, 2, 9));
+  EXPECT_THAT(frames, ElementsAre(0, 0, 0, 0, 1, 2, 2));
+  const Observations& o = result.rows();
   ASSERT_EQ(o.size(), 90U + 100 + 96 + 90 + 100);
   EXPECT_EQ(o.device[0], 0);  // row of the table, not the index
   EXPECT_EQ(o.device[90], 1);
   EXPECT_EQ(o.time_ns[90 + 99], 500 + 990'000);
-  ASSERT_EQ(result.data.imu.size(), 2U);
-  EXPECT_EQ(result.data.imu[1].time_ns, 51'050'000);
+  ASSERT_EQ(result.recording.data.imu.size(), 2U);
+  EXPECT_EQ(result.recording.data.imu[1].time_ns, 51'050'000);
 }
 
 TEST_F(LvxTest, ChunksStayWithinTheirSizeAndTogetherAreTheWhole) {
   const std::string file = rich_file();
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   for (const std::size_t max_rows : {1U, 90U, 100U, 250U}) {
     SCOPED_TRACE(max_rows);
-    const ReadResult pieces = read(file, max_rows);
-    EXPECT_EQ(pieces.data.packets.size(), whole.data.packets.size());
-    ASSERT_EQ(pieces.data.observations.size(), whole.data.observations.size());
-    expect_prefix(pieces.data.observations, whole.data.observations);
+    const Outcome pieces = read(file, max_rows);
+    EXPECT_EQ(pieces.recording.data.packets.size(), whole.recording.data.packets.size());
+    ASSERT_EQ(pieces.rows().size(), whole.rows().size());
+    EXPECT_TRUE(is_prefix(pieces.rows(), whole.rows()));
     const auto reader = open_recording(folder_.file("in.lvx"));
     Chunk chunk;
     while (reader->read(chunk, max_rows)) {
@@ -267,7 +228,7 @@ TEST_F(LvxTest, MemoryDoesNotGrowWithTheRecording) {
   EXPECT_EQ(rows, 4'000'000U);
   EXPECT_LE(largest, 10'000U);
   EXPECT_EQ(std::filesystem::file_size(path), 88 + 24 + 40'000 * 919);
-  EXPECT_TRUE(contents(again) == contents(path));
+  EXPECT_TRUE(get_bytes(again) == get_bytes(path));
 }
 
 // --- writing what was read -----------------------------------------------------------------------
@@ -309,17 +270,17 @@ TEST_F(LvxTest, RowsWithoutPacketsAreWrittenExactlyAndStayTheSame) {
     const RecordingHeader header = header_for(c.type, c.cartesian, c.returns);
     const Chunk chunk = rows_at(grid_times(20'000, c.rate_hz, 123'000), c.returns);
     const std::string bytes = write(header, chunk);
-    const ReadResult result = read(bytes);
-    ASSERT_FALSE(result.open_error || result.read_error);
-    EXPECT_TRUE(result.warnings.empty());
-    EXPECT_EQ(result.data.packets.size(), c.packets);
-    EXPECT_EQ(result.data.packets[0].data_type, c.data_type);
-    if (!c.cartesian) expect_same_shots(chunk.observations, result.data.observations);
-    ASSERT_GE(result.data.observations.size(), chunk.observations.size());
+    const Outcome result = read(bytes);
+    ASSERT_FALSE(result.error);
+    EXPECT_TRUE(result.recording.warnings.empty());
+    EXPECT_EQ(result.recording.data.packets.size(), c.packets);
+    EXPECT_EQ(result.recording.data.packets[0].data_type, c.data_type);
+    if (!c.cartesian) expect_same_shots(chunk.observations, result.rows());
+    ASSERT_GE(result.rows().size(), chunk.observations.size());
     for (std::size_t row = 0; c.cartesian && row < chunk.observations.size(); ++row) {
       // Without gaps in time the rows stand in the same order.
-      ASSERT_EQ(result.data.observations.time_ns[row], chunk.observations.time_ns[row]);
-      ASSERT_NEAR(result.data.observations.range[row], chunk.observations.range[row], 0.9e-3);
+      ASSERT_EQ(result.rows().time_ns[row], chunk.observations.time_ns[row]);
+      ASSERT_NEAR(result.rows().range[row], chunk.observations.range[row], 0.9e-3);
     }
     EXPECT_TRUE(copy(bytes, 1000) == bytes);
   }
@@ -332,23 +293,11 @@ TEST_F(LvxTest, RowsMayComeInPiecesOfAnySize) {
   const auto writer = create_recording(folder_.file("pieces.lvx"), header);
   for (std::size_t row = 0; row < all.observations.size(); row += 7) {
     Chunk piece;
-    for (std::size_t i = row; i < std::min(row + 7, all.observations.size()); ++i) {
-      Observations one = all.observations;
-      // One row of the whole: everything else is cut away.
-      const auto cut = [i](auto& column) {
-        column = {column.begin() + static_cast<std::ptrdiff_t>(i),
-                  column.begin() + static_cast<std::ptrdiff_t>(i) + 1};
-      };
-      cut(one.time_ns), cut(one.azimuth), cut(one.zenith), cut(one.range);
-      cut(one.azimuth_resolution), cut(one.zenith_resolution), cut(one.range_resolution);
-      cut(one.intensity), cut(one.return_number), cut(one.tag), cut(one.beam), cut(one.device);
-      cut(one.valid);
-      piece.observations.append(one);
-    }
+    piece.observations.append(all.observations, row, std::min(row + 7, all.observations.size()));
     writer->write(piece);
   }
   writer->close();
-  EXPECT_TRUE(contents(folder_.file("pieces.lvx")) == at_once);
+  EXPECT_TRUE(get_bytes(folder_.file("pieces.lvx")) == at_once);
 }
 
 TEST_F(LvxTest, FormedPacketsGoIntoFramesOfTheirDuration) {
@@ -358,10 +307,10 @@ TEST_F(LvxTest, FormedPacketsGoIntoFramesOfTheirDuration) {
   std::vector<std::int64_t> times = grid_times(10'000, 1e5);
   for (const std::int64_t t : grid_times(100, 1e5, 1'100'000'000)) times.push_back(t);
   const std::string bytes = write(header, rows_at(times));
-  const ReadResult result = read(bytes);
+  const Outcome result = read(bytes);
   std::vector<int> packets_of_frame(6);
-  for (const Packet& packet : result.data.packets) ++packets_of_frame.at(packet.frame);
-  EXPECT_THAT(packets_of_frame, ::testing::ElementsAre(20, 20, 20, 20, 20, 1));
+  for (const Packet& packet : result.recording.data.packets) ++packets_of_frame.at(packet.frame);
+  EXPECT_THAT(packets_of_frame, ElementsAre(20, 20, 20, 20, 20, 1));
   // The last frame ends with the file.
   std::uint64_t next = 0;
   std::memcpy(&next, bytes.data() + bytes.size() - 919 - 24 + 8, 8);
@@ -375,8 +324,8 @@ TEST_F(LvxTest, ShotsWithoutReturnKeepTheirPlaceAndTheirAngles) {
   o.valid[40] = 0;
   o.azimuth[41] = o.zenith[41] = o.range[41] = std::numeric_limits<double>::quiet_NaN();
   o.valid[41] = 0;
-  const ReadResult result = read(write(header_for(kMid40), chunk));
-  const Observations& again = result.data.observations;
+  const Outcome result = read(write(header_for(kMid40), chunk));
+  const Observations& again = result.rows();
   ASSERT_EQ(again.size(), 100U);
   EXPECT_EQ(again.range[40], 0.0);
   EXPECT_NEAR(again.azimuth[40], o.azimuth[40], 1e-12);
@@ -391,10 +340,10 @@ TEST_F(LvxTest, TagsAndFurtherReturnsThatAppearLateAreKept) {
   chunk.observations.tag[50] = 0x10;  // from here on records with a tag
   Chunk second = rows_at({3'000'000, 3'010'000}, 2);
   chunk.observations.append(second.observations);
-  const ReadResult result = read(write(header_for(kMid40), chunk));
-  expect_same_shots(chunk.observations, result.data.observations);
-  EXPECT_EQ(result.data.packets.front().data_type, 1);
-  EXPECT_EQ(result.data.packets.back().data_type, 5);
+  const Outcome result = read(write(header_for(kMid40), chunk));
+  expect_same_shots(chunk.observations, result.rows());
+  EXPECT_EQ(result.recording.data.packets.front().data_type, 1);
+  EXPECT_EQ(result.recording.data.packets.back().data_type, 5);
 }
 
 TEST_F(LvxTest, SeveralDevicesAndInertialSamplesAreWritten) {
@@ -416,15 +365,14 @@ TEST_F(LvxTest, SeveralDevicesAndInertialSamplesAreWritten) {
     chunk.imu.push_back(sample);
   }
   const std::string bytes = write(header, chunk);
-  const ReadResult result = read(bytes);
-  ASSERT_EQ(result.data.imu.size(), 3U);
-  EXPECT_EQ(result.data.imu[1].time_ns, 1'500'000);
-  EXPECT_EQ(result.data.imu[1].device, 1);
+  const Outcome result = read(bytes);
+  ASSERT_EQ(result.recording.data.imu.size(), 3U);
+  EXPECT_EQ(result.recording.data.imu[1].time_ns, 1'500'000);
+  EXPECT_EQ(result.recording.data.imu[1].device, 1);
   std::vector<std::int64_t> first, second;
-  for (std::size_t row = 0; row < result.data.observations.size(); ++row) {
-    if (!result.data.observations.valid[row]) continue;
-    (result.data.observations.device[row] == 0 ? first : second)
-        .push_back(result.data.observations.time_ns[row]);
+  for (std::size_t row = 0; row < result.rows().size(); ++row) {
+    if (!result.rows().valid[row]) continue;
+    (result.rows().device[row] == 0 ? first : second).push_back(result.rows().time_ns[row]);
   }
   EXPECT_EQ(first, times);
   ASSERT_EQ(second.size(), times.size());
@@ -453,87 +401,67 @@ TEST_F(LvxTest, TimesKeepTheirReference) {
     header.time_reference = c.reference;
     Chunk chunk = rows_at(grid_times(250'000, 1e5, c.start));
     const std::string bytes = write(header, chunk);
-    const ReadResult result = read(bytes);
+    const Outcome result = read(bytes);
     const auto reader = open_recording(folder_.file("in.lvx"));
     EXPECT_EQ(reader->header().time_reference, c.read_as);
     for (std::int64_t& t : chunk.observations.time_ns) t += c.read_start - c.start;
-    ASSERT_GE(result.data.observations.size(), chunk.observations.size());
-    expect_same_shots(chunk.observations, result.data.observations);
+    ASSERT_GE(result.rows().size(), chunk.observations.size());
+    expect_same_shots(chunk.observations, result.rows());
     EXPECT_TRUE(copy(bytes) == bytes);
   }
 }
 
 TEST_F(LvxTest, WhatLvxCannotHoldIsRefused) {
-  const auto message = [this](const RecordingHeader& header, const Chunk& chunk) -> std::string {
-    try {
-      write(header, chunk);
-    } catch (const InvalidArgument& error) {
-      return error.what();
-    }
-    return "was written";
-  };
-  using ::testing::AllOf;
-  using ::testing::HasSubstr;
-  const Chunk good = rows_at(grid_times(3, 1e5));
-  EXPECT_EQ(message(header_for(kMid40), good), "was written");
-
-  Chunk chunk = good;
-  chunk.observations.range.assign(3, std::numeric_limits<double>::quiet_NaN());
-  EXPECT_THAT(message(header_for(kMid40), chunk), AllOf(HasSubstr("row 0"), HasSubstr("range")));
   RecordingHeader header = header_for(kMid40);
-  header.has_range = false;
-  EXPECT_THAT(message(header, good), HasSubstr("ranges"));
-
-  chunk = good;
-  chunk.observations.time_ns[0] = -1;
-  EXPECT_THAT(message(header_for(kMid40), chunk), AllOf(HasSubstr("row 0"), HasSubstr("-1 ns")));
-  header = header_for(kMid40);
-  header.time_reference = TimeReference::utc;
-  EXPECT_THAT(message(header, good), AllOf(HasSubstr("1970"), HasSubstr("2000 to 2255")));
-  header.time_reference = TimeReference::pps;
-  chunk = rows_at({0, 1'500'000'000});
-  EXPECT_THAT(message(header, chunk), AllOf(HasSubstr("row 1"), HasSubstr("PPS")));
-
-  chunk = good;
-  chunk.observations.device[2] = 1;
-  EXPECT_THAT(message(header_for(kMid40), chunk), AllOf(HasSubstr("row 2"), HasSubstr("device")));
-  chunk = good;
-  chunk.observations.return_number[1] = 4;
-  EXPECT_THAT(message(header_for(kMid40), chunk), HasSubstr("return_number = 4"));
-  chunk.observations.return_number[1] = 0;
-  EXPECT_THAT(message(header_for(kMid40), chunk), HasSubstr("return_number = 0"));
-  chunk = rows_at(grid_times(300, 1e5));
-  chunk.observations.range[250] = -2;
-  EXPECT_THAT(message(header_for(kMid40), chunk), AllOf(HasSubstr("row 250"), HasSubstr("-2 m")));
-
-  EXPECT_THAT(message(header_for(200), good), HasSubstr("type 200"));
-  header = header_for(kMid40);
-  header.devices.push_back(header.devices[0]);
-  EXPECT_THAT(message(header, good), HasSubstr("twice"));
-  header = header_for(kMid40);
-  header.devices[0].serial = "seventeen letters";
-  EXPECT_THAT(message(header, good), HasSubstr("at most 16"));
-  EXPECT_THAT(message(header_for(kMid40, false, 4), good), HasSubstr("1 to 3"));
+  Chunk good = rows_at(grid_times(3, 1e5));
+  const auto refused = [&](const std::vector<const char*>& words, auto&& change) {
+    RecordingHeader changed_header = header;
+    Chunk changed = good;
+    change(changed_header, changed, changed.observations);
+    const std::string problem = refusal<InvalidArgument>([&] { write(changed_header, changed); });
+    for (const char* word : words) EXPECT_THAT(problem, HasSubstr(word));
+  };
+  using Header = RecordingHeader;
+  write(header, good);
+  refused({"row 0", "range"}, [](Header&, Chunk&, Observations& o) {
+    o.range.assign(3, std::numeric_limits<double>::quiet_NaN());
+  });
+  refused({"ranges"}, [](Header& h, Chunk&, Observations&) { h.has_range = false; });
+  refused({"row 0", "-1 ns"}, [](Header&, Chunk&, Observations& o) { o.time_ns[0] = -1; });
+  refused({"1970", "2000 to 2255"},
+          [](Header& h, Chunk&, Observations&) { h.time_reference = TimeReference::utc; });
+  refused({"row 1", "PPS"}, [](Header& h, Chunk& chunk, Observations&) {
+    h.time_reference = TimeReference::pps;
+    chunk = rows_at({0, 1'500'000'000});
+  });
+  refused({"row 2", "device"}, [](Header&, Chunk&, Observations& o) { o.device[2] = 1; });
+  for (const int number : {0, 4}) {
+    refused({fmt::format("return_number = {}", number).c_str()},
+            [&](Header&, Chunk&, Observations& o) {
+              o.return_number[1] = static_cast<std::uint8_t>(number);
+            });
+  }
+  refused({"row 250", "-2 m"}, [](Header&, Chunk& chunk, Observations& o) {
+    chunk = rows_at(grid_times(300, 1e5));
+    o.range[250] = -2;
+  });
+  refused({"type 200"}, [](Header& h, Chunk&, Observations&) { h = header_for(200); });
+  refused({"twice"}, [](Header& h, Chunk&, Observations&) { h.devices.push_back(h.devices[0]); });
+  refused({"at most 16"},
+          [](Header& h, Chunk&, Observations&) { h.devices[0].serial = "seventeen letters"; });
+  refused({"1 to 3"}, [](Header& h, Chunk&, Observations&) { h.returns_per_shot = 4; });
 
   // Packets that do not belong to their rows.
-  const ReadResult result = read(rich_file());
+  const Outcome result = read(rich_file());
   header = open_recording(folder_.file("in.lvx"))->header();
-  chunk = result.data;
-  EXPECT_EQ(message(header, chunk), "was written");
-  chunk.packets.pop_back();
-  EXPECT_THAT(message(header, chunk), HasSubstr("Chunk::packets"));
-  chunk = result.data;
-  chunk.imu.pop_back();
-  EXPECT_THAT(message(header, chunk), HasSubstr("Chunk::packets"));
-  chunk = result.data;
-  chunk.packets[0].rows = 89;
-  EXPECT_THAT(message(header, chunk), HasSubstr("Chunk::packets"));
-  chunk = result.data;
-  chunk.packets[0].device_index = 3;
-  EXPECT_THAT(message(header, chunk), HasSubstr("device index"));
-  chunk = result.data;
-  chunk.observations.time_ns[0] += 2000;
-  EXPECT_THAT(message(header, chunk), HasSubstr("timestamp"));
+  good = result.recording.data;
+  write(header, good);
+  refused({"Chunk::packets"}, [](Header&, Chunk& c, Observations&) { c.packets.pop_back(); });
+  refused({"Chunk::packets"}, [](Header&, Chunk& c, Observations&) { c.imu.pop_back(); });
+  refused({"Chunk::packets"}, [](Header&, Chunk& c, Observations&) { c.packets[0].rows = 89; });
+  refused({"device index"},
+          [](Header&, Chunk& c, Observations&) { c.packets[0].device_index = 3; });
+  refused({"timestamp"}, [](Header&, Chunk&, Observations& o) { o.time_ns[0] += 2000; });
 }
 
 TEST_F(LvxTest, NothingIsLeftWithoutClose) {
@@ -550,7 +478,7 @@ TEST_F(LvxTest, NothingIsLeftWithoutClose) {
 TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
   std::vector<std::size_t> frames;
   const std::string file = rich_file(&frames);
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   // What stands before the cut is known from the file's description alone.
   const std::size_t sizes[] = {679, 43, 919, 787, 1279, 1319, 43};
   const std::size_t rows[] = {90, 0, 100, 96, 90, 100, 0};
@@ -564,28 +492,28 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
   ASSERT_EQ(ends.back(), file.size());
   for (std::size_t cut = 0; cut <= file.size(); ++cut) {
     SCOPED_TRACE(cut);
-    const ReadResult result = read(file.substr(0, cut));
+    const Outcome result = read(file.substr(0, cut));
     if (cut < frames[0]) {
-      ASSERT_TRUE(result.open_error);
+      ASSERT_FALSE(result.opened);
       // Without the whole name it is no LVX file that can be told.
       if (cut >= 16) {
-        ASSERT_TRUE(result.open_error->place().byte_offset);
-        EXPECT_LE(*result.open_error->place().byte_offset, cut);
+        ASSERT_TRUE(result.error->place().byte_offset);
+        EXPECT_LE(*result.error->place().byte_offset, cut);
       }
       continue;
     }
-    ASSERT_FALSE(result.open_error);
-    ASSERT_FALSE(result.read_error);
+    ASSERT_TRUE(result.opened);
+    ASSERT_FALSE(result.error);
     std::size_t expected = 0, packets = 0;
     while (packets < 7 && ends[packets] <= cut) expected += rows[packets++];
-    ASSERT_EQ(result.data.observations.size(), expected);
-    ASSERT_EQ(result.data.packets.size(), packets);
-    expect_prefix(result.data.observations, whole.data.observations);
+    ASSERT_EQ(result.rows().size(), expected);
+    ASSERT_EQ(result.recording.data.packets.size(), packets);
+    EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
     // A cut between two frames leaves a file that is whole.
     const bool between = cut == file.size() || cut == frames[1] || cut == frames[2];
-    ASSERT_EQ(result.warnings.size(), between ? 0U : 1U);
+    ASSERT_EQ(result.recording.warnings.size(), between ? 0U : 1U);
     if (between) continue;
-    const ReadWarning& warning = result.warnings[0];
+    const ReadWarning& warning = result.recording.warnings[0];
     ASSERT_TRUE(warning.place.byte_offset);
     EXPECT_LE(*warning.place.byte_offset, cut);
     // Eleven bytes of a package tell how many records it had.
@@ -596,7 +524,7 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
     if (in_package && left >= 11) {
       const std::size_t records[] = {30, 1, 100, 48, 30, 100, 1};
       EXPECT_EQ(warning.lost_records, records[packets]);
-      EXPECT_THAT(warning.message, ::testing::HasSubstr("cut off"));
+      EXPECT_THAT(warning.message, HasSubstr("cut off"));
     } else {
       EXPECT_EQ(warning.lost_records, 0U);
     }
@@ -606,7 +534,7 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
 TEST_F(LvxTest, AFlippedHeaderBitInventsNoPoint) {
   std::vector<std::size_t> frames;
   const std::string file = rich_file(&frames);
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   std::vector<std::size_t> bytes;
   for (std::size_t i = 0; i < 24; ++i) bytes.push_back(i);
   bytes.push_back(28);
@@ -619,20 +547,21 @@ TEST_F(LvxTest, AFlippedHeaderBitInventsNoPoint) {
       SCOPED_TRACE(::testing::Message() << "byte " << at << " bit " << bit);
       std::string damaged = file;
       damaged[at] = static_cast<char>(damaged[at] ^ (1 << bit));
-      const ReadResult result = read(damaged);
+      const Outcome result = read(damaged);
       if (at < 24) {
-        EXPECT_TRUE(result.open_error);
+        EXPECT_FALSE(result.opened);
         continue;
       }
-      if (result.open_error) continue;
-      expect_prefix(result.data.observations, whole.data.observations);
-      const bool complete = result.data.packets.size() == whole.data.packets.size();
-      EXPECT_TRUE(complete || result.read_error || !result.warnings.empty());
+      if (!result.opened) continue;
+      EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
+      const bool complete =
+          result.recording.data.packets.size() == whole.recording.data.packets.size();
+      EXPECT_TRUE(complete || result.error || !result.recording.warnings.empty());
       const bool is_current = std::any_of(frames.begin(), frames.end(), [&](std::size_t frame) {
         return at >= frame && at < frame + 8;
       });
       if (is_current) {
-        EXPECT_TRUE(result.read_error);
+        EXPECT_TRUE(result.error);
       }
     }
   }
@@ -640,34 +569,26 @@ TEST_F(LvxTest, AFlippedHeaderBitInventsNoPoint) {
 
 TEST_F(LvxTest, DamagedHeadersAreNamed) {
   const std::string file = rich_file();
-  const auto message = [this](const std::string& bytes) -> std::string {
-    const ReadResult result = read(bytes);
-    return result.open_error ? result.open_error->what() : "was opened";
+  const auto refused = [&](const std::map<std::size_t, char>& changes,
+                           const std::vector<const char*>& words) {
+    std::string bytes = file;
+    for (const auto& [at, value] : changes) bytes[at] = value;
+    const Outcome result = read(bytes);
+    ASSERT_FALSE(result.opened);
+    for (const char* word : words) EXPECT_THAT(result.error->what(), HasSubstr(word));
   };
-  using ::testing::AllOf;
-  using ::testing::HasSubstr;
-  std::string bytes = file;
-  bytes[16] = 2, bytes[17] = 0;
-  EXPECT_THAT(message(bytes), AllOf(HasSubstr("LVX 2"), HasSubstr("not supported")));
-  bytes = file;
-  bytes[17] = 7;
-  EXPECT_THAT(message(bytes), AllOf(HasSubstr("byte 16"), HasSubstr("1.7.0.0")));
-  bytes = file;
-  bytes[20] = 0;
-  EXPECT_THAT(message(bytes), AllOf(HasSubstr("byte 20"), HasSubstr("AC0EA767")));
-  bytes = file;
-  bytes[28] = 0;
-  EXPECT_THAT(message(bytes), AllOf(HasSubstr("byte 28"), HasSubstr("devices = 0")));
-  bytes = file;
-  bytes[29 + 59 + 32] = 9;
-  EXPECT_THAT(message(bytes), AllOf(HasSubstr("device index 9"), HasSubstr("twice")));
-  EXPECT_THAT(message(file.substr(0, 100)), HasSubstr("device table"));
+  refused({{16, 2}, {17, 0}}, {"LVX 2", "not supported"});
+  refused({{17, 7}}, {"byte 16", "1.7.0.0"});
+  refused({{20, 0}}, {"byte 20", "AC0EA767"});
+  refused({{28, 0}}, {"byte 28", "devices = 0"});
+  refused({{29 + 59 + 32, 9}}, {"device index 9", "twice"});
+  EXPECT_THAT(read(file.substr(0, 100)).error->what(), HasSubstr("device table"));
 }
 
 TEST_F(LvxTest, DamageInTheBodyIsReportedAfterTheSoundRows) {
   std::vector<std::size_t> frames;
   const std::string file = rich_file(&frames);
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   struct Case {
     const char* name;
     std::size_t at;
@@ -688,13 +609,11 @@ TEST_F(LvxTest, DamageInTheBodyIsReportedAfterTheSoundRows) {
     std::string damaged = file;
     damaged[c.at] = static_cast<char>(c.value);
     for (const std::size_t max_rows : {std::size_t{1}, kDefaultChunkRows}) {
-      const ReadResult result = read(damaged, max_rows);
-      ASSERT_FALSE(result.open_error);
-      ASSERT_TRUE(result.read_error);
-      EXPECT_EQ(result.read_error->place().byte_offset, c.offset);
-      EXPECT_THAT(result.read_error->what(), ::testing::HasSubstr(c.message));
-      EXPECT_EQ(result.data.packets.size(), c.packets);
-      expect_prefix(result.data.observations, whole.data.observations);
+      const Outcome result = read(damaged, max_rows);
+      ASSERT_TRUE(result.opened);
+      expect_damage(result, HasSubstr(c.message), {}, c.offset);
+      EXPECT_EQ(result.recording.data.packets.size(), c.packets);
+      EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
     }
   }
 }
@@ -704,44 +623,44 @@ TEST_F(LvxTest, UnknownDataTypesAreSteppedOverToTheNextFrame) {
   std::string file = rich_file(&frames);
   const std::size_t second = frames[0] + 24 + 679;
   file[second + 10] = 9;
-  ReadResult result = read(file);
-  ASSERT_FALSE(result.read_error);
+  Outcome result = read(file);
+  ASSERT_FALSE(result.error);
   std::vector<int> types;
-  for (const Packet& packet : result.data.packets) types.push_back(packet.data_type);
-  EXPECT_THAT(types, ::testing::ElementsAre(8, 7, 0, 6));
-  ASSERT_EQ(result.warnings.size(), 1U);
-  EXPECT_EQ(result.warnings[0].place.byte_offset, second);
-  EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("data type 9"));
+  for (const Packet& packet : result.recording.data.packets) types.push_back(packet.data_type);
+  EXPECT_THAT(types, ElementsAre(8, 7, 0, 6));
+  ASSERT_EQ(result.recording.warnings.size(), 1U);
+  EXPECT_EQ(result.recording.warnings[0].place.byte_offset, second);
+  EXPECT_THAT(result.recording.warnings[0].message, HasSubstr("data type 9"));
   file[frames[1] + 24 + 10] = 9;
   result = read(file);
-  EXPECT_EQ(result.warnings.size(), 1U);
-  EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("its frame and of 1 more"));
+  EXPECT_EQ(result.recording.warnings.size(), 1U);
+  EXPECT_THAT(result.recording.warnings[0].message, HasSubstr("its frame and of 1 more"));
 }
 
 TEST_F(LvxTest, TheLastFrameMayBeLeftOpen) {
   std::vector<std::size_t> frames;
   const std::string file = rich_file(&frames);
-  const ReadResult whole = read(file);
+  const Outcome whole = read(file);
   for (const std::uint64_t next :
        {std::uint64_t{0}, std::uint64_t{frames[2]}, std::uint64_t{frames[2] - 5},
         std::uint64_t{file.size() + 1}, ~std::uint64_t{0}}) {
     SCOPED_TRACE(next);
     std::string open = file;
     put_at(open, frames[2] + 8, next);
-    ReadResult result = read(open);
-    ASSERT_FALSE(result.read_error);
-    ASSERT_EQ(result.data.observations.size(), whole.data.observations.size());
-    expect_prefix(result.data.observations, whole.data.observations);
-    EXPECT_EQ(result.data.imu.size(), 2U);
-    ASSERT_EQ(result.warnings.size(), 1U);
-    EXPECT_EQ(result.warnings[0].place.byte_offset, file.size());
+    Outcome result = read(open);
+    ASSERT_FALSE(result.error);
+    ASSERT_EQ(result.rows().size(), whole.rows().size());
+    EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
+    EXPECT_EQ(result.recording.data.imu.size(), 2U);
+    ASSERT_EQ(result.recording.warnings.size(), 1U);
+    EXPECT_EQ(result.recording.warnings[0].place.byte_offset, file.size());
     // An open frame in the middle does not hide the frames behind it.
     open = file;
     put_at(open, frames[0] + 8, next == frames[2] || next == frames[2] - 5 ? 0 : next);
     result = read(open);
-    ASSERT_FALSE(result.read_error);
-    EXPECT_EQ(result.data.packets.size(), whole.data.packets.size());
-    EXPECT_EQ(result.warnings.size(), 1U);
+    ASSERT_FALSE(result.error);
+    EXPECT_EQ(result.recording.data.packets.size(), whole.recording.data.packets.size());
+    EXPECT_EQ(result.recording.warnings.size(), 1U);
   }
 }
 
@@ -751,11 +670,11 @@ TEST_F(LvxTest, EmptyFramesAreRead) {
   put_frame(file, {}, 0);
   put_frame(file, {package(0, 0, 1, 0, random)}, 1);
   put_frame(file, {}, 2);
-  const ReadResult result = read(file);
-  EXPECT_FALSE(result.read_error);
-  EXPECT_TRUE(result.warnings.empty());
-  ASSERT_EQ(result.data.packets.size(), 1U);
-  EXPECT_EQ(result.data.packets[0].frame, 1U);
+  const Outcome result = read(file);
+  EXPECT_FALSE(result.error);
+  EXPECT_TRUE(result.recording.warnings.empty());
+  ASSERT_EQ(result.recording.data.packets.size(), 1U);
+  EXPECT_EQ(result.recording.data.packets[0].frame, 1U);
 }
 
 // --- what the packets themselves tell ------------------------------------------------------------
@@ -769,10 +688,9 @@ TEST_F(LvxTest, TheRateOfAnUnknownDeviceIsTakenFromItsPackets) {
       packages.push_back(package(0, 0, 3, static_cast<std::uint64_t>(i) * period, random));
     }
     put_frame(file, packages, 0);
-    const ReadResult result = read(file);
-    EXPECT_EQ(result.data.observations.time_ns[95], last);
-    ASSERT_EQ(result.warnings.size(), 1U);
-    EXPECT_THAT(result.warnings[0].message, ::testing::HasSubstr("type 99"));
+    const Outcome result = read(file);
+    EXPECT_EQ(result.rows().time_ns[95], last);
+    EXPECT_THAT(warnings_of(result), ElementsAre(HasSubstr("type 99")));
     EXPECT_TRUE(copy(file) == file);
   }
 }
@@ -806,8 +724,8 @@ TEST_F(LvxTest, SeveralReturnsInSingleReturnRecordsAreToldByPeriodAndIntensity) 
       packages.push_back(one);
     }
     put_frame(file, packages, 0);
-    const ReadResult result = read(file);
-    const Observations& o = result.data.observations;
+    const Outcome result = read(file);
+    const Observations& o = result.rows();
     EXPECT_EQ(o.time_ns[99], c.last_ns);
     EXPECT_EQ(o.return_number[1], c.returns == 1 ? 1 : 2);
     EXPECT_EQ(o.return_number[c.returns], 1);
@@ -843,15 +761,15 @@ TEST_F(LvxTest, Lvx10IsReadWithBothSizesOfFrameHeaders) {
     for (const bool empty_first : {false, true}) {
       SCOPED_TRACE(::testing::Message() << header_bytes << " " << empty_first);
       const std::string file = lvx10_file(header_bytes, empty_first);
-      const ReadResult result = read(file);
-      ASSERT_FALSE(result.open_error || result.read_error);
-      EXPECT_TRUE(result.warnings.empty());
+      const Outcome result = read(file);
+      ASSERT_FALSE(result.error);
+      EXPECT_TRUE(result.recording.warnings.empty());
       const RecordingHeader header = open_recording(folder_.file("in.lvx"))->header();
       EXPECT_EQ(header.format, "lvx-1.0");
       EXPECT_TRUE(header.cartesian);
       ASSERT_EQ(header.devices.size(), 2U);
-      EXPECT_THAT(header.devices[1].translation_m, ::testing::ElementsAre(0.1F, 0.2F, -0.3F));
-      const Observations& o = result.data.observations;
+      EXPECT_THAT(header.devices[1].translation_m, ElementsAre(0.1F, 0.2F, -0.3F));
+      const Observations& o = result.rows();
       ASSERT_EQ(o.size(), 300U);
       EXPECT_NEAR(o.range[0], std::sqrt(4 + 1.5625 + 0.25), 1e-7);
       EXPECT_NEAR(o.azimuth[0], std::atan2(1.25, 2.0), 1e-7);
@@ -862,11 +780,11 @@ TEST_F(LvxTest, Lvx10IsReadWithBothSizesOfFrameHeaders) {
       EXPECT_EQ(o.device[100], 1);
 
       // As LVX 1.1 the points are whole millimetres.
-      const ReadResult converted = read(copy(file));
-      ASSERT_EQ(converted.data.observations.size(), 300U);
-      EXPECT_EQ(converted.data.observations.time_ns, o.time_ns);
+      const Outcome converted = read(copy(file));
+      ASSERT_EQ(converted.rows().size(), 300U);
+      EXPECT_EQ(converted.rows().time_ns, o.time_ns);
       for (std::size_t row = 0; row < 300; ++row) {
-        ASSERT_NEAR(converted.data.observations.range[row], o.range[row], 1e-6);
+        ASSERT_NEAR(converted.rows().range[row], o.range[row], 1e-6);
       }
     }
   }
@@ -875,24 +793,22 @@ TEST_F(LvxTest, Lvx10IsReadWithBothSizesOfFrameHeaders) {
 TEST_F(LvxTest, Lvx10CutsAndDamageLoseOnlyTheTail) {
   for (const std::size_t header_bytes : {24U, 32U}) {
     const std::string file = lvx10_file(header_bytes, false);
-    const ReadResult whole = read(file);
+    const Outcome whole = read(file);
     const std::size_t first = 25 + 2 * 58;
     for (std::size_t cut = first + header_bytes + 1319; cut < file.size(); ++cut) {
-      const ReadResult result = read(file.substr(0, cut));
-      ASSERT_FALSE(result.open_error || result.read_error) << cut;
-      ASSERT_GE(result.data.observations.size(), 100U);
-      expect_prefix(result.data.observations, whole.data.observations);
-      ASSERT_EQ(result.warnings.size(), cut == first + header_bytes + 2 * 1319 ? 0U : 1U) << cut;
+      const Outcome result = read(file.substr(0, cut));
+      ASSERT_FALSE(result.error) << cut;
+      ASSERT_GE(result.rows().size(), 100U);
+      EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
+      ASSERT_EQ(result.recording.warnings.size(), cut == first + header_bytes + 2 * 1319 ? 0U : 1U)
+          << cut;
     }
     for (std::size_t cut = 0; cut < first; ++cut) {
-      ASSERT_TRUE(read(file.substr(0, cut)).open_error) << cut;
+      ASSERT_FALSE(read(file.substr(0, cut)).opened) << cut;
     }
     std::string damaged = file;
     put_at(damaged, first + header_bytes + 1319 + 19 + 13, std::numeric_limits<float>::quiet_NaN());
-    const ReadResult result = read(damaged);
-    ASSERT_TRUE(result.read_error);
-    EXPECT_EQ(result.read_error->place().byte_offset, first + header_bytes + 1319 + 19 + 13);
-    EXPECT_EQ(result.data.observations.size(), 100U);
+    expect_damage(read(damaged), _, 100, first + header_bytes + 1319 + 19 + 13);
   }
 }
 

@@ -8,7 +8,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include "bags/written_mcap.hpp"
 #include "fuzz/memory_file.hpp"
@@ -94,25 +93,13 @@ TEST(Mcap, HoldsMessagesOfRos1) {
                                                   static_cast<std::int64_t>(kPowerOn) + 10'000));
 }
 
-TEST(Mcap, OpensByContentAndIsNotWritten) {
-  const TestFolder folder;
-  const std::string path = folder.file("without_ending");
-  small_file().write(path);
-  const Recording recording = load_recording(path);
-  EXPECT_EQ(recording.header.format, "mcap");
-  EXPECT_EQ(recording.data.observations.size(), 120U);
-  EXPECT_THROW(create_recording(folder.file("out.mcap"), recording.header), InvalidArgument);
-  EXPECT_EQ(folder.names().size(), 1U);
-}
-
 TEST(Mcap, OtherEncodingsAndVersionsAreNamed) {
   McapFile file = small_file();
   file.topics[0].encoding = "protobuf";
   Outcome outcome = read_bytes(file.bytes());
-  ASSERT_TRUE(outcome.error);
-  EXPECT_THAT(outcome.error->problem(),
-              HasSubstr("/livox/lidar (livox_ros_driver2/msg/CustomMsg, encoded as \"protobuf\" "
-                        "instead of cdr"));
+  expect_damage(outcome,
+                HasSubstr("/livox/lidar (livox_ros_driver2/msg/CustomMsg, encoded as \"protobuf\" "
+                          "instead of cdr"));
   std::string bytes = small_file().bytes();
   bytes[5] = '1';
   outcome = read_bytes(bytes);
@@ -212,16 +199,12 @@ TEST(Mcap, DamageKeepsWhatStandsBefore) {
     chunks.push_back(at - 37);  // where the record begins
   }
   ASSERT_EQ(chunks.size(), 5U);
-  const auto expect_damage = [&](const std::string& changed, std::size_t rows,
-                                 std::optional<std::size_t> offset, const char* problem) {
+  const auto refused = [&](const std::string& changed, std::size_t rows,
+                           std::optional<std::size_t> offset, const char* problem) {
     SCOPED_TRACE(problem);
     const Outcome outcome = read_bytes(changed);
-    ASSERT_TRUE(outcome.error);
-    EXPECT_EQ(outcome.rows().size(), rows);
-    EXPECT_THAT(outcome.error->problem(), HasSubstr(problem));
-    ASSERT_TRUE(outcome.error->place().byte_offset);
-    EXPECT_EQ(*outcome.error->place().byte_offset,
-              offset.value_or(*outcome.error->place().byte_offset));
+    expect_damage(outcome, HasSubstr(problem), rows, offset);
+    EXPECT_TRUE(outcome.error && outcome.error->place().byte_offset);
   };
   const auto changed = [&](std::size_t at, const std::string& by) {
     std::string other = bytes;
@@ -230,22 +213,22 @@ TEST(Mcap, DamageKeepsWhatStandsBefore) {
   };
   const std::string huge(8, '\x7f');
   // Two messages of 20 points each stand in the two chunks before the third.
-  expect_damage(changed(chunks[2] + 33, "\1\1\1\1"), 60, chunks[2], "the chunk has the checksum");
-  expect_damage(changed(chunks[2] + 25, huge), 60, chunks[2], "at most 1073741824 bytes");
-  expect_damage(changed(chunks[2] + 25, std::string("\0\0\0\x20\0\0\0\0", 8)), 60, chunks[2],
-                "of which they cannot come");
-  expect_damage(changed(chunks[2] + 25, std::string("\1\0\0\0\0\0\0\0", 8)), 60, chunks[2],
-                "states 1 bytes when unpacked, found more");
-  expect_damage(changed(chunks[2] + 41, "zfoo"), 60, chunks[2], "found \"zfoo\"");
-  expect_damage(changed(chunks[2] + 45, huge), 60, chunks[2], "bytes of records, found");
-  expect_damage(changed(chunks[2] + 53, "????"), 60, chunks[2], "cannot be unpacked by Zstandard");
-  expect_damage(changed(chunks[2] + 1, huge), 60, chunks[2], "expected a record that ends by byte");
-  expect_damage(changed(chunks[2], std::string(1, '\0')), 60, chunks[2], "found type 0");
-  expect_damage(changed(chunks[2], "\x45"), 100, std::nullopt, "its summary states 18");
+  refused(changed(chunks[2] + 33, "\1\1\1\1"), 60, chunks[2], "the chunk has the checksum");
+  refused(changed(chunks[2] + 25, huge), 60, chunks[2], "at most 1073741824 bytes");
+  refused(changed(chunks[2] + 25, std::string("\0\0\0\x20\0\0\0\0", 8)), 60, chunks[2],
+          "of which they cannot come");
+  refused(changed(chunks[2] + 25, std::string("\1\0\0\0\0\0\0\0", 8)), 60, chunks[2],
+          "states 1 bytes when unpacked, found more");
+  refused(changed(chunks[2] + 41, "zfoo"), 60, chunks[2], "found \"zfoo\"");
+  refused(changed(chunks[2] + 45, huge), 60, chunks[2], "bytes of records, found");
+  refused(changed(chunks[2] + 53, "????"), 60, chunks[2], "cannot be unpacked by Zstandard");
+  refused(changed(chunks[2] + 1, huge), 60, chunks[2], "expected a record that ends by byte");
+  refused(changed(chunks[2], std::string(1, '\0')), 60, chunks[2], "found type 0");
+  refused(changed(chunks[2], "\x45"), 100, std::nullopt, "its summary states 18");
   const std::size_t footer = bytes.size() - 37;
-  expect_damage(changed(footer + 25, "\1\1\1\1"), 120, std::nullopt, "the summary that begins");
-  expect_damage(changed(footer + 9, huge), 120, footer, "the summary begins at byte 9187201950");
-  expect_damage(changed(bytes.size() - 1, "x"), 120, bytes.size() - 8, "expected the file to end");
+  refused(changed(footer + 25, "\1\1\1\1"), 120, std::nullopt, "the summary that begins");
+  refused(changed(footer + 9, huge), 120, footer, "the summary begins at byte 9187201950");
+  refused(changed(bytes.size() - 1, "x"), 120, bytes.size() - 8, "expected the file to end");
 
   file.packing = "";
   file.data_checksum = true;
@@ -254,7 +237,7 @@ TEST(Mcap, DamageKeepsWhatStandsBefore) {
   const std::size_t end = other.rfind(std::string("\x0f\4\0\0\0\0\0\0\0", 9));
   ASSERT_NE(end, other.npos);
   other.replace(end + 9, 4, "\1\1\1\1");
-  expect_damage(other, 120, end, "the file up to here has the checksum");
+  refused(other, 120, end, "the file up to here has the checksum");
 }
 
 TEST(Mcap, RecordsThatContradictEachOther) {
@@ -295,10 +278,8 @@ TEST(Mcap, DamagedMessagesAreNamed) {
     file.chunked = chunked;
     const std::string bytes = file.bytes();
     const Outcome outcome = read_bytes(bytes);
-    ASSERT_TRUE(outcome.error);
-    EXPECT_EQ(outcome.rows().size(), 40U);
-    EXPECT_THAT(outcome.error->problem(), HasSubstr("message 3 of topic /livox/lidar"));
-    EXPECT_EQ(outcome.error->place().byte_offset, bytes.find("no CDR") - 31);
+    expect_damage(outcome, HasSubstr("message 3 of topic /livox/lidar"), 40,
+                  bytes.find("no CDR") - 31);
   }
 }
 
@@ -310,9 +291,7 @@ TEST(Mcap, InertialSamplesWithoutNumbersAreLeftOut) {
   const Outcome outcome = read_bytes(file.bytes());
   EXPECT_FALSE(outcome.error);
   EXPECT_EQ(outcome.recording.data.imu.size(), 5U);
-  ASSERT_EQ(outcome.recording.warnings.size(), 1U);
-  EXPECT_THAT(outcome.recording.warnings[0].message,
-              HasSubstr("are not finite numbers were left out"));
+  EXPECT_THAT(warnings_of(outcome), ElementsAre(HasSubstr("are not finite numbers were left out")));
 }
 
 TEST(Mcap, AClaimedChunkCostsNoMemory) {
@@ -329,18 +308,9 @@ TEST(Mcap, AClaimedChunkCostsNoMemory) {
   std::string bytes = file.bytes();
   const std::size_t at = bytes.find(std::string("\x04\0\0\0zstd", 8));
   bytes.replace(at - 12, 8, std::string("\0\0\0\x40\0\0\0\0", 8));
-  const auto peak_kib = [] {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return usage.ru_maxrss;
-  };
-  const auto before = peak_kib();
-  const Outcome outcome = read_bytes(bytes);
-  ASSERT_TRUE(outcome.error);
-  EXPECT_THAT(outcome.error->problem(), HasSubstr("states 1073741824 bytes when unpacked, found"));
-#if !defined(__SANITIZE_THREAD__)  // it touches its own notes of every allocation
-  EXPECT_LT(peak_kib() - before, 200 << 10);
-#endif
+  expect_little_memory([&] {
+    expect_damage(read_bytes(bytes), HasSubstr("states 1073741824 bytes when unpacked, found"));
+  });
 }
 
 TEST(Mcap, OpeningAndReadingCanBeCancelled) {

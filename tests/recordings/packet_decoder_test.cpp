@@ -16,6 +16,7 @@
 #include "risley/core/error.hpp"
 #include "risley/recordings/reader.hpp"
 
+#include "recordings/format_tests.hpp"
 #include "recordings/lvx_bytes.hpp"
 
 // Which rows come out of which bytes is tested in packet_test.cpp, through files; here, what a live
@@ -66,7 +67,7 @@ TEST(PacketDecoder, GivesTheRowsThatAFileOfThePacketsGives) {
   std::string file = header_lvx11({{"3JEDK1E001F6361", 0, kAvia}});
   put_frame(file, packages, 0);
   const TestFolder folder;
-  save(folder.file("in.lvx"), file);
+  format_tests::put_bytes(folder.file("in.lvx"), file);
   const Recording recording = load_recording(folder.file("in.lvx"));
 
   PacketDecoder decoder({.device_type = kAvia});

@@ -12,6 +12,7 @@
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/writer.hpp"
 
+#include "recordings/format_tests.hpp"
 #include "recordings/lvx_bytes.hpp"
 
 // Packets are tested through the files that hold them: what counts is which rows come out of which
@@ -34,7 +35,7 @@ std::string one_package_file(std::uint8_t device_type, std::uint8_t data_type, s
 class PacketTest : public ::testing::Test {
  protected:
   Recording load(const std::string& bytes) {
-    save(folder_.file("in.lvx"), bytes);
+    format_tests::put_bytes(folder_.file("in.lvx"), bytes);
     return load_recording(folder_.file("in.lvx"));
   }
 
@@ -43,7 +44,7 @@ class PacketTest : public ::testing::Test {
     const auto writer = create_recording(folder_.file("out.lvx"), recording.header);
     writer->write(recording.data);
     writer->close();
-    return contents(folder_.file("out.lvx"));
+    return format_tests::get_bytes(folder_.file("out.lvx"));
   }
 
   /// Writes and checks that the same bytes come out.
@@ -276,7 +277,7 @@ class ClockTest : public PacketTest {
     std::vector<std::string> packages;
     for (const std::uint64_t value : raw) packages.push_back(package(0, type, 1, value, random));
     put_frame(file, packages, 0);
-    save(folder_.file("clock.lvx"), file);
+    format_tests::put_bytes(folder_.file("clock.lvx"), file);
     const auto reader = open_recording(folder_.file("clock.lvx"));
     reference_ = reader->header().time_reference;
     Chunk chunk;

@@ -13,11 +13,11 @@
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/writer.hpp"
 
+#include "recordings/format_tests.hpp"
 #include "recordings/lvx_bytes.hpp"
 
 namespace risley::recordings::registry_test {
 
-using lvx_bytes::save;
 using ::testing::HasSubstr;
 
 class RegistryTest : public ::testing::Test {
@@ -68,15 +68,15 @@ TEST_F(RegistryTest, FilesThatCannotBeARecordingAreNamed) {
   EXPECT_THAT(open_error(std::filesystem::path(folder_.file("x")).parent_path()),
               HasSubstr("folder"));
   EXPECT_THAT(open_error("/dev/null"), HasSubstr("regular"));
-  save(folder_.file("empty.lvx"), "");
+  format_tests::put_bytes(folder_.file("empty.lvx"), "");
   EXPECT_THAT(open_error(folder_.file("empty.lvx")), HasSubstr("empty"));
-  save(folder_.file("text.lvx"), "hello, world");
+  format_tests::put_bytes(folder_.file("text.lvx"), "hello, world");
   EXPECT_THAT(open_error(folder_.file("text.lvx")),
               ::testing::AllOf(HasSubstr("lvx-1.1"), HasSubstr("scan-sequence-csv"),
                                HasSubstr("'hello, world'")));
-  save(folder_.file("binary.lvx"), std::string("\x7F"
-                                               "ELF\0\1",
-                                               6));
+  format_tests::put_bytes(folder_.file("binary.lvx"), std::string("\x7F"
+                                                                  "ELF\0\1",
+                                                                  6));
   EXPECT_THAT(open_error(folder_.file("binary.lvx")), HasSubstr("7F 45 4C 46 00 01"));
 }
 
@@ -131,7 +131,7 @@ TEST_F(RegistryTest, AWholeRecordingIsLoadedWithItsWarnings) {
   }
   lvx_bytes::put_frame(file, packages, 0);
   file.resize(file.size() - 1);
-  save(folder_.file("a.lvx"), file);
+  format_tests::put_bytes(folder_.file("a.lvx"), file);
   std::vector<double> progress;
   const Recording recording =
       load_recording(folder_.file("a.lvx"), [&](double f) { progress.push_back(f); });

@@ -15,9 +15,6 @@ namespace risley::recordings::ros2_messages {
 using namespace bags::written;
 using namespace livox_points;
 
-inline constexpr std::uint64_t kPowerOn = 5'000'000'000;          // ns since power-on
-inline constexpr std::uint64_t kUtc = 1'600'000'000'123'456'789;  // 2020
-inline constexpr const char* kTopic = "/livox/lidar";
 inline constexpr const char* kCustomType = "livox_ros_driver2/msg/CustomMsg";
 inline constexpr const char* kCloudType = "sensor_msgs/msg/PointCloud2";
 inline constexpr const char* kImuType = "sensor_msgs/msg/Imu";

@@ -14,6 +14,7 @@
 #include "risley/core/error.hpp"
 #include "risley/recordings/reader.hpp"
 
+#include "recordings/format_tests.hpp"
 #include "recordings/lvx_bytes.hpp"
 
 namespace risley::recordings::time_audit_test {
@@ -238,7 +239,7 @@ TEST(TimeAudit, AFileIsAuditedWithItsWrapsAndSamples) {
        lvx_bytes::package(0, 4, 6, 999'700'000, random),
        lvx_bytes::package(0, 4, 5, 999'800'000, random), lvx_bytes::package(0, 4, 5, 0, random)},
       0);
-  lvx_bytes::save(folder.file("a.lvx"), file);
+  format_tests::put_bytes(folder.file("a.lvx"), file);
   const auto reader = open_recording(folder.file("a.lvx"));
   double last = 0;
   const TimeAuditResult result = audit_recording(*reader, [&](double f) { last = f; });
@@ -271,9 +272,10 @@ TEST(TimeAudit, TimesOfAnySizeDoNotOverflow) {
 TEST(TimeAudit, TimesTooFarApartAreDamage) {
   const lvx_bytes::TestFolder folder;
   const std::string path = folder.file("far.csv");
-  lvx_bytes::save(path,
-                  "Time/s,Azimuth/deg,Zenith/deg\n-9100000000.0,1.0,90.0\n-9099999999.0,1.0,90.0\n"
-                  "9100000000.0,1.1,90.0\n9100000001.0,1.1,90.0\n");
+  format_tests::put_bytes(
+      path,
+      "Time/s,Azimuth/deg,Zenith/deg\n-9100000000.0,1.0,90.0\n-9099999999.0,1.0,90.0\n"
+      "9100000000.0,1.1,90.0\n9100000001.0,1.1,90.0\n");
   const auto reader = open_recording(path);
   Chunk chunk;
   ASSERT_TRUE(reader->read(chunk));
@@ -301,7 +303,7 @@ TEST(TimeAudit, PacketsStayWholeInFrontOfATimeTooFarAway) {
       {lvx_bytes::package(0, 1, 3, 1000, random), lvx_bytes::package(0, 1, 6, 2000, random),
        lvx_bytes::package(0, 1, 3, kFar, random)},
       0);
-  lvx_bytes::save(path, file);
+  format_tests::put_bytes(path, file);
   const auto reader = open_recording(path);
   Chunk chunk;
   ASSERT_TRUE(reader->read(chunk));

@@ -19,6 +19,7 @@
 #include "risley/io/text_file.hpp"
 
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 
 namespace risley::recordings::truth_test {
 
@@ -158,12 +159,8 @@ TEST_F(Truth, OtherFilesAreRefused) {
   int id = 0;
   ASSERT_EQ(nc_create(path().c_str(), NC_NETCDF4 | NC_CLOBBER, &id), NC_NOERR);
   ASSERT_EQ(nc_close(id), NC_NOERR);
-  try {
-    load_truth(path());
-    FAIL();
-  } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("is not a truth file"));
-  }
+  EXPECT_THAT(refusal<FileError>([&] { load_truth(path()); }),
+              ::testing::HasSubstr("is not a truth file"));
 }
 
 }  // namespace risley::recordings::truth_test

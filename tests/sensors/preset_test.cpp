@@ -16,6 +16,7 @@
 #include "risley/io/text_file.hpp"
 
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 #include "source_tree.hpp"
 
 namespace risley::sensors::preset_test {
@@ -271,12 +272,7 @@ TEST(Preset, ASequenceIsRefusedWithItsLine) {
   const auto refused = [&](const std::string& from, const std::string& to,
                            const std::string& says) {
     const std::string bad = replaced(good, from, to);
-    try {
-      parse_preset(bad, "bad.yaml");
-      ADD_FAILURE() << says;
-    } catch (const FileError& error) {
-      EXPECT_THAT(error.what(), HasSubstr(says));
-    }
+    EXPECT_THAT(refusal<FileError>([&] { parse_preset(bad, "bad.yaml"); }), HasSubstr(says));
   };
   refused("firing: in_turn", "firing: at_once",
           "sequence.firing = \"at_once\", allowed in_turn, together");

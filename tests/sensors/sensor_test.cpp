@@ -9,6 +9,8 @@
 #include "risley/sensors/preset.hpp"
 #include "risley/sensors/prism_sizes.hpp"
 
+#include "refusal.hpp"
+
 namespace risley::sensors::sensor_test {
 
 using ::testing::ElementsAre;
@@ -28,12 +30,8 @@ TEST(Sensor, RefusesWhatItDoesNotHaveAndWhatIsOutOfBounds) {
   Sensor sensor = load_sensor("mid-40");
   EXPECT_THROW(sensor.get("rotation_angle_a_deg"), InvalidArgument);
   EXPECT_THROW(sensor.set("wedge_angle_c_deg", 0.1), InvalidArgument);
-  try {
-    sensor.set("wedge_angle_a_deg", radians_from_degrees(95.0));
-    FAIL();
-  } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("wedge_angle_a_deg = 95 deg, allowed 0 to 60"));
-  }
+  EXPECT_THAT(refusal([&] { sensor.set("wedge_angle_a_deg", radians_from_degrees(95.0)); }),
+              HasSubstr("wedge_angle_a_deg = 95 deg, allowed 0 to 60"));
   EXPECT_NEAR(sensor.get("wedge_angle_a_deg"), radians_from_degrees(18.0), 1e-15);
 }
 

@@ -62,8 +62,6 @@ class PackedSeries {
   AngleSeries rows() const { return rows({0, size()}); }
   /// Times of rows, as recorded, into memory that is used again.
   void times(ShotRange range, std::vector<std::int64_t>& out) const;
-  /// Emitters of rows, into memory that is used again.
-  void beams(ShotRange range, std::vector<std::uint8_t>& out) const;
 
   /// Appends all rows of a series. @throws InvalidArgument where columns have other lengths
   void append(const AngleSeries& series);
@@ -130,6 +128,13 @@ class PackedSeries {
   /// Calls see(block or null for the tail, its first row, rows, rows of the range before them).
   template <class See>
   void visit(ShotRange range, const See& see) const;
+  /// A column of a range. @param put  (block, first row, rows, to), or a column that puts itself
+  template <class T, class Put>
+  void put_column(ShotRange range, const std::vector<T>& tail, const Put& put,
+                  std::vector<T>& out) const;
+  template <class T, class Column>
+  void put_column(ShotRange range, const std::vector<T>& tail, Column Block::*column,
+                  std::vector<T>& out) const;
 
   std::vector<Block> blocks_;
   Grid azimuth_grid_, zenith_grid_;

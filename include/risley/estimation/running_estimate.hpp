@@ -120,8 +120,8 @@ class RunningEstimate {
   const RunningOptions& options() const;  ///< as they were given
 
  private:
-  class Work;
-  std::unique_ptr<Work> work_;
+  class Watcher;
+  std::unique_ptr<Watcher> watcher_;
 };
 
 }  // namespace risley::estimation

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <functional>
-#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
@@ -55,7 +54,7 @@ class YamlMap {
   YamlMap(const YamlNode& node, std::string path, std::string field);
 
   /// @throws FileError for a key that is not among these
-  void allow_only(std::initializer_list<std::string_view> keys) const;
+  void allow_only(const std::vector<std::string>& keys) const;
 
   /// All entries, in the order of the text.
   const std::vector<Entry>& entries() const { return entries_; }

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "risley/core/error.hpp"
@@ -53,6 +54,11 @@ class Reader {
   RecordingHeader header_;
   std::vector<ReadWarning> warnings_;
   std::uint64_t clock_wraps_ = 0;
+
+  /// Adds to warnings().
+  void warn(FilePlace place, std::string message, std::uint64_t lost_records = 0) {
+    warnings_.push_back({place, std::move(message), lost_records});
+  }
 };
 
 /// No time of a recording is further from the first one: 146 years, half of what 64 bits hold, so

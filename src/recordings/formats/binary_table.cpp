@@ -113,7 +113,7 @@ BinaryTableReader::BinaryTableReader(std::string path, std::string_view format, 
     throw FileError(path_, {table_.columns_offset, {}}, bad.what());
   }
   for (std::string& warning : table_.warnings) {
-    warnings_.push_back({{table_.columns_offset, {}}, std::move(warning), 0});
+    warn({table_.columns_offset, {}}, std::move(warning));
   }
   open_lanes();
 }

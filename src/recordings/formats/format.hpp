@@ -29,9 +29,20 @@ struct Format {
   ///                  nothing is heard of a library for long
   std::unique_ptr<Reader> (*open)(const std::string& path, const Progress& progress);
   /// nullptr when the format is only read.
-  std::unique_ptr<Writer> (*create)(const std::string& path, const RecordingHeader& header);
+  std::unique_ptr<Writer> (*create)(const std::string& path,
+                                    const RecordingHeader& header) = nullptr;
   bool holds_shot_numbers = false;  ///< recordings without times can be written, too
 };
+
+/// Format::open and Format::create of classes that need nothing but their arguments.
+template <class Opened>
+std::unique_ptr<Reader> open_with(const std::string& path, const Progress&) {
+  return std::make_unique<Opened>(path);
+}
+template <class Created>
+std::unique_ptr<Writer> create_with(const std::string& path, const RecordingHeader& header) {
+  return std::make_unique<Created>(path, header);
+}
 
 extern const Format kLvx11Format;            // lvx11.cpp
 extern const Format kLvx10Format;            // lvx10.cpp
@@ -40,9 +51,9 @@ extern const Format kOpenpylivoxCsvFormat;   // openpylivox_csv.cpp
 extern const Format kOpenpylivoxBinFormat;   // openpylivox_bin.cpp
 extern const Format kViewerCsvFormat;        // viewer_csv.cpp
 extern const Format kNetcdfFormat;           // netcdf.cpp
-extern const Format kRos1BagFormat;          // ros1_bag.cpp
-extern const Format kRos2BagFormat;          // ros2_bag.cpp
-extern const Format kMcapFormat;             // mcap.cpp
+extern const Format kRos1BagFormat;          // bags.cpp
+extern const Format kRos2BagFormat;          // bags.cpp
+extern const Format kMcapFormat;             // bags.cpp
 extern const Format kPcapFormat;             // pcap.cpp
 extern const Format kLasFormat;              // las.cpp
 extern const Format kLazFormat;              // las.cpp, laz.cpp

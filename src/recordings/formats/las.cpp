@@ -118,10 +118,6 @@ class LasReader final : public Reader {
     return !ahead_.empty();
   }
 
-  void warn(FilePlace place, std::string message) {
-    warnings_.push_back({place, std::move(message), 0});
-  }
-
   Vector3<double> position(const Point& point) const {
     const auto coordinate = [&](std::size_t axis) {
       return point.steps[axis] * file_.scale[axis] + file_.offset[axis];
@@ -303,7 +299,6 @@ const Format kLasFormat = {
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<las::LasReader>(path, "las");
     },
-    nullptr,
 };
 
 const Format kLazFormat = {
@@ -314,7 +309,6 @@ const Format kLazFormat = {
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<las::LasReader>(path, "laz");
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

@@ -77,11 +77,11 @@ class HeaderReader {
 
  private:
   [[noreturn]] void fail(std::uint64_t offset, const std::string& problem) const {
-    throw FileError(input_.path(), {.byte_offset = offset, .line = {}}, problem);
+    throw FileError(input_.path(), {offset, {}}, problem);
   }
 
   void warn(std::uint64_t offset, std::string message) {
-    warnings_.push_back({{.byte_offset = offset, .line = {}}, std::move(message), 0});
+    warnings_.push_back({{offset, {}}, std::move(message), 0});
   }
 
   template <class T>

@@ -26,14 +26,14 @@ class PlainPoints final : public PointSource {
       // A program that fills in its counter last was interrupted.
       points_ = header_.points = room;
       warnings.push_back(
-          {{.byte_offset = header_.points_at, .line = {}},
+          {{header_.points_at, {}},
            fmt::format("the header says that there are 0 points; the {} that follow it were read",
                        room),
            0});
     }
     if (header_.points < room) {
       warnings.push_back(
-          {{.byte_offset = place_of(header_.points), .line = {}},
+          {{place_of(header_.points), {}},
            fmt::format("the header says that there are {} points; those after them were left out",
                        header_.points),
            room - header_.points});
@@ -42,7 +42,7 @@ class PlainPoints final : public PointSource {
 
   std::size_t read(std::span<Point> points) override {
     if (next_ == points_ && points_ < header_.points) {
-      throw FileError(input_.path(), {.byte_offset = place_of(points_), .line = {}},
+      throw FileError(input_.path(), {place_of(points_), {}},
                       fmt::format("expected {} points of {} bytes, as the header says, found room "
                                   "for {} up to byte {}, where {}",
                                   header_.points, header_.record_bytes, points_, header_.points_end,
@@ -64,8 +64,7 @@ class PlainPoints final : public PointSource {
   }
 
   FilePlace gps_time_place(std::uint64_t point) const override {
-    return {.byte_offset = place_of(point) + gps_time_at(header_.point_format).value_or(0),
-            .line = {}};
+    return {place_of(point) + gps_time_at(header_.point_format).value_or(0), {}};
   }
 
   double fraction_read() const override {

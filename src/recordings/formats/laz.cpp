@@ -26,7 +26,7 @@ class LazPoints final : public PointSource {
   LazPoints(io::BlockInput input, const PublicHeader& header, std::vector<ReadWarning>& warnings)
       : path_(input.path()), header_(header), size_(input.size()) {
     if (header_.points == 0 && size_ > header_.points_at + sizeof(std::int64_t)) {
-      warnings.push_back({{.byte_offset = header_.points_at, .line = {}},
+      warnings.push_back({{header_.points_at, {}},
                           "the header says that there are 0 points; what follows it was left out",
                           0});
     }
@@ -144,7 +144,7 @@ class LazPoints final : public PointSource {
   FilePlace place() {
     stream_.clear();
     const auto at = static_cast<std::streamoff>(stream_.tellg());
-    return {.byte_offset = at < 0 ? size_ : static_cast<std::uint64_t>(at), .line = {}};
+    return {at < 0 ? size_ : static_cast<std::uint64_t>(at), {}};
   }
 
   std::string problem() const {
@@ -185,7 +185,7 @@ namespace risley::recordings::las {
 std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& /*header*/,
                                                     std::vector<ReadWarning>& /*warnings*/) {
-  throw FileError(input.path(), {.byte_offset = kPointFormatAt, .line = {}},
+  throw FileError(input.path(), {kPointFormatAt, {}},
                   "is compressed by LASzip, and this build has no LASzip, because Debian 12 has no "
                   "package of it. Build with liblaszip-dev (Debian 13), or convert the file to LAS "
                   "with another program (laszip, PDAL, laspy)");

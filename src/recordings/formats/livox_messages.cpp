@@ -180,10 +180,9 @@ void MessageReader::choose_topics() {
   for (std::size_t i = 0; i < topics().size(); ++i) {
     const bags::Topic& topic = topics()[i];
     if (topic.kind == MessageKind::cloud && wanted == MessageKind::points) {
-      warn(
-          fmt::format("the point clouds of topic {} were left out: the Livox driver's own "
-                      "messages have better times",
-                      topic.name));
+      warn({}, fmt::format("the point clouds of topic {} were left out: the Livox driver's own "
+                           "messages have better times",
+                           topic.name));
     }
     if (topic.kind != wanted) continue;
     if (header_.devices.size() > UINT8_MAX) {
@@ -200,21 +199,30 @@ void MessageReader::choose_topics() {
   lidars_.assign(topics().size(), {});
 }
 
-void MessageReader::find_lidars() {
-  std::vector<std::set<std::uint8_t>> seen(topics().size());
-  std::size_t points = 0, messages = 0;
+template <class See>
+void MessageReader::look_at_first(std::size_t point_sources, const See& see) {
+  std::size_t points = 0, messages = 0, point_messages = 0;
   LidarMessage message;
   rewind();
   try {
-    while (points < kPointsLookedAt && messages < kPointMessagesLookedAt * header_.devices.size() &&
-           next(message)) {
+    while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
+           point_messages < kPointMessagesLookedAt * point_sources && next(message)) {
       ++messages;
+      if (!see(message)) continue;
+      ++point_messages;
       points += message.points.size();
-      seen[message.topic].insert(message.lidar);
     }
   } catch (const FileError&) {
     // Reported when the caller comes to it, behind the sound messages.
   }
+}
+
+void MessageReader::find_lidars() {
+  std::vector<std::set<std::uint8_t>> seen(topics().size());
+  look_at_first(header_.devices.size(), [&](const LidarMessage& message) {
+    seen[message.topic].insert(message.lidar);
+    return true;
+  });
   std::vector<Device> devices;
   for (std::size_t i = 0; i < topics().size(); ++i) {
     if (!devices_[i]) continue;
@@ -226,10 +234,10 @@ void MessageReader::find_lidars() {
     }
     if (sharing > 1) {
       lidars_[i].assign(seen[i].begin(), seen[i].end());
-      warn(
-          fmt::format("{} lidars share the topic {}: they are told apart by the numbers that the "
-                      "driver gave them",
-                      sharing, topics()[i].name));
+      warn({},
+           fmt::format("{} lidars share the topic {}: they are told apart by the numbers that the "
+                       "driver gave them",
+                       sharing, topics()[i].name));
       device.serial.clear();
     }
     for (std::size_t lidar = 0; lidar < sharing; ++lidar) {
@@ -271,9 +279,9 @@ void MessageReader::choose_imu_topics() {
     } else if (imu_topics == 1 && header_.devices.size() == 1) {
       devices_[i] = std::uint8_t{0};
     } else {
-      warn(fmt::format(
-          "the inertial samples of topic {} were left out: nothing says to which lidar they belong",
-          topics()[i].name));
+      warn({}, fmt::format("the inertial samples of topic {} were left out: nothing says to which "
+                           "lidar they belong",
+                           topics()[i].name));
     }
   }
 }
@@ -289,6 +297,33 @@ struct MessageReader::FirstMessages {
   std::vector<double> accelerations;
   /// Times, stamps and earliest offsets of messages.
   std::vector<std::int64_t> times_ns, stamps_ns, offsets_ns;
+
+  /// @param drivers  whether it is one of the driver's own messages
+  /// @param timed    whether its points have times
+  void add(const LidarMessage& message, bool drivers, bool timed) {
+    const std::vector<MessagePoint>& points = message.points;
+    if (last_time_ns && message.time_ns > *last_time_ns && last_points > 0) {
+      rates.push_back(static_cast<double>(last_points) * kSecond /
+                      static_cast<double>(message.time_ns - *last_time_ns));
+    }
+    last_time_ns = message.time_ns;
+    last_points = points.size();
+    if (drivers && !points.empty()) {
+      times_ns.push_back(message.time_ns);
+      stamps_ns.push_back(message.stamp_ns);
+      offsets_ns.push_back(std::ranges::min(points, {}, &MessagePoint::offset_ns).offset_ns);
+    }
+    for (std::size_t i = 0; i < points.size();) {
+      tagged = tagged || points[i].tag != 0;
+      several_lines = several_lines || points[i].line != 0;
+      const std::size_t run = timed ? run_length(points, i) : 1;
+      if (is_one_shot(points, i, run)) most_returns = std::max(most_returns, run);
+      if (i + run < points.size() && timed && points[i + run].offset_ns > points[i].offset_ns) {
+        intervals.push_back(static_cast<double>(points[i + run].offset_ns - points[i].offset_ns));
+      }
+      i += run;
+    }
+  }
 };
 
 void MessageReader::find_cloud_times() {
@@ -299,31 +334,21 @@ void MessageReader::find_cloud_times() {
   for (std::size_t i = 0; i < topics().size(); ++i) clouds += is_cloud(i) ? 1 : 0;
   if (clouds == 0) return;
   std::vector<CloudTimeSearch> searches(topics().size());
-  std::size_t points = 0, messages = 0, cloud_messages = 0;
-  LidarMessage message;
-  rewind();
-  try {
-    while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
-           cloud_messages < kPointMessagesLookedAt * clouds && next(message)) {
-      ++messages;
-      if (!is_cloud(message.topic)) continue;
-      ++cloud_messages;
-      points += message.points.size();
-      searches[message.topic].add(message.layout, message.data, message.time_ns);
-    }
-  } catch (const FileError&) {
-    // Reported when the caller comes to it, behind the sound messages.
-  }
+  look_at_first(clouds, [&](const LidarMessage& message) {
+    if (!is_cloud(message.topic)) return false;
+    searches[message.topic].add(message.layout, message.data, message.time_ns);
+    return true;
+  });
   for (std::size_t i = 0; i < topics().size(); ++i) {
     if (!is_cloud(i)) continue;
     cloud_times_[i] = searches[i].found();
     if (!cloud_times_[i]) {
       unused_times_[i] = searches[i].problem();
     } else if (constexpr double kCoarse_ns = 100; cloud_times_[i]->step_ns >= kCoarse_ns) {
-      warn(
-          fmt::format("the times of the points of topic {} are floating-point numbers in steps of "
-                      "{:.0f} ns (field {})",
-                      topics()[i].name, cloud_times_[i]->step_ns, cloud_times_[i]->field));
+      warn({},
+           fmt::format("the times of the points of topic {} are floating-point numbers in steps of "
+                       "{:.0f} ns (field {})",
+                       topics()[i].name, cloud_times_[i]->step_ns, cloud_times_[i]->field));
     }
   }
 }
@@ -332,64 +357,23 @@ void MessageReader::describe() {
   header_.cartesian = true;
   header_.has_intensity = false;
   find_cloud_times();
-  rewind();
   std::vector<FirstMessages> first(topics().size()), lidars(header_.devices.size());
-  std::size_t points = 0, messages = 0, point_messages = 0;
   std::optional<std::int64_t> first_time_ns;
-  LidarMessage message;
-  try {
-    while (points < kPointsLookedAt && messages < kMessagesLookedAt &&
-           point_messages < kPointMessagesLookedAt * header_.devices.size() && next(message)) {
-      ++messages;
-      if (topics()[message.topic].kind == MessageKind::imu) {
-        const auto& a = message.acceleration;
-        first[message.topic].accelerations.push_back(std::hypot(a[0], a[1], a[2]));
-        continue;
-      }
-      const auto device = device_of(message);
-      if (!device) continue;
-      FirstMessages& topic = lidars[*device];
-      ++point_messages;
-      points += message.points.size();
-      header_.has_intensity = header_.has_intensity || message.has_intensity;
-      if (!first_time_ns) first_time_ns = message.time_ns;
-      if (topic.last_time_ns && message.time_ns > *topic.last_time_ns && topic.last_points > 0) {
-        topic.rates.push_back(static_cast<double>(topic.last_points) * kSecond /
-                              static_cast<double>(message.time_ns - *topic.last_time_ns));
-      }
-      topic.last_time_ns = message.time_ns;
-      topic.last_points = message.points.size();
-      if (topics()[message.topic].kind == MessageKind::points && !message.points.empty()) {
-        topic.times_ns.push_back(message.time_ns);
-        topic.stamps_ns.push_back(message.stamp_ns);
-        topic.offsets_ns.push_back(
-            std::min_element(message.points.begin(), message.points.end(),
-                             [](const MessagePoint& a, const MessagePoint& b) {
-                               return a.offset_ns < b.offset_ns;
-                             })
-                ->offset_ns);
-      }
-      const bool timed = has_times(message.topic);
-      for (std::size_t i = 0; i < message.points.size();) {
-        const MessagePoint& point = message.points[i];
-        topic.tagged = topic.tagged || point.tag != 0;
-        topic.several_lines = topic.several_lines || point.line != 0;
-        const std::size_t run = timed ? run_length(message.points, i) : 1;
-        if (is_one_shot(message.points, i, run)) {
-          topic.most_returns = std::max(topic.most_returns, run);
-        }
-        if (i + run < message.points.size() && timed &&
-            message.points[i + run].offset_ns > point.offset_ns) {
-          topic.intervals.push_back(
-              static_cast<double>(message.points[i + run].offset_ns - point.offset_ns));
-        }
-        i += run;
-      }
+  look_at_first(header_.devices.size(), [&](const LidarMessage& message) {
+    if (topics()[message.topic].kind == MessageKind::imu) {
+      const auto& a = message.acceleration;
+      first[message.topic].accelerations.push_back(std::hypot(a[0], a[1], a[2]));
+      return false;
     }
-  } catch (const FileError&) {
-    // Reported when the caller comes to it, behind the sound messages.
-  }
-  if (point_messages == 0) header_.has_intensity = true;
+    const auto device = device_of(message);
+    if (!device) return false;
+    header_.has_intensity = header_.has_intensity || message.has_intensity;
+    if (!first_time_ns) first_time_ns = message.time_ns;
+    lidars[*device].add(message, topics()[message.topic].kind == MessageKind::points,
+                        has_times(message.topic));
+    return true;
+  });
+  if (!first_time_ns) header_.has_intensity = true;
   if (first_time_ns) {
     header_.time_reference =
         *first_time_ns >= kYear2000 ? TimeReference::utc : TimeReference::power_on;
@@ -408,10 +392,10 @@ void MessageReader::describe() {
       }
     } else if (!first[i].accelerations.empty() && median(first[i].accelerations) > kLongestInG) {
       acceleration_units_[i] = 1.0 / kStandardGravity;
-      warn(
-          fmt::format("judging by their size, the accelerations of topic {} are in m/s^2; they "
-                      "were divided by {} m/s^2",
-                      topics()[i].name, kStandardGravity));
+      warn({},
+           fmt::format("judging by their size, the accelerations of topic {} are in m/s^2; they "
+                       "were divided by {} m/s^2",
+                       topics()[i].name, kStandardGravity));
     }
   }
   rewind();
@@ -456,11 +440,11 @@ void MessageReader::compare_clocks(std::uint8_t device, const FirstMessages& fir
   }
   if (!grow) return;
   growth_from_ns_[device] = first.times_ns[0];
-  warn(
-      fmt::format("times are at fault: the offset times of topic {} do not begin anew with each "
-                  "message but grow as the time of the messages does; they were taken as counted "
-                  "from the first message",
-                  header_.devices[device].topic));
+  warn({},
+       fmt::format("times are at fault: the offset times of topic {} do not begin anew with each "
+                   "message but grow as the time of the messages does; they were taken as counted "
+                   "from the first message",
+                   header_.devices[device].topic));
 }
 
 /// Finds the shots per second and the returns per shot of a cloud topic from its points per
@@ -501,7 +485,7 @@ void MessageReader::settle_cloud_grid(std::size_t topic, FirstMessages& first) {
         "after them have wrong times",
         rate);
   }
-  warn(std::move(message));
+  warn({}, std::move(message));
 }
 
 bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
@@ -527,13 +511,11 @@ bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
 void MessageReader::take_bag_warnings() {
   if (std::exchange(ended_, true)) return;
   for (const bags::BagWarning& one : bag_->warnings()) {
-    warnings_.push_back({one.place, one.message, 0});
+    warn(one.place, one.message);
   }
   if (unknown_lidar_points_ == 0) return;
-  warnings_.push_back({{},
-                       "points of lidars that are not among the first messages of their topic were "
-                       "left out",
-                       unknown_lidar_points_});
+  warn({}, "points of lidars that are not among the first messages of their topic were left out",
+       unknown_lidar_points_);
 }
 
 void MessageReader::append(const LidarMessage& message, Chunk& chunk) {
@@ -593,10 +575,10 @@ void MessageReader::append_points(const LidarMessage& message, std::uint8_t devi
     const bool is_shot = is_one_shot(points, first, run);
     if (run > kMostReturns && !equal_times_reported_) {
       equal_times_reported_ = true;
-      warn(
-          fmt::format("{} points of topic {} have the same time; where more than {} do, each is "
-                      "taken as a separate shot",
-                      run, topics()[message.topic].name, kMostReturns));
+      warn({},
+           fmt::format("{} points of topic {} have the same time; where more than {} do, each is "
+                       "taken as a separate shot",
+                       run, topics()[message.topic].name, kMostReturns));
     }
     for (std::size_t i = 0; i < run; ++i, ++row) {
       const MessagePoint& point = points[first + i];
@@ -630,10 +612,10 @@ void MessageReader::append_imu(const LidarMessage& message, std::uint8_t device,
         static_cast<float>(message.acceleration[axis] * acceleration_units_[message.topic]);
     if (std::isfinite(sample.angular_velocity[axis] + sample.acceleration_g[axis])) continue;
     if (!std::exchange(imu_without_numbers_reported_, true)) {
-      warn(
-          fmt::format("inertial samples of topic {} whose rates or accelerations are not finite "
-                      "numbers were left out",
-                      topics()[message.topic].name));
+      warn({},
+           fmt::format("inertial samples of topic {} whose rates or accelerations are not finite "
+                       "numbers were left out",
+                       topics()[message.topic].name));
     }
     return;
   }

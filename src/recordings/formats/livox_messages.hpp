@@ -106,6 +106,10 @@ class MessageReader final : public Reader {
   void describe();
   /// Finds the fields by which clouds tell times, from the first messages.
   void find_cloud_times();
+  /// Shows the first messages to a function, which returns its number of points where it took
+  /// points: so many messages of each of `point_sources` and no more than all together.
+  template <class See>
+  void look_at_first(std::size_t point_sources, const See& see);
   void rewind();
   /// The next message of a wanted topic, replacing all of `message`. @return false at the end
   bool next(LidarMessage& message);
@@ -128,7 +132,6 @@ class MessageReader final : public Reader {
   void append_cloud(const LidarMessage& message, std::uint8_t device, Observations& rows) const;
   void append_imu(const LidarMessage& message, std::uint8_t device,
                   std::vector<ImuSample>& samples);
-  void warn(std::string message) { warnings_.push_back({{}, std::move(message), 0}); }
 
   std::unique_ptr<bags::Bag> bag_;
   std::vector<std::optional<std::uint8_t>> devices_;  ///< by topic; empty when it is not read

@@ -495,15 +495,11 @@ void Lvx11Writer::close() {
   output_.commit();
 }
 
-std::unique_ptr<Writer> create(const std::string& path, const RecordingHeader& header) {
-  return std::make_unique<Lvx11Writer>(path, header);
-}
-
 }  // namespace
 
 const Format kLvx11Format = {
     "lvx-1.1",        ".lvx",     "Livox LVX 1.1, as written by Livox Viewer and the Livox SDK",
-    recognises_lvx11, open_lvx11, create,
+    recognises_lvx11, open_lvx11, create_with<Lvx11Writer>,
 };
 
 }  // namespace risley::recordings

@@ -205,17 +205,15 @@ void LvxReader::open_frame() {
   if (position_ == file_.size()) {
     ended_ = true;
     if (frames_ == 0) {
-      warnings_.push_back({{position_, {}}, "the file ends before its first frame", 0});
+      warn({position_, {}}, "the file ends before its first frame");
     }
     return;
   }
   const std::uint64_t left = file_.size() - position_;
   if (left < version_.frame_header_bytes) {
-    warnings_.push_back(
-        {{position_, {}},
+    warn({position_, {}},
          fmt::format("cut off while recording: {} bytes are left, a frame header has {}", left,
-                     version_.frame_header_bytes),
-         0});
+                     version_.frame_header_bytes));
     position_ = file_.size();
     ended_ = true;
     return;
@@ -251,7 +249,7 @@ void LvxReader::stop_at_cut(std::optional<std::size_t> records) {
   } else if (open_ended_) {
     message += fmt::format("; its frame was never closed (next offset {})", next_offset_);
   }
-  warnings_.push_back({{position_, {}}, message, records.value_or(0)});
+  warn({position_, {}}, message, records.value_or(0));
   position_ = file_.size();
   ended_ = true;
 }
@@ -260,7 +258,7 @@ void LvxReader::step_over(std::uint8_t data_type) {
   // One warning per data type, however long the recording is.
   const std::uint64_t frames = ++frames_stepped_over_[data_type];
   const auto [entry, is_new] = stepped_over_.try_emplace(data_type, warnings_.size());
-  if (is_new) warnings_.push_back({{position_, {}}, {}, 0});
+  if (is_new) warn({position_, {}}, {});
   warnings_[entry->second].message = fmt::format(
       "a packet has the unknown data type {}; the rest of {} was skipped", data_type,
       frames == 1 ? std::string("its frame") : fmt::format("its frame and of {} more", frames - 1));
@@ -283,10 +281,8 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
   // A frame that was never closed may still be followed by a whole one.
   if (open_ended_ && left >= version_.frame_header_bytes &&
       load<std::uint64_t>(bytes) == position_) {
-    warnings_.push_back(
-        {{position_, {}},
-         fmt::format("the previous frame was never closed (next offset {})", next_offset_),
-         0});
+    warn({position_, {}},
+         fmt::format("the previous frame was never closed (next offset {})", next_offset_));
     in_frame_ = false;
     return true;
   }

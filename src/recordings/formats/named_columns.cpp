@@ -25,6 +25,23 @@ constexpr double kAngleSlack_deg = 1e-4;  // of float32 at 360
 /// Times of 2001 to 2099 as seconds since 1970.
 constexpr double kEarliestEpoch = 1e9, kLatestEpoch = 4.1e9;
 
+/// A value that texts stand for.
+template <class Value>
+struct WordsFor {
+  Value value;
+  std::initializer_list<std::string_view> names;
+};
+
+/// Of the first that has this name.
+template <class Value, std::size_t count>
+std::optional<Value> meant_by(const std::array<WordsFor<Value>, count>& all,
+                              std::string_view name) {
+  for (const WordsFor<Value>& one : all) {
+    if (std::find(one.names.begin(), one.names.end(), name) != one.names.end()) return one.value;
+  }
+  return std::nullopt;
+}
+
 bool is_whole(double value) { return value == std::floor(value); }
 
 /// Smallest and largest number of a column; NaN without any.
@@ -60,11 +77,7 @@ double median_step(const std::vector<Decimal>& samples) {
 }  // namespace
 
 std::optional<NamedColumns::Unit> NamedColumns::unit_of(std::string_view text) {
-  struct Named {
-    Unit unit;
-    std::initializer_list<std::string_view> names;
-  };
-  static const std::array<Named, 10> units = {{
+  static const std::array<WordsFor<Unit>, 10> units = {{
       {{Unit::Kind::length, 1.0}, {"m", "meter", "metre", "meters", "metres"}},
       {{Unit::Kind::length, 100.0}, {"cm"}},
       {{Unit::Kind::length, 1000.0}, {"mm"}},
@@ -76,20 +89,11 @@ std::optional<NamedColumns::Unit> NamedColumns::unit_of(std::string_view text) {
       {{Unit::Kind::time, 1e6, 6}, {"us", "\xC2\xB5s", "\xCE\xBCs", "micros", "microseconds"}},
       {{Unit::Kind::time, 1e9, 9}, {"ns", "nsec", "nanos", "nanoseconds"}},
   }};
-  for (const Named& named : units) {
-    if (std::find(named.names.begin(), named.names.end(), text) != named.names.end()) {
-      return named.unit;
-    }
-  }
-  return std::nullopt;
+  return meant_by(units, text);
 }
 
 NamedColumns::Role NamedColumns::role_of(std::string_view base) {
-  struct Named {
-    Role role;
-    std::initializer_list<std::string_view> names;
-  };
-  static const std::array<Named, 13> roles = {{
+  static const std::array<WordsFor<Role>, 13> roles = {{
       {Role::x, {"x", "points:0", "points_0", "xyz:0", "position:0"}},
       {Role::y, {"y", "points:1", "points_1", "xyz:1", "position:1"}},
       {Role::z, {"z", "points:2", "points_2", "xyz:2", "position:2"}},
@@ -107,11 +111,7 @@ NamedColumns::Role NamedColumns::role_of(std::string_view base) {
       {Role::tag, {"tag"}},
       {Role::beam, {"line", "beam", "ring", "laser_id", "laserid"}},
   }};
-  for (const Named& named : roles) {
-    if (std::find(named.names.begin(), named.names.end(), base) != named.names.end()) {
-      return named.role;
-    }
-  }
+  if (const auto role = meant_by(roles, base)) return *role;
   // Arrays of many are often called by their plural.
   const bool plural = base.size() > 2 && base.ends_with('s');
   return plural ? role_of(base.substr(0, base.size() - 1)) : Role::none;
@@ -346,7 +346,7 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
 
 void NamedColumns::settle_time(RecordingHeader& header, std::vector<std::string>& warnings) {
   const Source* chosen = nullptr;
-  std::string shared, others;
+  std::string shared;
   for (const Source& source : sources_) {
     if (source.meaning.role != Role::time) continue;
     if (is_shared_by_many(source)) {

@@ -196,12 +196,11 @@ std::optional<TableHead> find_head(std::string_view bytes) {
 NamedTextLayout read_layout(const std::string& path) {
   const auto head = find_head(io::read_file_head(path, kHeadBytes, "a recording"));
   if (!head) {
-    throw FileError(path, {.byte_offset = {}, .line = 1},
-                    "expected a line with the names of the columns, found none");
+    throw FileError(path, {{}, 1}, "expected a line with the names of the columns, found none");
   }
   if (head->layout.names.empty()) {
     throw FileError(
-        path, {.byte_offset = {}, .line = head->layout.first_row_line},
+        path, {{}, head->layout.first_row_line},
         "expected a line with the names of the columns before the first row, found numbers; add "
         "such a line, as in x_m,y_m,z_m or time_s,azimuth_deg,zenith_deg,range_m");
   }
@@ -221,7 +220,6 @@ const Format kNamedCsvFormat = {
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<NamedTextReader>(path, kNamedCsv, read_layout(path));
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

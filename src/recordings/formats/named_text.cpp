@@ -31,7 +31,7 @@ NamedTextReader::NamedTextReader(const std::string& path, std::string_view forma
     fail(layout_.names_line, bad.what());
   }
   for (std::string& warning : layout_.warnings) {
-    warnings_.push_back({{.byte_offset = {}, .line = layout_.names_line}, std::move(warning), 0});
+    warn({{}, layout_.names_line}, std::move(warning));
   }
 }
 
@@ -83,7 +83,7 @@ std::string_view HeaderLines::next() {
 }
 
 void HeaderLines::fail(const std::string& problem) const {
-  throw FileError(path_, {.byte_offset = {}, .line = line_}, problem);
+  throw FileError(path_, {{}, line_}, problem);
 }
 
 std::uint64_t count_field(std::string_view field, std::string_view name) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -69,70 +70,69 @@ void for_each_column(Rows&& rows, Function&& f) {
   f(NetcdfColumn{"valid", "1", "1 where the direction can be trusted"}, rows.valid);
 }
 
-/// The packet table as columns.
-struct PacketColumns {
-  std::vector<std::uint32_t> rows, status;
-  std::vector<std::uint64_t> frame;
-  std::vector<std::uint8_t> device_index, version, slot, lidar_id, reserved, timestamp_type,
-      data_type, timestamp;
-};
-
-template <class Packets, class Function>
-void for_each_packet_column(Packets&& p, Function&& f) {
-  f(NetcdfColumn{"packet_rows", "1", "number of rows of the packet"}, p.rows);
-  f(NetcdfColumn{"packet_frame", "1", "number of the frame that holds the packet"}, p.frame);
+/// As for_each_column(), of the tables of records: with the members that columns hold.
+template <class Function>
+void for_each_packet_column(Function&& f) {
+  f(NetcdfColumn{"packet_rows", "1", "number of rows of the packet"}, &Packet::rows);
+  f(NetcdfColumn{"packet_frame", "1", "number of the frame that holds the packet"}, &Packet::frame);
   f(NetcdfColumn{"packet_device_index", "1", "index by which the packet names its device"},
-    p.device_index);
-  f(NetcdfColumn{"packet_version", "1", "version of the packet"}, p.version);
-  f(NetcdfColumn{"packet_slot", "1", "hub port"}, p.slot);
-  f(NetcdfColumn{"packet_lidar_id", "1", "lidar number at the hub port"}, p.lidar_id);
-  f(NetcdfColumn{"packet_reserved", "1", "reserved byte"}, p.reserved);
-  f(NetcdfColumn{"packet_status", "1", "status code of the sensor"}, p.status);
-  f(NetcdfColumn{"packet_timestamp_type", "1", "kind of the time stamp"}, p.timestamp_type);
-  f(NetcdfColumn{"packet_data_type", "1", "kind of the records"}, p.data_type);
-  f(NetcdfColumn{"packet_timestamp", "1", "time stamp as sent", kByteDimension, 8}, p.timestamp);
+    &Packet::device_index);
+  f(NetcdfColumn{"packet_version", "1", "version of the packet"}, &Packet::version);
+  f(NetcdfColumn{"packet_slot", "1", "hub port"}, &Packet::slot);
+  f(NetcdfColumn{"packet_lidar_id", "1", "lidar number at the hub port"}, &Packet::lidar_id);
+  f(NetcdfColumn{"packet_reserved", "1", "reserved byte"}, &Packet::reserved);
+  f(NetcdfColumn{"packet_status", "1", "status code of the sensor"}, &Packet::status);
+  f(NetcdfColumn{"packet_timestamp_type", "1", "kind of the time stamp"}, &Packet::timestamp_type);
+  f(NetcdfColumn{"packet_data_type", "1", "kind of the records"}, &Packet::data_type);
+  f(NetcdfColumn{"packet_timestamp", "1", "time stamp as sent", kByteDimension, 8},
+    &Packet::timestamp);
 }
 
-/// The inertial samples as columns.
-struct ImuColumns {
-  std::vector<std::int64_t> time_ns;
-  std::vector<std::uint8_t> device;
-  std::vector<float> angular_velocity, acceleration_g;
-};
-
-template <class Imu, class Function>
-void for_each_imu_column(Imu&& imu, Function&& f) {
-  f(NetcdfColumn{"imu_time", "ns", "time of the inertial sample"}, imu.time_ns);
-  f(NetcdfColumn{"imu_device", "1", "row of the device table"}, imu.device);
+template <class Function>
+void for_each_imu_column(Function&& f) {
+  f(NetcdfColumn{"imu_time", "ns", "time of the inertial sample"}, &ImuSample::time_ns);
+  f(NetcdfColumn{"imu_device", "1", "row of the device table"}, &ImuSample::device);
   f(NetcdfColumn{"imu_angular_velocity", "radian s-1", "angular velocity", kAxisDimension, 3},
-    imu.angular_velocity);
+    &ImuSample::angular_velocity);
   f(NetcdfColumn{"imu_acceleration_g", "9.80665 m s-2", "acceleration", kAxisDimension, 3},
-    imu.acceleration_g);
+    &ImuSample::acceleration_g);
 }
 
-/// The device table as columns; serials are padded with NUL.
-struct DeviceColumns {
-  std::size_t serial_length = kShortestSerial;
-  std::vector<char> serial, hub_serial;
-  std::vector<std::uint8_t> index, type, extrinsic_enabled;
-  std::vector<float> roll_pitch_yaw_deg, translation_m;
-};
-
-template <class Devices, class Function>
-void for_each_device_column(Devices&& d, Function&& f) {
-  f(NetcdfColumn{"device_serial", nullptr, "broadcast code", kSerialDimension, d.serial_length},
-    d.serial);
+/// @param serial_length  of texts, which are padded with NUL
+template <class Function>
+void for_each_device_column(std::size_t serial_length, Function&& f) {
+  f(NetcdfColumn{"device_serial", nullptr, "broadcast code", kSerialDimension, serial_length},
+    &Device::serial);
   f(NetcdfColumn{"device_hub_serial", nullptr, "broadcast code of the hub", kSerialDimension,
-                 d.serial_length},
-    d.hub_serial);
-  f(NetcdfColumn{"device_index", "1", "index by which packets name the device"}, d.index);
-  f(NetcdfColumn{"device_type", "1", "device type of the sensor"}, d.type);
+                 serial_length},
+    &Device::hub_serial);
+  f(NetcdfColumn{"device_index", "1", "index by which packets name the device"}, &Device::index);
+  f(NetcdfColumn{"device_type", "1", "device type of the sensor"}, &Device::type);
   f(NetcdfColumn{"device_extrinsic_enabled", "1", "1 where the pose is to be applied"},
-    d.extrinsic_enabled);
+    &Device::extrinsic_enabled);
   f(NetcdfColumn{"device_roll_pitch_yaw", "degree", "attitude", kAxisDimension, 3},
-    d.roll_pitch_yaw_deg);
-  f(NetcdfColumn{"device_translation", "m", "position", kAxisDimension, 3}, d.translation_m);
+    &Device::roll_pitch_yaw_deg);
+  f(NetcdfColumn{"device_translation", "m", "position", kAxisDimension, 3}, &Device::translation_m);
 }
+
+/// The type of a column's values, by a vector of them or by a member of records: a number, several,
+/// or a text.
+template <class Values>
+struct ColumnElement {
+  using Type = Values;
+};
+template <class T>
+struct ColumnElement<std::vector<T>> : ColumnElement<T> {};
+template <class T, std::size_t N>
+struct ColumnElement<std::array<T, N>> : ColumnElement<T> {};
+template <class Record, class T>
+struct ColumnElement<T Record::*> : ColumnElement<T> {};
+template <>
+struct ColumnElement<std::string> : ColumnElement<char> {};
+template <>
+struct ColumnElement<bool> : ColumnElement<std::uint8_t> {};
+template <class Values>
+using ElementOf = typename ColumnElement<Values>::Type;
 
 /// @throws FileError where the file is damaged or of another layout
 std::unique_ptr<Reader> open_recording(const std::string& path, const Progress& progress);

@@ -4,7 +4,8 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <span>
+#include <type_traits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -31,8 +32,9 @@ struct RequireColumns {
   const tables::NetcdfDimension& dimension;
   std::size_t block;  ///< entries that are read together
 
-  template <class T>
-  void operator()(const NetcdfColumn& column, const std::vector<T>&) const {
+  template <class Values>
+  void operator()(const NetcdfColumn& column, const Values&) const {
+    using T = ElementOf<Values>;
     if (column.inner_dimension == nullptr) {
       variables.emplace(column.name, file.variable<T>(column.name, {&dimension}, block));
     } else {
@@ -54,38 +56,32 @@ struct GetColumns {
   }
 };
 
-Packet packet_of(const PacketColumns& columns, std::size_t i) {
-  Packet p;
-  p.rows = columns.rows[i];
-  p.frame = columns.frame[i];
-  p.device_index = columns.device_index[i];
-  p.version = columns.version[i];
-  p.slot = columns.slot[i];
-  p.lidar_id = columns.lidar_id[i];
-  p.reserved = columns.reserved[i];
-  p.status = columns.status[i];
-  p.timestamp_type = columns.timestamp_type[i];
-  p.data_type = columns.data_type[i];
-  std::copy_n(columns.timestamp.data() + i * p.timestamp.size(), p.timestamp.size(),
-              p.timestamp.begin());
-  return p;
-}
+/// Reads records from entry `start` on, as many as there are.
+template <class Record>
+struct GetRecords {
+  const tables::NetcdfInput& file;
+  const Variables& variables;
+  std::size_t start;
+  std::vector<Record>& records;
 
-Device device_of(const DeviceColumns& columns, std::size_t i) {
-  const auto text = [&](const std::vector<char>& source) {
-    std::string padded(source.data() + i * columns.serial_length, columns.serial_length);
-    return padded.substr(0, padded.find_last_not_of('\0') + 1);
-  };
-  Device device;
-  device.serial = text(columns.serial);
-  device.hub_serial = text(columns.hub_serial);
-  device.index = columns.index[i];
-  device.type = columns.type[i];
-  device.extrinsic_enabled = columns.extrinsic_enabled[i] != 0;
-  std::copy_n(columns.roll_pitch_yaw_deg.data() + 3 * i, 3, device.roll_pitch_yaw_deg.begin());
-  std::copy_n(columns.translation_m.data() + 3 * i, 3, device.translation_m.begin());
-  return device;
-}
+  template <class T>
+  void operator()(const NetcdfColumn& column, T Record::*member) const {
+    std::vector<ElementOf<T>> values;
+    file.get(variables.at(column.name), start, records.size(), values);
+    for (auto from = values.begin(); Record & record : records) {
+      const auto end = from + static_cast<std::ptrdiff_t>(column.width);
+      if constexpr (std::is_arithmetic_v<T>) {
+        record.*member = static_cast<T>(*from);
+      } else if constexpr (std::is_same_v<T, std::string>) {
+        const std::string padded(from, end);
+        record.*member = padded.substr(0, padded.find_last_not_of('\0') + 1);
+      } else {
+        std::copy(from, end, (record.*member).begin());
+      }
+      from = end;
+    }
+  }
+};
 
 class NetcdfReader final : public Reader {
  public:
@@ -98,9 +94,8 @@ class NetcdfReader final : public Reader {
     packet_count_ = packet.length;
     imu_count_ = sample.length;
     for_each_column(Observations{}, RequireColumns{file_, variables_, row, kRowBlock});
-    for_each_packet_column(PacketColumns{},
-                           RequireColumns{file_, variables_, packet, kPacketBlock});
-    for_each_imu_column(ImuColumns{}, RequireColumns{file_, variables_, sample, kImuBlock});
+    for_each_packet_column(RequireColumns{file_, variables_, packet, kPacketBlock});
+    for_each_imu_column(RequireColumns{file_, variables_, sample, kImuBlock});
   }
 
   bool read(Chunk& chunk, std::size_t max_rows) override {
@@ -163,13 +158,11 @@ class NetcdfReader final : public Reader {
       file_.fail(fmt::format("dimension {} has length {}, allowed 1 to {}", kDeviceDimension,
                              device.length, kMostDevices));
     }
-    DeviceColumns devices;
-    devices.serial_length = file_.dimension(kSerialDimension).length;
-    for_each_device_column(devices, RequireColumns{file_, variables_, device, 0});
-    for_each_device_column(devices, GetColumns{file_, variables_, 0, device.length});
-    for (std::size_t i = 0; i < device.length; ++i) {
-      header_.devices.push_back(device_of(devices, i));
-    }
+    const std::size_t serial_length = file_.dimension(kSerialDimension).length;
+    for_each_device_column(serial_length, RequireColumns{file_, variables_, device, 0});
+    header_.devices.resize(device.length);
+    for_each_device_column(serial_length,
+                           GetRecords<Device>{file_, variables_, 0, header_.devices});
   }
 
   TimeReference read_time_reference() const {
@@ -181,16 +174,11 @@ class NetcdfReader final : public Reader {
     file_.fail(fmt::format("expected a known time_reference, found \"{}\"", found));
   }
 
-  /// Refuses entries that belong to no device of the table.
-  void require_known_devices(const char* variable, std::span<const std::uint8_t> devices,
-                             std::size_t first) const {
-    const auto found = std::find_if(devices.begin(), devices.end(), [this](std::uint8_t device) {
-      return device >= header_.devices.size();
-    });
-    if (found == devices.end()) return;
-    file_.fail(fmt::format("entry {} of variable {} is {}, allowed below {} = {}",
-                           first + static_cast<std::size_t>(found - devices.begin()), variable,
-                           *found, kDeviceDimension, header_.devices.size()));
+  /// Refuses entry `entry` of a variable where it is no device of the table.
+  void require_known_device(const char* variable, std::uint8_t device, std::size_t entry) const {
+    if (device < header_.devices.size()) return;
+    file_.fail(fmt::format("entry {} of variable {} is {}, allowed below {} = {}", entry, variable,
+                           device, kDeviceDimension, header_.devices.size()));
   }
 
   /// Takes the next packets of about max_rows rows, and says what they own.
@@ -198,18 +186,20 @@ class NetcdfReader final : public Reader {
                     std::size_t& samples) {
     rows = samples = 0;
     while (rows + samples < max_rows && packets.size() < max_rows) {
-      if (next_packet_ == known_packets_.rows.size()) {
+      if (next_packet_ == known_packets_.size()) {
         const std::size_t count = std::min(kPacketBlock, packet_count_ - packets_read_);
         if (count == 0) break;
-        for_each_packet_column(known_packets_, GetColumns{file_, variables_, packets_read_, count});
+        known_packets_.resize(count);
+        for_each_packet_column(
+            GetRecords<Packet>{file_, variables_, packets_read_, known_packets_});
         packets_read_ += count;
         next_packet_ = 0;
       }
-      packets.push_back(packet_of(known_packets_, next_packet_++));
+      packets.push_back(known_packets_[next_packet_++]);
       rows += packets.back().rows;
       if (packets.back().data_type == livox::kImuDataType) ++samples;
     }
-    const bool last = packets_read_ == packet_count_ && next_packet_ == known_packets_.rows.size();
+    const bool last = packets_read_ == packet_count_ && next_packet_ == known_packets_.size();
     const std::size_t rows_left = row_count_ - row_, samples_left = imu_count_ - imu_sample_;
     if (rows > rows_left || samples > samples_left ||
         (last && (rows < rows_left || samples < samples_left))) {
@@ -225,23 +215,20 @@ class NetcdfReader final : public Reader {
       const std::size_t start = row_ + rows.size();
       const std::size_t length = std::min(kRowBlock - start % kRowBlock, count - rows.size());
       for_each_column(block, GetColumns{file_, variables_, start, length});
-      require_known_devices("device", block.device, start);
+      for (std::size_t i = 0; i < length; ++i) {
+        require_known_device("device", block.device[i], start + i);
+      }
       rows.append(block);
     }
   }
 
   void read_imu(std::vector<ImuSample>& samples, std::size_t count) {
-    ImuColumns columns;
-    for_each_imu_column(columns, GetColumns{file_, variables_, imu_sample_, count});
-    require_known_devices("imu_device", columns.device, imu_sample_);
+    std::vector<ImuSample> found(count);
+    for_each_imu_column(GetRecords<ImuSample>{file_, variables_, imu_sample_, found});
     for (std::size_t i = 0; i < count; ++i) {
-      ImuSample sample;
-      sample.time_ns = columns.time_ns[i];
-      sample.device = columns.device[i];
-      std::copy_n(columns.angular_velocity.data() + 3 * i, 3, sample.angular_velocity.begin());
-      std::copy_n(columns.acceleration_g.data() + 3 * i, 3, sample.acceleration_g.begin());
-      samples.push_back(sample);
+      require_known_device("imu_device", found[i].device, imu_sample_ + i);
     }
+    samples = std::move(found);
   }
 
   /// After damage: drops the packets that did not get all their rows and samples, and the rows of
@@ -268,7 +255,7 @@ class NetcdfReader final : public Reader {
   Variables variables_;
   std::size_t row_count_ = 0, packet_count_ = 0, imu_count_ = 0;
   std::size_t row_ = 0, imu_sample_ = 0, packets_read_ = 0, next_packet_ = 0;
-  PacketColumns known_packets_;
+  std::vector<Packet> known_packets_;
   std::optional<FileError> pending_;
 };
 

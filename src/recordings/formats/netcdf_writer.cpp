@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -33,8 +33,9 @@ struct DefineColumns {
   const tables::NetcdfDimension& dimension;
   std::size_t block;
 
-  template <class T>
-  void operator()(const NetcdfColumn& column, const std::vector<T>&) const {
+  template <class Values>
+  void operator()(const NetcdfColumn& column, const Values&) const {
+    using T = ElementOf<Values>;
     const tables::NetcdfStorage storage{block, block > 0, block > 0};
     const auto variable =
         column.inner_dimension == nullptr
@@ -59,48 +60,36 @@ struct PutColumns {
   }
 };
 
-PacketColumns columns_of(const std::vector<Packet>& packets, std::size_t count) {
-  PacketColumns columns;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Packet& p = packets[i];
-    columns.rows.push_back(p.rows);
-    columns.frame.push_back(p.frame);
-    columns.device_index.push_back(p.device_index);
-    columns.version.push_back(p.version);
-    columns.slot.push_back(p.slot);
-    columns.lidar_id.push_back(p.lidar_id);
-    columns.reserved.push_back(p.reserved);
-    columns.status.push_back(p.status);
-    columns.timestamp_type.push_back(p.timestamp_type);
-    columns.data_type.push_back(p.data_type);
-    columns.timestamp.insert(columns.timestamp.end(), p.timestamp.begin(), p.timestamp.end());
-  }
-  return columns;
-}
+/// Writes records at entry `start` of the file.
+template <class Record>
+struct PutRecords {
+  tables::NetcdfOutput& file;
+  const Variables& variables;
+  std::size_t start;
+  std::span<const Record> records;
 
-DeviceColumns columns_of(const std::vector<Device>& devices) {
-  DeviceColumns columns;
-  for (const auto& device : devices) {
-    columns.serial_length =
-        std::max({columns.serial_length, device.serial.size(), device.hub_serial.size()});
+  template <class T>
+  void operator()(const NetcdfColumn& column, T Record::*member) const {
+    std::vector<ElementOf<T>> values;
+    for (const Record& record : records) {
+      const T& value = record.*member;
+      if constexpr (std::is_arithmetic_v<T>) {
+        values.push_back(static_cast<ElementOf<T>>(value));
+      } else {
+        values.insert(values.end(), value.begin(), value.end());
+        values.resize(values.size() + column.width - value.size());
+      }
+    }
+    file.put(variables.at(column.name), start, values);
   }
-  const auto append_padded = [&](std::vector<char>& target, const std::string& text) {
-    target.insert(target.end(), text.begin(), text.end());
-    target.resize(target.size() + columns.serial_length - text.size(), '\0');
-  };
-  for (const auto& device : devices) {
-    append_padded(columns.serial, device.serial);
-    append_padded(columns.hub_serial, device.hub_serial);
-    columns.index.push_back(device.index);
-    columns.type.push_back(device.type);
-    columns.extrinsic_enabled.push_back(device.extrinsic_enabled ? 1 : 0);
-    columns.roll_pitch_yaw_deg.insert(columns.roll_pitch_yaw_deg.end(),
-                                      device.roll_pitch_yaw_deg.begin(),
-                                      device.roll_pitch_yaw_deg.end());
-    columns.translation_m.insert(columns.translation_m.end(), device.translation_m.begin(),
-                                 device.translation_m.end());
+};
+
+std::size_t serial_length_of(const std::vector<Device>& devices) {
+  std::size_t length = kShortestSerial;
+  for (const Device& device : devices) {
+    length = std::max({length, device.serial.size(), device.hub_serial.size()});
   }
-  return columns;
+  return length;
 }
 
 class NetcdfWriter final : public Writer {
@@ -116,16 +105,16 @@ class NetcdfWriter final : public Writer {
     require_whole_packets(chunk);
     rows_.append(chunk.observations);
     packets_.insert(packets_.end(), chunk.packets.begin(), chunk.packets.end());
-    append_imu(chunk.imu);
+    imu_.insert(imu_.end(), chunk.imu.begin(), chunk.imu.end());
     flush(false);
   }
 
   void close() override {
     flush(true);
-    const std::size_t samples = imu_.time_ns.size();
-    for (std::size_t start = 0; start < samples; start += kImuBlock) {
-      for_each_imu_column(
-          imu_, PutColumns{file_, variables_, start, start, std::min(kImuBlock, samples - start)});
+    for (std::size_t start = 0; start < imu_.size(); start += kImuBlock) {
+      const auto block =
+          std::span<const ImuSample>(imu_).subspan(start, std::min(kImuBlock, imu_.size() - start));
+      for_each_imu_column(PutRecords<ImuSample>{file_, variables_, start, block});
     }
     file_.close();
   }
@@ -150,25 +139,23 @@ class NetcdfWriter final : public Writer {
     auto details = header.details;
     std::erase_if(details, [](const auto& detail) { return detail.first == kSourceFormat; });
     file_.put_text_group(kDetailsGroup, details);
-    const DeviceColumns devices = columns_of(header.devices);
+    const std::size_t serial_length = serial_length_of(header.devices);
     Dimensions inner;
     for (const auto& [name, length] :
          {std::pair{kByteDimension, std::tuple_size_v<decltype(Packet::timestamp)>},
-          std::pair{kAxisDimension, std::size_t{3}},
-          std::pair{kSerialDimension, devices.serial_length}}) {
+          std::pair{kAxisDimension, std::size_t{3}}, std::pair{kSerialDimension, serial_length}}) {
       inner.emplace(name, file_.define_dimension(name, length));
     }
     const auto device = file_.define_dimension(kDeviceDimension, header.devices.size());
     const auto row = file_.define_growing_dimension(kRowDimension);
     for_each_column(rows_, DefineColumns{file_, variables_, inner, row, kRowBlock});
     const auto packet = file_.define_growing_dimension(kPacketDimension);
-    for_each_packet_column(PacketColumns{},
-                           DefineColumns{file_, variables_, inner, packet, kPacketBlock});
+    for_each_packet_column(DefineColumns{file_, variables_, inner, packet, kPacketBlock});
     const auto sample = file_.define_growing_dimension(kImuDimension);
-    for_each_imu_column(imu_, DefineColumns{file_, variables_, inner, sample, kImuBlock});
-    for_each_device_column(devices, DefineColumns{file_, variables_, inner, device, 0});
+    for_each_imu_column(DefineColumns{file_, variables_, inner, sample, kImuBlock});
+    for_each_device_column(serial_length, DefineColumns{file_, variables_, inner, device, 0});
     file_.end_definitions();
-    for_each_device_column(devices, PutColumns{file_, variables_, 0, 0, header.devices.size()});
+    for_each_device_column(serial_length, PutRecords<Device>{file_, variables_, 0, header.devices});
   }
 
   /// Packets, where there are any, must account for all rows and inertial samples.
@@ -190,17 +177,6 @@ class NetcdfWriter final : public Writer {
         chunk.observations.size(), chunk.imu.size(), rows, samples));
   }
 
-  void append_imu(const std::vector<ImuSample>& samples) {
-    for (const auto& sample : samples) {
-      imu_.time_ns.push_back(sample.time_ns);
-      imu_.device.push_back(sample.device);
-      imu_.angular_velocity.insert(imu_.angular_velocity.end(), sample.angular_velocity.begin(),
-                                   sample.angular_velocity.end());
-      imu_.acceleration_g.insert(imu_.acceleration_g.end(), sample.acceleration_g.begin(),
-                                 sample.acceleration_g.end());
-    }
-  }
-
   /// Writes the blocks that are full, and at the end the rest: those of rows and of packets in
   /// the order in which the recording completes them, rows first.
   void flush(bool at_end) {
@@ -218,8 +194,8 @@ class NetcdfWriter final : public Writer {
         rows_written_ += rows;
         done += rows;
       } else if (packets > 0) {
-        for_each_packet_column(columns_of(packets_, packets),
-                               PutColumns{file_, variables_, packets_written_, 0, packets});
+        const auto block = std::span<const Packet>(packets_).first(packets);
+        for_each_packet_column(PutRecords<Packet>{file_, variables_, packets_written_, block});
         packets_.erase(packets_.begin(), packets_.begin() + static_cast<std::ptrdiff_t>(packets));
         packets_written_ += packets;
         rows_of_written_packets_ = packets_end;
@@ -237,7 +213,7 @@ class NetcdfWriter final : public Writer {
   Variables variables_;
   Observations rows_;
   std::vector<Packet> packets_;
-  ImuColumns imu_;  ///< to the end: a sample takes 33 bytes and there are 200 per second
+  std::vector<ImuSample> imu_;  ///< to the end: there are 200 per second
   std::optional<bool> with_packets_;
   std::size_t rows_written_ = 0, packets_written_ = 0;
   std::uint64_t rows_of_written_packets_ = 0;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "risley/io/little_endian.hpp"
 
@@ -192,6 +193,12 @@ void take_fields(LiteralReader& reader, ArrayHeader& header, int depth) {
   }
 }
 
+/// Elements of an array from a byte of its data on.
+TableLane lane_of(const ArrayHeader& header, const OpenArray& open, std::uint64_t from,
+                  std::size_t bytes) {
+  return {[open, offset = header.data_offset + from] { return open(offset); }, bytes};
+}
+
 }  // namespace
 
 std::uint64_t ArrayHeader::elements() const {
@@ -201,11 +208,7 @@ std::uint64_t ArrayHeader::elements() const {
 }
 
 std::string ArrayHeader::shape_text() const {
-  std::string text;
-  for (const std::uint64_t length : shape) {
-    text += fmt::format("{}{}", text.empty() ? "" : " x ", length);
-  }
-  return text.empty() ? "a single element" : text;
+  return shape.empty() ? "a single element" : fmt::format("{}", fmt::join(shape, " x "));
 }
 
 ArrayHeader read_array_header(ByteSource& source) {
@@ -292,8 +295,7 @@ void add_table(const ArrayHeader& header, const OpenArray& open, BinaryTable& ta
     for (const ArrayField& field : header.fields) {
       table.columns.push_back({field.name, field.type, first_lane, field.offset});
     }
-    table.lanes.push_back(
-        {[open, offset = header.data_offset] { return open(offset); }, header.element_bytes});
+    table.lanes.push_back(lane_of(header, open, 0, header.element_bytes));
     std::string others;
     for (const std::string& name : header.other_fields) {
       if (!name.empty()) others += (others.empty() ? "" : ", ") + name;
@@ -315,21 +317,18 @@ void add_table(const ArrayHeader& header, const OpenArray& open, BinaryTable& ta
     const std::size_t lane = header.fortran_order ? first_lane + i : first_lane;
     table.columns.push_back({kNames[i], type, lane, header.fortran_order ? 0 : i * type.bytes});
     if (header.fortran_order) {
-      const std::uint64_t offset = header.data_offset + i * table.rows * type.bytes;
-      table.lanes.push_back({[open, offset] { return open(offset); }, type.bytes});
+      table.lanes.push_back(lane_of(header, open, i * table.rows * type.bytes, type.bytes));
     }
   }
   if (!header.fortran_order) {
-    table.lanes.push_back(
-        {[open, offset = header.data_offset] { return open(offset); }, columns * type.bytes});
+    table.lanes.push_back(lane_of(header, open, 0, columns * type.bytes));
   }
 }
 
 void add_column(const ArrayHeader& header, const std::string& name, const OpenArray& open,
                 BinaryTable& table) {
   table.columns.push_back({name, header.fields.front().type, table.lanes.size(), 0});
-  table.lanes.push_back(
-      {[open, offset = header.data_offset] { return open(offset); }, header.element_bytes});
+  table.lanes.push_back(lane_of(header, open, 0, header.element_bytes));
 }
 
 }  // namespace risley::recordings

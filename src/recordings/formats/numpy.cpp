@@ -178,7 +178,6 @@ const Format kNpyFormat = {
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<BinaryTableReader>(path, kNpyName, npy_table(path));
     },
-    nullptr,
 };
 
 const Format kNpzFormat = {
@@ -189,7 +188,6 @@ const Format kNpzFormat = {
     [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
       return std::make_unique<BinaryTableReader>(path, kNpzName, npz_table(path));
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

@@ -81,7 +81,7 @@ class OpenpylivoxBinReader final : public Reader {
 
  private:
   [[noreturn]] void fail(std::uint64_t offset, const std::string& problem) const {
-    throw FileError(input_.path(), {.byte_offset = offset, .line = {}}, problem);
+    throw FileError(input_.path(), {offset, {}}, problem);
   }
 
   OpenpylivoxLayout read_layout() {
@@ -145,11 +145,10 @@ class OpenpylivoxBinReader final : public Reader {
   void report_tail() {
     if (offset_ == input_.size() || tail_reported_) return;
     tail_reported_ = true;
-    warnings_.push_back({{.byte_offset = offset_, .line = {}},
-                         fmt::format("the last record is cut off: expected {} bytes, found {}; it "
-                                     "was left out",
-                                     parts_.bytes(), input_.size() - offset_),
-                         1});
+    warn({offset_, {}},
+         fmt::format("the last record is cut off: expected {} bytes, found {}; it was left out",
+                     parts_.bytes(), input_.size() - offset_),
+         1);
   }
 
   io::BlockInput input_;
@@ -166,10 +165,7 @@ const Format kOpenpylivoxBinFormat = {
     ".bin",
     "openpylivox binary capture: points with intensity and time",
     [](std::string_view head) { return head.starts_with(kBinSignature); },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<OpenpylivoxBinReader>(path);
-    },
-    nullptr,
+    open_with<OpenpylivoxBinReader>,
 };
 
 }  // namespace risley::recordings

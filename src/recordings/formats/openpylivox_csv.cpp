@@ -273,12 +273,8 @@ const Format kOpenpylivoxCsvFormat = {
     ".openpylivox.csv",
     "openpylivox text capture: points with intensity and time",
     [](std::string_view head) { return find_variant(normalized_header(head)) != nullptr; },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<OpenpylivoxCsvReader>(path);
-    },
-    [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
-      return std::make_unique<OpenpylivoxCsvWriter>(path, header);
-    },
+    open_with<OpenpylivoxCsvReader>,
+    create_with<OpenpylivoxCsvWriter>,
 };
 
 }  // namespace risley::recordings

@@ -63,26 +63,21 @@ struct Named {
   std::string firmware;
 };
 
-/// The broadcast of a datagram, if it is one.
-std::optional<wire::Broadcast> broadcast_of(const CapturedDatagram& datagram) {
+/// What a datagram says, if it says that. @tparam Whole  wire::Message or wire::Reply
+template <class What, class Whole, class Decode>
+std::optional<What> said_in(const CapturedDatagram& datagram, const Decode& decode) {
   const auto decoded = wire::decode_frame(datagram.bytes);
   const auto* frame = std::get_if<wire::Frame>(&decoded);
-  if (frame == nullptr || frame->type == wire::FrameType::reply) return std::nullopt;
-  const auto message = wire::decode_message(*frame);
-  const auto* said = std::get_if<wire::Message>(&message);
-  const auto* broadcast = said == nullptr ? nullptr : std::get_if<wire::Broadcast>(said);
-  return broadcast == nullptr ? std::nullopt : std::optional(*broadcast);
+  const bool replies = std::is_same_v<Whole, wire::Reply>;
+  if (frame == nullptr || (frame->type == wire::FrameType::reply) != replies) return std::nullopt;
+  const auto content = decode(*frame);
+  const auto* whole = std::get_if<Whole>(&content);
+  const auto* what = whole == nullptr ? nullptr : std::get_if<What>(whole);
+  return what == nullptr ? std::nullopt : std::optional(*what);
 }
 
-/// The firmware that a reply names, if it does.
-std::optional<std::string> firmware_of(const CapturedDatagram& datagram) {
-  const auto decoded = wire::decode_frame(datagram.bytes);
-  const auto* frame = std::get_if<wire::Frame>(&decoded);
-  if (frame == nullptr || frame->type != wire::FrameType::reply) return std::nullopt;
-  const auto reply = wire::decode_reply(*frame);
-  const auto* said = std::get_if<wire::Reply>(&reply);
-  const auto* info = said == nullptr ? nullptr : std::get_if<wire::DeviceInfo>(said);
-  return info == nullptr ? std::nullopt : std::optional(wire::firmware_text(info->firmware));
+std::optional<wire::Broadcast> broadcast_of(const CapturedDatagram& datagram) {
+  return said_in<wire::Broadcast, wire::Message>(datagram, wire::decode_message);
 }
 
 /// Reads captures. The first look at the file finds its sensors.
@@ -123,9 +118,6 @@ class PcapReader final : public Reader {
   void end();
   void say_what_is_missing();
   std::string name_of(std::size_t device) const;
-  void warn(std::string message, std::uint64_t lost_records = 0) {
-    warnings_.push_back({{}, std::move(message), lost_records});
-  }
 
   CaptureFile file_;
   std::map<Sender, std::size_t> devices_;  ///< by sender: row of the header's table
@@ -176,9 +168,10 @@ void PcapReader::look_through(const Progress& progress) {
           auto& known = named_[datagram->from.address].broadcast;
           if (!known) known = *broadcast;
         }
-      } else if (const auto firmware = firmware_of(*datagram);
-                 firmware && named_.contains(datagram->from.address)) {
-        named_[datagram->from.address].firmware = *firmware;
+      } else if (const auto info =
+                     said_in<wire::DeviceInfo, wire::Reply>(*datagram, wire::decode_reply);
+                 info && named_.contains(datagram->from.address)) {
+        named_[datagram->from.address].firmware = wire::firmware_text(info->firmware);
       }
     }
   } catch (const FileError& error) {  // who reads comes to it again
@@ -284,8 +277,8 @@ void PcapReader::add_device(const Seen& seen) {
             ? fmt::format("its type is unknown, too: by its packets it measures at {} kHz",
                           grid && grid->beams == 1 ? 100 : 240)
             : fmt::format("by its packets it is a {}", device_type_name(device.type));
-    warn(fmt::format("device {} is {}: no broadcast names its serial number; {}", row,
-                     to_string(endpoints_[row]), type));
+    warn({}, fmt::format("device {} is {}: no broadcast names its serial number; {}", row,
+                         to_string(endpoints_[row]), type));
   }
 }
 
@@ -347,29 +340,31 @@ void PcapReader::say_what_is_missing() {
   for (std::size_t row = 0; row < live_.size(); ++row) {
     const PacketCounts& counts = live_[row].order.counts();
     if (counts.lost > 0) {
-      warn(fmt::format("{}: {} packets are missing between others", name_of(row), counts.lost));
+      warn({}, fmt::format("{}: {} packets are missing between others", name_of(row), counts.lost));
     }
     if (counts.duplicates > 0) {
-      warn(fmt::format("{}: {} packets were captured twice; the second ones were left out",
-                       name_of(row), counts.duplicates));
+      warn({}, fmt::format("{}: {} packets were captured twice; the second ones were left out",
+                           name_of(row), counts.duplicates));
     }
     if (counts.rejected > 0) {
-      warn(fmt::format("{}: {} packets that no sensor sends were left out", name_of(row),
-                       counts.rejected));
+      warn({}, fmt::format("{}: {} packets that no sensor sends were left out", name_of(row),
+                           counts.rejected));
     }
   }
   if (cut_ > 0) {
-    warn(fmt::format("{} packets were not captured whole, because only {} bytes of each were kept; "
+    warn({},
+         fmt::format("{} packets were not captured whole, because only {} bytes of each were kept; "
                      "capture whole packets, as tcpdump -s 0 does",
                      cut_, file_.snap_length()),
          cut_rows_);
   }
   if (file_.fragments() > 0) {
-    warn(fmt::format("{} fragments of datagrams were left out; sensors send none",
-                     file_.fragments()));
+    warn({}, fmt::format("{} fragments of datagrams were left out; sensors send none",
+                         file_.fragments()));
   }
   if (strangers_ > 0) {
-    warn(fmt::format("{} packets were left out: of more than {} senders, or with impossible times",
+    warn({},
+         fmt::format("{} packets were left out: of more than {} senders, or with impossible times",
                      strangers_, kMostSenders));
   }
 }
@@ -427,7 +422,6 @@ const Format kPcapFormat = {
     [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
       return std::make_unique<PcapReader>(path, progress);
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

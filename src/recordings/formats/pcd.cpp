@@ -38,15 +38,15 @@ struct PcdHeader {
   std::vector<std::string> warnings;
 };
 
-/// Values of one line of the header, one for each field.
-std::vector<std::string_view> per_field(const HeaderLines& lines, const PcdHeader& header,
-                                        std::vector<std::string_view> words) {
+/// Gives each field its value of one line of the header.
+template <class Take>
+void per_field(const HeaderLines& lines, PcdHeader& header,
+               const std::vector<std::string_view>& words, const Take& take) {
   if (words.size() - 1 != header.fields.size()) {
     lines.fail(fmt::format("expected {} values after {}, as many as FIELDS, found {}",
                            header.fields.size(), words[0], words.size() - 1));
   }
-  words.erase(words.begin());
-  return words;
+  for (std::size_t i = 1; i < words.size(); ++i) take(header.fields[i - 1], words[i]);
 }
 
 PcdHeader read_pcd_header(const std::string& path) {
@@ -66,26 +66,22 @@ PcdHeader read_pcd_header(const std::string& path) {
       };
       if (key == "FIELDS" || key == "COLUMNS") {
         for (std::size_t i = 1; i < words.size(); ++i) {
-          header.fields.push_back({std::string(words[i]), 4, 1, 'F'});
+          header.fields.push_back({.name = std::string(words[i])});
         }
         header.fields_line = lines.line();
         header.fields_offset = offset;
       } else if (key == "SIZE") {
-        const auto values = per_field(lines, header, words);
-        for (std::size_t i = 0; i < values.size(); ++i) {
-          header.fields[i].bytes = static_cast<std::uint64_t>(integer_field(values[i], key, 1, 8));
-        }
+        per_field(lines, header, words, [&](PcdField& field, std::string_view value) {
+          field.bytes = static_cast<std::uint64_t>(integer_field(value, key, 1, 8));
+        });
       } else if (key == "TYPE") {
-        const auto values = per_field(lines, header, words);
-        for (std::size_t i = 0; i < values.size(); ++i) {
-          header.fields[i].type = values[i].size() == 1 ? values[i].front() : '?';
-        }
+        per_field(lines, header, words, [](PcdField& field, std::string_view value) {
+          field.type = value.size() == 1 ? value.front() : '?';
+        });
       } else if (key == "COUNT") {
-        const auto values = per_field(lines, header, words);
-        for (std::size_t i = 0; i < values.size(); ++i) {
-          header.fields[i].count =
-              static_cast<std::uint64_t>(integer_field(values[i], key, 0, kMostRecordBytes));
-        }
+        per_field(lines, header, words, [&](PcdField& field, std::string_view value) {
+          field.count = static_cast<std::uint64_t>(integer_field(value, key, 0, kMostRecordBytes));
+        });
       } else if (key == "WIDTH") {
         width = count_field(only_value(), key);
       } else if (key == "HEIGHT") {
@@ -255,13 +251,12 @@ const Format kPcdFormat = {
         return std::make_unique<NamedTextReader>(path, kPcd, text_layout(std::move(header)));
       }
       if (header.data != "binary" && header.data != "binary_compressed") {
-        throw FileError(path, {.byte_offset = {}, .line = header.data_line - 1},
+        throw FileError(path, {{}, header.data_line - 1},
                         fmt::format("expected DATA ascii, binary or binary_compressed, found {}",
                                     printable(header.data)));
       }
       return std::make_unique<BinaryTableReader>(path, kPcd, binary_table(path, std::move(header)));
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

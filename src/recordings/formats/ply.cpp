@@ -290,7 +290,6 @@ const Format kPlyFormat = {
       }
       return std::make_unique<BinaryTableReader>(path, kPly, binary_table(path, header));
     },
-    nullptr,
 };
 
 }  // namespace risley::recordings

@@ -93,10 +93,9 @@ class ScanSequenceReader final : public TextTableReader {
     if (beyond_180) header_.set_detail(kAzimuthSense, "0-360");
     if (all_shot_numbers) {
       header_.has_times = false;
-      warnings_.push_back(
-          {{.byte_offset = {}, .line = 2},
-           "column Time/s holds shot numbers instead of seconds; the time between shots is unknown",
-           0});
+      warn({{}, 2},
+           "column Time/s holds shot numbers instead of seconds; the time between shots is "
+           "unknown");
     }
   }
 
@@ -226,12 +225,8 @@ const Format kScanSequenceCsvFormat = {
     ".csv",
     "Livox scan sequence: time, azimuth and zenith as text, no ranges",
     [](std::string_view head) { return normalized_header(head) == kSequenceHeader; },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<ScanSequenceReader>(path);
-    },
-    [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
-      return std::make_unique<ScanSequenceWriter>(path, header);
-    },
+    open_with<ScanSequenceReader>,
+    create_with<ScanSequenceWriter>,
     true,
 };
 

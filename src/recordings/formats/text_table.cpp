@@ -31,14 +31,12 @@ TextTableReader::TextTableReader(const std::string& path, std::string format)
   if (!lines_.next(line)) fail(1, "expected a header line, found an empty file");
   table_header_ = normalized_header(line);
   if (!lines_.has_line_end()) {
-    warnings_.push_back({{.byte_offset = {}, .line = 1},
-                         "the file ends within its header line; it holds no rows",
-                         0});
+    warn({{}, 1}, "the file ends within its header line; it holds no rows");
   }
 }
 
 void TextTableReader::fail(std::uint64_t line, const std::string& problem) const {
-  throw FileError(path_, {.byte_offset = {}, .line = line}, problem);
+  throw FileError(path_, {{}, line}, problem);
 }
 
 void TextTableReader::refuse_header(const std::string& expected) const {
@@ -117,12 +115,11 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
       const int decimals = all_fields ? decimals_of(fields_.back()) : 0;
       if (!lines_.has_line_end() &&
           !(all_fields && decimals > 0 && decimals == last_field_decimals_)) {
-        warnings_.push_back(
-            {{.byte_offset = {}, .line = lines_.line_number()},
+        warn({{}, lines_.line_number()},
              fmt::format(
                  "the last line has no line end and may be cut off (\"{}\"); it was left out",
                  printable(line)),
-             rows_left_.value_or(1)});
+             rows_left_.value_or(1));
         finished_ = true;
         break;
       }
@@ -135,7 +132,7 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
       if (rows_left_) --*rows_left_;
     }
   } catch (const BadRow& bad) {
-    stop(FileError(path_, {.byte_offset = {}, .line = lines_.line_number()}, bad.what()));
+    stop(FileError(path_, {{}, lines_.line_number()}, bad.what()));
   } catch (const FileError& error) {
     stop(error);
   }

@@ -48,11 +48,6 @@ struct Row {
   int zenith_centideg = 0, azimuth_centideg = 0;
 };
 
-std::int64_t integer(std::span<const std::string_view> fields, std::size_t column,
-                     std::string_view name, std::int64_t low, std::int64_t high) {
-  return integer_field(fields[column], name, low, high);
-}
-
 void require_status(std::string_view field) {
   const bool prefixed = field.starts_with("0x") || field.starts_with("0X");
   const std::string_view digits = prefixed ? field.substr(2) : std::string_view();
@@ -67,25 +62,26 @@ void require_status(std::string_view field) {
 Row parse(std::span<const std::string_view> fields) {
   constexpr std::int64_t kCoordinate = INT32_MAX;
   Row row;
-  integer(fields, 0, "Version", kPacketVersion, kPacketVersion);
-  row.slot = static_cast<int>(integer(fields, 1, "Slot ID", 0, 255));
-  row.lidar = static_cast<int>(integer(fields, 2, "LiDAR Index", 0, 255));
+  integer_field(fields[0], "Version", kPacketVersion, kPacketVersion);
+  row.slot = static_cast<int>(integer_field(fields[1], "Slot ID", 0, 255));
+  row.lidar = static_cast<int>(integer_field(fields[2], "LiDAR Index", 0, 255));
   require_status(fields[4]);
-  row.timestamp_type = static_cast<std::uint8_t>(integer(fields, 5, "Timestamp Type", 0, 5));
-  row.data_type = static_cast<std::uint8_t>(integer(fields, 6, "Data Type", 0, 8));
+  row.timestamp_type = static_cast<std::uint8_t>(integer_field(fields[5], "Timestamp Type", 0, 5));
+  row.data_type = static_cast<std::uint8_t>(integer_field(fields[6], "Data Type", 0, 8));
   row.layout = record_layout(row.data_type);
   if (row.layout->returns == 0) {
     throw BadRow{fmt::format("expected a data type that holds points, found {}", row.data_type)};
   }
-  row.timestamp_ns = integer(fields, 7, "Timestamp", 0, INT64_MAX / 2);
-  row.intensity = static_cast<std::uint8_t>(integer(fields, 11, "Reflectivity", 0, 255));
-  row.tag = static_cast<std::uint8_t>(integer(fields, 12, "Tag", 0, 255));
+  row.timestamp_ns = integer_field(fields[7], "Timestamp", 0, INT64_MAX / 2);
+  row.intensity = static_cast<std::uint8_t>(integer_field(fields[11], "Reflectivity", 0, 255));
+  row.tag = static_cast<std::uint8_t>(integer_field(fields[12], "Tag", 0, 255));
   if (row.layout->cartesian) {
     const std::array<std::string_view, 3> names = {"Ori_x", "Ori_y", "Ori_z"};
     std::array<double, 3> coordinates{};
     bool has_integers = false;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto steps = integer(fields, 13 + axis, names[axis], -kCoordinate - 1, kCoordinate);
+      const auto steps =
+          integer_field(fields[13 + axis], names[axis], -kCoordinate - 1, kCoordinate);
       coordinates[axis] = static_cast<double>(steps) * kMillimetre;
       has_integers = has_integers || steps != 0;
     }
@@ -96,9 +92,10 @@ Row parse(std::span<const std::string_view> fields) {
     }
     row.point = {coordinates[0], coordinates[1], coordinates[2]};
   } else {
-    row.range = static_cast<double>(integer(fields, 16, "Ori_radius", 0, UINT32_MAX)) * kMillimetre;
-    row.zenith_centideg = static_cast<int>(integer(fields, 17, "Ori_theta", 0, 18'000));
-    row.azimuth_centideg = static_cast<int>(integer(fields, 18, "Ori_phi", 0, 36'000));
+    row.range =
+        static_cast<double>(integer_field(fields[16], "Ori_radius", 0, UINT32_MAX)) * kMillimetre;
+    row.zenith_centideg = static_cast<int>(integer_field(fields[17], "Ori_theta", 0, 18'000));
+    row.azimuth_centideg = static_cast<int>(integer_field(fields[18], "Ori_phi", 0, 36'000));
   }
   return row;
 }
@@ -203,7 +200,7 @@ class ViewerCsvReader final : public TextTableReader {
     if (sensor.rows < sensor.rows_expected && !short_packet_reported_) {
       short_packet_reported_ = true;
       warnings_.push_back(
-          {{.byte_offset = {}, .line = line_number()},
+          {{{}, line_number()},
            fmt::format("the previous packet has {} of {} points; where points are missing in a "
                        "packet, the times of those after them are too early",
                        sensor.rows, sensor.rows_expected),
@@ -261,10 +258,7 @@ const Format kViewerCsvFormat = {
     "",
     "Livox Viewer table: points with the headers of their packets (read only)",
     [](std::string_view head) { return normalized_header(head) == kViewerHeader; },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<ViewerCsvReader>(path);
-    },
-    nullptr,
+    open_with<ViewerCsvReader>,
 };
 
 }  // namespace risley::recordings

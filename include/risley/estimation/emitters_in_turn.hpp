@@ -1,0 +1,29 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "risley/estimation/angle_series.hpp"
+
+namespace risley::estimation {
+
+/// A recording whose times were counted from the numbers of its shots.
+struct CountedShots {
+  AngleSeries series;             ///< all valid shots, as recorded
+  std::vector<std::size_t> rows;  ///< observation of each, counted from 0 over all rows
+  double shot_rate = 0;           ///< that they were counted with, Hz
+  bool in_turn = false;           ///< the file names no emitters: they were taken to fire in turn
+};
+
+/// Emitters that fire in turn, as far as known sensors have so many: shots of one emitter follow
+/// each other as smoothly as those of one that fires alone.
+int emitters_in_turn(const CountedShots& shots);
+
+/// How many rows stand between two places where the beam of an emitter jumps or turns as no rotors
+/// move it from one of its shots to the next; infinite where it does not, or there are too few
+/// shots to tell. @param emitters  of the sensor, which fire in turn
+double rows_between_jumps(const CountedShots& shots, int emitters);
+
+}  // namespace risley::estimation

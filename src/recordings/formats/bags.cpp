@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Bags of ROS 1 and of ROS 2, whose messages are read alike.
+#include <memory>
+
+#include "risley/bags/bag.hpp"
+
+#include "recordings/formats/format.hpp"
+#include "recordings/formats/livox_messages.hpp"
+
+namespace risley::recordings {
+namespace {
+
+template <bags::BagKind Kind>
+bool is_bag(std::string_view head) {
+  return bags::bag_kind(head) == Kind;
+}
+
+template <bags::BagKind Kind, const Format& Its>
+std::unique_ptr<Reader> open_bag(const std::string& path, const Progress& progress) {
+  return std::make_unique<MessageReader>(bags::open_bag(path, Kind, progress), Its.name);
+}
+
+}  // namespace
+
+const Format kRos1BagFormat = {
+    "ros1-bag",
+    "",
+    "ROS 1 bag: messages of Livox drivers, point clouds (read only)",
+    is_bag<bags::BagKind::ros1>,
+    open_bag<bags::BagKind::ros1, kRos1BagFormat>,
+};
+
+const Format kRos2BagFormat = {
+    "ros2-bag",
+    "",
+    "ROS 2 bag in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
+    is_bag<bags::BagKind::ros2>,
+    open_bag<bags::BagKind::ros2, kRos2BagFormat>,
+};
+
+const Format kMcapFormat = {
+    "mcap",
+    "",
+    "ROS 2 or ROS 1 bag in MCAP: messages of Livox drivers, point clouds (read only)",
+    is_bag<bags::BagKind::mcap>,
+    open_bag<bags::BagKind::mcap, kMcapFormat>,
+};
+
+}  // namespace risley::recordings
