@@ -22,8 +22,15 @@ namespace {
 /// In the order in which they are tried.
 const std::vector<const Format*>& formats() {
   static const std::vector<const Format*> all{
-      &kInertialExplorerFormat, &kPospacFormat, &kRtklibFormat, &kNamedCsvFormat,
-      &kOpenmmsFormat,          &kTumFormat,    &kRosBagFormat, &kSbetFormat,
+      &kInertialExplorerFormat,
+      &kPospacFormat,
+      &kRtklibFormat,
+      &kNamedCsvFormat,
+      &kOpenmmsFormat,
+      &kTumFormat,
+      &kKittiFormat,
+      &kRosBagFormat,
+      &kSbetFormat,
   };
   return all;
 }
@@ -31,7 +38,7 @@ const std::vector<const Format*>& formats() {
 std::string known_formats() {
   std::string names;
   for (const Format* format : formats()) {
-    if (format == &kRtklibFormat) continue;
+    if (format == &kRtklibFormat || format == &kKittiFormat) continue;
     names += fmt::format("{}{}", names.empty() ? "" : ", ", format->name);
   }
   return names;

@@ -100,7 +100,8 @@ TEST(PlausibleInput, TrajectoriesAreNamedAsSuch) {
   }
   io::write_text_file(folder.file("tum.txt"), tum);
   io::write_text_file(folder.file("ins.csv"), ins);
-  for (const char* name : {"tum.txt", "ins.csv"}) {
+  io::write_text_file(folder.file("kitti.txt"), "1 0 0 0.0 0 1 0 0 0 0 1 0\n");
+  for (const char* name : {"tum.txt", "ins.csv", "kitti.txt"}) {
     EXPECT_THAT(estimate_problem(folder.file(name)),
                 AllOf(HasSubstr(name), HasSubstr("is a trajectory")));
   }

@@ -570,6 +570,12 @@ TEST(TrajectoryCsv, NamesWithUnitsInBrackets) {
               AllOf(HasSubstr("heading_deg"), HasSubstr("ellipsoidal_height_m")));
 }
 
+TEST(Kitti, IsRefusedBecauseItHasNoTimes) {
+  const std::string text = "1 0 0 0.0 0 1 0 0 0 0 1 0\n0 -1 0 0.05 1 0 0 0 0 0 1 0\n";
+  EXPECT_THAT(fault(text), AllOf(HasSubstr("KITTI"), HasSubstr("time x y z qx qy qz qw")));
+  EXPECT_THAT(fault(replaced(text, "0 -1 0 0.05", "0 -2 0 0.05")), HasSubstr("known kind"));
+}
+
 TEST(InertialExplorer, TheDateDecidesBetweenSecondsOfDayAndOfWeek) {
   // 2023-11-16 is a Thursday, day 4 of GPS week 2288.
   const auto text = [](const std::string& unit, const std::vector<std::string>& days,

@@ -48,6 +48,7 @@ extern const Format kOpenmmsFormat;           // openmms.cpp
 extern const Format kNamedCsvFormat;          // named_csv.cpp
 extern const Format kTumFormat;               // tum.cpp
 extern const Format kRtklibFormat;            // rtklib.cpp
+extern const Format kKittiFormat;             // kitti.cpp
 extern const Format kRosBagFormat;            // ros_bag.cpp
 
 bool is_smrmsg(const FileHead& head);  // smrmsg.cpp
