@@ -221,14 +221,15 @@ class NetcdfInput::Process {
   std::optional<ConfinedProcess> process_;
 };
 
-NetcdfInput::NetcdfInput(const std::string& path, const Progress& progress)
-    : path_(path), process_(std::make_unique<Process>(*this, path, progress)) {
+NetcdfInput::NetcdfInput(io::InputFile file, const Progress& progress)
+    : file_(std::move(file)),
+      process_(std::make_unique<Process>(*this, file_.name_for_libraries(), progress)) {
   process_->ask(request(Request::open), "the file");
 }
 
 NetcdfInput::~NetcdfInput() = default;
 
-void NetcdfInput::fail(const std::string& problem) const { throw FileError(path_, {}, problem); }
+void NetcdfInput::fail(const std::string& problem) const { throw FileError(path(), {}, problem); }
 
 bool NetcdfInput::has_attribute(const std::string& name) const {
   const std::string answer =

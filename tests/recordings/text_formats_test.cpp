@@ -211,7 +211,7 @@ TEST(ScanSequence, RefusesOtherHeaders) {
     EXPECT_EQ(outcome.error->place().line, 1U);
   }
   EXPECT_THROW(kScanSequenceCsvFormat.open("/no/such/file.csv", {}), FileError);
-  EXPECT_THROW(kScanSequenceCsvFormat.open("/", {}), FileError);
+  EXPECT_THROW(kScanSequenceCsvFormat.open(std::string("/"), {}), FileError);
 }
 
 TEST(ScanSequence, ShotNumbersAreNoSeconds) {

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "risley/io/block_file.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/writer.hpp"
 
@@ -27,7 +28,7 @@ struct Format {
   bool (*recognises)(std::string_view head);
   /// @param progress  cancels where much may have to be looked through before there is a row, or
   ///                  nothing is heard of a library for long
-  std::unique_ptr<Reader> (*open)(const std::string& path, const Progress& progress);
+  std::unique_ptr<Reader> (*open)(const io::InputFile& file, const Progress& progress);
   /// nullptr when the format is only read.
   std::unique_ptr<Writer> (*create)(const std::string& path, const RecordingHeader& header);
   bool holds_shot_numbers = false;  ///< recordings without times can be written, too

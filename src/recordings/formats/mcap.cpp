@@ -19,9 +19,8 @@ const Format kMcapFormat = {
     "",
     "ROS 2 or ROS 1 bag in MCAP: messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::mcap; },
-    [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
-      return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::mcap, progress),
-                                             kMcap);
+    [](const io::InputFile& file, const Progress& progress) -> std::unique_ptr<Reader> {
+      return std::make_unique<MessageReader>(bags::open_bag(file, progress), kMcap);
     },
     nullptr,
 };

@@ -50,7 +50,7 @@ RecordParts parts_of(const OpenpylivoxLayout& layout) {
 
 class OpenpylivoxBinReader final : public Reader {
  public:
-  explicit OpenpylivoxBinReader(const std::string& path) : input_(path) {
+  explicit OpenpylivoxBinReader(const io::InputFile& file) : input_(file) {
     header_.format = kOpenpylivoxBinName;
     layout_ = read_layout();
     parts_ = parts_of(layout_);
@@ -166,8 +166,8 @@ const Format kOpenpylivoxBinFormat = {
     ".bin",
     "openpylivox binary capture: points with intensity and time",
     [](std::string_view head) { return head.starts_with(kBinSignature); },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<OpenpylivoxBinReader>(path);
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<OpenpylivoxBinReader>(file);
     },
     nullptr,
 };

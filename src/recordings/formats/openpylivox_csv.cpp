@@ -47,8 +47,8 @@ const Variant* find_variant(std::string_view header) {
 
 class OpenpylivoxCsvReader final : public TextTableReader {
  public:
-  explicit OpenpylivoxCsvReader(const std::string& path)
-      : TextTableReader(path, std::string(kOpenpylivoxCsvName)) {
+  explicit OpenpylivoxCsvReader(const io::InputFile& file)
+      : TextTableReader(file, std::string(kOpenpylivoxCsvName)) {
     const Variant* const variant = find_variant(table_header());
     if (variant == nullptr) refuse_header("of an openpylivox table (//X,Y,Z,Inten-sity,Time, ...)");
     variant_ = *variant;
@@ -273,8 +273,8 @@ const Format kOpenpylivoxCsvFormat = {
     ".openpylivox.csv",
     "openpylivox text capture: points with intensity and time",
     [](std::string_view head) { return find_variant(normalized_header(head)) != nullptr; },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<OpenpylivoxCsvReader>(path);
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<OpenpylivoxCsvReader>(file);
     },
     [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
       return std::make_unique<OpenpylivoxCsvWriter>(path, header);

@@ -19,9 +19,8 @@ const Format kRos1BagFormat = {
     "",
     "ROS 1 bag: messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::ros1; },
-    [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
-      return std::make_unique<MessageReader>(bags::open_bag(path, bags::BagKind::ros1, progress),
-                                             kRos1Bag);
+    [](const io::InputFile& file, const Progress& progress) -> std::unique_ptr<Reader> {
+      return std::make_unique<MessageReader>(bags::open_bag(file, progress), kRos1Bag);
     },
     nullptr,
 };

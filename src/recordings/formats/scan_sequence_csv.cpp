@@ -36,8 +36,8 @@ float resolution_of(int decimals) {
 
 class ScanSequenceReader final : public TextTableReader {
  public:
-  explicit ScanSequenceReader(const std::string& path)
-      : TextTableReader(path, std::string(kScanSequenceCsv)) {
+  explicit ScanSequenceReader(const io::InputFile& file)
+      : TextTableReader(file, std::string(kScanSequenceCsv)) {
     if (table_header() != kSequenceHeader) refuse_header(std::string(kSequenceHeader));
     set_column_count(3);
     header_.has_range = header_.has_intensity = false;
@@ -226,8 +226,8 @@ const Format kScanSequenceCsvFormat = {
     ".csv",
     "Livox scan sequence: time, azimuth and zenith as text, no ranges",
     [](std::string_view head) { return normalized_header(head) == kSequenceHeader; },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<ScanSequenceReader>(path);
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<ScanSequenceReader>(file);
     },
     [](const std::string& path, const RecordingHeader& header) -> std::unique_ptr<Writer> {
       return std::make_unique<ScanSequenceWriter>(path, header);

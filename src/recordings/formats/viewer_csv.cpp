@@ -115,8 +115,8 @@ struct Sensor {
 
 class ViewerCsvReader final : public TextTableReader {
  public:
-  explicit ViewerCsvReader(const std::string& path)
-      : TextTableReader(path, std::string(kViewerCsv)) {
+  explicit ViewerCsvReader(const io::InputFile& file)
+      : TextTableReader(file, std::string(kViewerCsv)) {
     if (table_header() != kViewerHeader) refuse_header("of a Livox Viewer table (19 columns)");
     set_column_count(kColumnCount);
     header_.devices.clear();
@@ -261,8 +261,8 @@ const Format kViewerCsvFormat = {
     "",
     "Livox Viewer table: points with the headers of their packets (read only)",
     [](std::string_view head) { return normalized_header(head) == kViewerHeader; },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<ViewerCsvReader>(path);
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<ViewerCsvReader>(file);
     },
     nullptr,
 };
