@@ -25,16 +25,16 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
     } catch (const InvalidArgument&) {  // no preset of that type: the header names it all the same
     }
   }
+  std::string removed;
+  if (!input.reader->header().has_times) removed = input.removed_shots_words(progress.silent());
   input.source = {};  // and with it what was decoded first
   const Progress reading = progress.stage("reading");
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   recordings::TimeAudit audit;
   recordings::Chunk chunk;
-  UntimedShots untimed;
   try {
     while (reader->read(chunk)) {
       audit.add(chunk);
-      if (!reader->header().has_times && !untimed.enough()) untimed.add(chunk.observations);
       reading.report(reader->fraction_read());
     }
   } catch (const FileError& error) {
@@ -45,11 +45,8 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   result.audit.pps_wraps = reader->clock_wraps();
   result.warnings = reader->warnings();
   for (const std::string& words : input.warnings) result.warnings.push_back({{}, words});
+  if (!removed.empty()) result.warnings.push_back({{}, removed});
   result.time_uncertainty = input.time_uncertainty;
-  if (!result.header.has_times) {
-    const std::string words = untimed.removed_words();
-    if (!words.empty()) result.warnings.push_back({{}, words});
-  }
   result.choice = std::move(input.choice);
   if (result.audit.shots == 0) result.choice.reset();
   if (!result.choice) return result;

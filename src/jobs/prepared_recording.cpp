@@ -214,43 +214,55 @@ std::optional<sensors::Sensor> sensor_to_count_by(const recordings::RecordingHea
   return preset_of_type(device.type);
 }
 
+/// What is wrong with a count of shots where those without a return were removed; empty where they
+/// were not. @param emitters  of the sensor, which fire in turn
+std::string words_of_removed(const estimation::CountedShots& shots, int emitters) {
+  const double rows = estimation::rows_between_jumps(shots, emitters);
+  // Where a packet is missing now and then, rotors can be followed from one to the next.
+  constexpr double kFewest = 1000;
+  if (rows >= kFewest) return {};
+  return fmt::format(
+      "shots without a return were removed from this file, which has no times: about every {:.0f} "
+      "rows the beam jumps, and how many shots are missing there, so when each was fired, is lost. "
+      "Directions and ranges hold all the same: they can be looked at, converted, and made a "
+      "cloud. "
+      "An estimation needs the recording with times of single shots, or with shots without a "
+      "return "
+      "kept as 0 0 0, or what it was exported from (LVX, a capture, or a bag of CustomMsg)",
+      rows);
+}
+
 /// What a recording without times lacks: only their rate, or shots; what is wrong with the shots
 /// themselves comes first.
 /// @throws recordings::MissingTimes, FileError for what is no scan, EstimationError where shots
 /// were removed
-[[noreturn]] void refuse_without_times(const recordings::Source& source,
-                                       const recordings::ReadOptions& reading,
-                                       recordings::Reader& reader, const Progress& progress) {
+[[noreturn]] void refuse_without_times(const PreparedRecording& recording,
+                                       const Progress& progress) {
   constexpr double kAnyRate = 1e5;  // Hz
-  recordings::ReadOptions counted = reading;
+  recordings::ReadOptions counted = recording.reading;
   counted.shot_rate = kAnyRate;
-  const estimation::AngleSeries first = first_second(source, counted, progress);
+  const estimation::AngleSeries first = first_second(recording.source, counted, progress);
+  const std::string& name = recording.source.name();
   if (const auto problem = recordings::not_a_scan(first.azimuth, first.zenith, first.range)) {
-    throw FileError(source.name(), {}, *problem);
+    throw FileError(name, {}, *problem);
   }
   const auto beyond =
       recordings::beyond_reach(first.range, recordings::kFarthestReach, "these sensors");
-  UntimedShots shots;
-  recordings::Chunk chunk;
+  const std::string words = recording.removed_shots_words(progress);
+  if (!words.empty()) throw EstimationError(fmt::format("{}: {}", name, words));
   try {
-    while (!shots.enough() && reader.read(chunk)) shots.add(chunk.observations);
-  } catch (const FileError&) {  // what is wrong here comes first
-  }
-  const std::string words = shots.removed_words();
-  if (!words.empty()) throw EstimationError(fmt::format("{}: {}", source.name(), words));
-  try {
-    recordings::require_times(reader.header());
+    recordings::require_times(recording.reader->header());
   } catch (const recordings::MissingTimes& missing) {
     if (!beyond) throw;
     throw recordings::MissingTimes(fmt::format("{}. Besides, {}", *beyond, missing.what()));
   }
-  throw EstimationError(fmt::format("{}: has no times", source.name()));
+  throw EstimationError(fmt::format("{}: has no times", name));
 }
 
 /// @throws EstimationError where shots are missing all over a recording whose shots were counted
 void require_all_shots(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
                        const std::string& name) {
-  const auto words = removed_shots_words(shots, sensor.train.emitters());
+  const auto words = words_of_removed(shots, sensor.train.emitters());
   if (!words.empty()) throw EstimationError(fmt::format("{}: {}", name, words));
 }
 
@@ -266,7 +278,7 @@ void find_times(PreparedRecording& recording, const Preparation& wishes, const P
     recording.read_again(progress);
   }
   if (!recording.reader->header().has_times) {
-    refuse_without_times(recording.source, recording.reading, *recording.reader, progress);
+    refuse_without_times(recording, progress);
   }
 }
 
@@ -360,6 +372,19 @@ const SensorChoice& PreparedRecording::choose(const std::optional<sensors::Senso
   return *choice;
 }
 
+std::string PreparedRecording::removed_shots_words(const Progress& progress) const {
+  constexpr std::size_t kMost = 100'000;
+  estimation::ShotSelector selector({.rate = std::nullopt, .ranges = false, .rows = true});
+  try {
+    const auto own = recordings::open_recording(source, reading, progress);
+    recordings::Chunk chunk;
+    while (selector.rows().size() < kMost && own->read(chunk)) selector.add(chunk.observations);
+  } catch (const FileError&) {  // who reads on is told of it
+  }
+  const estimation::CountedShots shots{selector.take_series(), selector.rows(), 0, false};
+  return words_of_removed(shots, estimation::emitters_in_turn(shots));
+}
+
 PreparedRecording prepare_recording(const recordings::Source& source,
                                     const recordings::ReadOptions& options,
                                     const Preparation& wishes, const Progress& progress) {
@@ -400,27 +425,6 @@ PreparedRecording prepare_recording(const recordings::Source& source,
   result.reading.packet_places = std::move(placed.places);
   result.read_again(progress);
   return result;
-}
-
-std::string removed_shots_words(const estimation::CountedShots& shots, int emitters) {
-  const double rows = estimation::rows_between_jumps(shots, emitters);
-  // Where a packet is missing now and then, rotors can be followed from one to the next.
-  constexpr double kFewest = 1000;
-  if (rows >= kFewest) return {};
-  return fmt::format(
-      "shots without a return were removed from this file, which has no times: about every {:.0f} "
-      "rows the beam jumps, and how many shots are missing there, so when each was fired, is lost. "
-      "Directions and ranges hold all the same: they can be looked at, converted, and made a "
-      "cloud. "
-      "An estimation needs the recording with times of single shots, or with shots without a "
-      "return "
-      "kept as 0 0 0, or what it was exported from (LVX, a capture, or a bag of CustomMsg)",
-      rows);
-}
-
-std::string UntimedShots::removed_words() {
-  const estimation::CountedShots shots{selector_.take_series(), selector_.rows(), 0, false};
-  return removed_shots_words(shots, estimation::emitters_in_turn(shots));
 }
 
 std::string pose_text(const Extrinsics& pose) {

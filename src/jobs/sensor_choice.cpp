@@ -98,6 +98,17 @@ std::string misfit_text(double misfit) {
                                : "no lines at all";
 }
 
+std::vector<PresetMisfit> best_two(const SensorRecognition& found,
+                                   std::span<const Sensor> candidates) {
+  std::vector<PresetMisfit> misfits;
+  for (const SensorMatch& match : found.matches) {
+    if (misfits.size() < 2) {
+      misfits.push_back({candidates[match.candidate].name, misfit_of(match)});
+    }
+  }
+  return misfits;
+}
+
 /// What was found of a recognition's best match; its words are the caller's.
 void take(const SensorRecognition& found, std::span<const Sensor> candidates,
           SensorChoice& choice) {
@@ -107,11 +118,7 @@ void take(const SensorRecognition& found, std::span<const Sensor> candidates,
   choice.order = best.order;
   choice.frame = best.frame;
   if (std::abs(best.roll) > kLeastRoll) choice.roll = best.roll;
-  choice.misfits.clear();
-  for (const SensorMatch& match : found.matches) {
-    choice.misfits.push_back({candidates[match.candidate].name, misfit_of(match)});
-    if (choice.misfits.size() == 2) break;
-  }
+  choice.misfits = best_two(found, candidates);
 }
 
 std::string comparison(const std::vector<PresetMisfit>& misfits) {
@@ -191,10 +198,7 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
   }
   choice.chosen_by = ChosenBy::guess;
   choice.fits = false;
-  for (const SensorMatch& match : found->matches) {
-    choice.misfits.push_back({candidates[match.candidate].name, misfit_of(match)});
-    if (choice.misfits.size() == 2) break;
-  }
+  choice.misfits = best_two(*found, candidates);
   choice.words = "no built-in preset describes the scan: " + comparison(choice.misfits);
   choice.warnings.push_back(fmt::format(
       "{}; {} is assumed. Option sensor names the sensor, by a preset or a calibration file; the "

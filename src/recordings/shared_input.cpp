@@ -10,10 +10,10 @@
 
 #include "risley/bags/bag.hpp"
 #include "risley/io/file_head.hpp"
+#include "risley/recordings/livox/packet.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/livox_messages.hpp"
-#include "recordings/memory_reader.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -47,26 +47,23 @@ std::string shown(std::string_view head) {
 
 }  // namespace
 
-/// Reads first rows that others have decoded, and goes on behind them.
+/// Reads first rows that others have decoded, packets whole as their file would be read, and goes
+/// on behind them.
 class SharedReader final : public Reader {
  public:
   SharedReader(std::shared_ptr<SharedInput> input, const Progress& progress)
-      : input_(std::move(input)),
-        progress_(progress),
-        first_(input_->first_rows(progress)),
-        memory_(std::make_unique<MemoryReader>(first_->recording)) {
-    header_ = memory_->header();
-    warnings_ = memory_->warnings();
+      : input_(std::move(input)), progress_(progress), first_(input_->first_rows(progress)) {
+    header_ = first_->recording->header;
+    warnings_ = first_->recording->warnings;
     clock_wraps_ = first_->clock_wraps;
   }
 
   bool read(Chunk& chunk, std::size_t max_rows) override {
     if (!rest_) {
-      if (memory_->read(chunk, max_rows)) return true;
+      if (read_held(chunk, max_rows)) return true;
       if (first_->failure) throw FileError(*first_->failure);
       if (first_->ended) return false;
       rest_ = input_->behind(*first_, progress_);
-      memory_.reset();
       first_.reset();
     }
     const auto take_over = [this] {
@@ -85,14 +82,55 @@ class SharedReader final : public Reader {
   }
 
   double fraction_read() const override {
-    return rest_ ? rest_->fraction_read() : first_->fraction * memory_->fraction_read();
+    if (rest_) return rest_->fraction_read();
+    const Chunk& all = first_->recording->data;
+    const std::size_t total = all.observations.size() + all.imu.size();
+    return total == 0 ? first_->fraction
+                      : first_->fraction * static_cast<double>(row_ + sample_) /
+                            static_cast<double>(total);
   }
 
  private:
+  bool read_held(Chunk& chunk, std::size_t max_rows) {
+    chunk.clear();
+    const Chunk& all = first_->recording->data;
+    std::size_t rows = 0, samples = 0;
+    for (; packet_ < all.packets.size() && rows + samples < max_rows; ++packet_) {
+      const Packet& packet = all.packets[packet_];
+      chunk.packets.push_back(packet);
+      rows += packet.rows;
+      samples += packet.data_type == livox::kImuDataType ? 1 : 0;
+    }
+    if (all.packets.empty()) {
+      rows = rows_of_whole_packets(max_rows);
+      samples = std::min(max_rows, all.imu.size() - sample_);
+    }
+    chunk.observations.append(all.observations, row_, row_ + rows);
+    const auto sample = all.imu.begin() + static_cast<std::ptrdiff_t>(sample_);
+    chunk.imu.assign(sample, sample + static_cast<std::ptrdiff_t>(samples));
+    const auto& begins = all.packet_begins;
+    for (; begin_ < begins.size() && begins[begin_] < row_ + rows; ++begin_) {
+      chunk.packet_begins.push_back(begins[begin_] - row_);
+    }
+    row_ += rows;
+    sample_ += samples;
+    return rows > 0 || samples > 0 || !chunk.packets.empty();
+  }
+
+  /// Up to the last beginning of a packet within max_rows, or the first one behind.
+  std::size_t rows_of_whole_packets(std::size_t max_rows) const {
+    const auto& begins = first_->recording->data.packet_begins;
+    const std::size_t left = first_->recording->data.observations.size() - row_;
+    if (left <= max_rows || begins.empty()) return std::min(left, max_rows);
+    auto end = std::upper_bound(begins.begin(), begins.end(), row_ + max_rows);
+    if (end != begins.begin() && *(end - 1) > row_) --end;
+    return end == begins.end() ? left : *end - row_;
+  }
+
   std::shared_ptr<SharedInput> input_;
   Progress progress_;
   std::shared_ptr<const FirstRows> first_;
-  std::unique_ptr<MemoryReader> memory_;  ///< of the first rows
+  std::size_t row_ = 0, packet_ = 0, sample_ = 0, begin_ = 0;  ///< the next of each
   std::unique_ptr<Reader> rest_;
 };
 

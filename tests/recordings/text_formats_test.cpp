@@ -210,7 +210,7 @@ TEST(ScanSequence, RefusesOtherHeaders) {
     ASSERT_TRUE(outcome.error);
     EXPECT_EQ(outcome.error->place().line, 1U);
   }
-  EXPECT_THROW(kScanSequenceCsvFormat.open("/no/such/file.csv", {}), FileError);
+  EXPECT_THROW(kScanSequenceCsvFormat.open(std::string("/no/such/file.csv"), {}), FileError);
   EXPECT_THROW(kScanSequenceCsvFormat.open(std::string("/"), {}), FileError);
 }
 

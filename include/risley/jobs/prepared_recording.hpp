@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
-#include "risley/estimation/angle_series.hpp"
-#include "risley/estimation/shot_slips.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/reader.hpp"
@@ -48,6 +46,9 @@ struct PreparedRecording {
 
   /// Begins at the first row again.
   void read_again(const Progress& progress);
+  /// What is wrong with the shots of a recording without times where those without a return were
+  /// removed; empty where they were not. By its first shots, of a sensor that nobody knows.
+  std::string removed_shots_words(const Progress& progress) const;
   /// The sensor, chosen where nobody has before. @throws as choose_sensor()
   const SensorChoice& choose(const std::optional<sensors::Sensor>& given, const Progress& progress);
 };
@@ -76,25 +77,6 @@ struct PreparedRecording {
 PreparedRecording prepare_recording(const recordings::Source& source,
                                     const recordings::ReadOptions& reading,
                                     const Preparation& wishes, const Progress& progress);
-
-/// What is wrong with a count of shots where those without a return were removed; empty where they
-/// were not. @param emitters  of the sensor, which fire in turn
-std::string removed_shots_words(const estimation::CountedShots& shots, int emitters);
-
-/// The first shots of a recording without times, which tell whether others were removed.
-class UntimedShots {
- public:
-  /// Takes the next rows of the recording.
-  void add(const recordings::Observations& rows) { selector_.add(rows); }
-  /// Whether there are enough to tell.
-  bool enough() const { return selector_.rows().size() >= kMost; }
-  /// As removed_shots_words(), of a sensor that nobody knows. Leaves no shot here.
-  std::string removed_words();
-
- private:
-  static constexpr std::size_t kMost = 100'000;
-  estimation::ShotSelector selector_{{.rate = std::nullopt, .ranges = false, .rows = true}};
-};
 
 /// "yaw 90 pitch -2.25 roll 1.5 deg, translation 0.1 0.2 -0.3 m"
 std::string pose_text(const recordings::Extrinsics& pose);
