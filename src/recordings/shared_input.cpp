@@ -18,9 +18,9 @@
 namespace risley::recordings {
 namespace {
 
-/// Rows that are read at once, a second of a Mid-40 and more, and how many of them are kept: where
-/// times have to be judged first, as many as that takes.
-constexpr std::size_t kFirstRows = 1 << 17, kMostFirstRows = 1 << 18;
+/// So many rows are kept, a second of a Mid-40 and more; without packets, whose times have to be
+/// judged first, as many as that takes.
+constexpr std::size_t kFirstRows = 1 << 17, kFirstRowsWithoutPackets = 1 << 18;
 
 std::string known_formats() {
   std::string names;
@@ -53,8 +53,8 @@ class SharedReader final : public Reader {
  public:
   SharedReader(std::shared_ptr<SharedInput> input, const Progress& progress)
       : input_(std::move(input)), progress_(progress), first_(input_->first_rows(progress)) {
-    header_ = first_->recording->header;
-    warnings_ = first_->recording->warnings;
+    header_ = first_->header;
+    warnings_ = first_->warnings;
     clock_wraps_ = first_->clock_wraps;
   }
 
@@ -83,17 +83,19 @@ class SharedReader final : public Reader {
 
   double fraction_read() const override {
     if (rest_) return rest_->fraction_read();
-    const Chunk& all = first_->recording->data;
-    const std::size_t total = all.observations.size() + all.imu.size();
-    return total == 0 ? first_->fraction
-                      : first_->fraction * static_cast<double>(row_ + sample_) /
-                            static_cast<double>(total);
+    if (first_->rows == 0) return first_->fraction;
+    return first_->fraction * static_cast<double>(given_) / static_cast<double>(first_->rows);
   }
 
  private:
+  /// The next rows of the present chunk. A decoder's own chunks are given as they came.
   bool read_held(Chunk& chunk, std::size_t max_rows) {
     chunk.clear();
-    const Chunk& all = first_->recording->data;
+    if (chunk_ == first_->chunks.size()) return false;
+    const Chunk& all = *first_->chunks[chunk_];
+    const bool whole =
+        first_->are_decoded && row_ + sample_ + packet_ == 0 && max_rows >= kDefaultChunkRows;
+    if (whole) max_rows = all.observations.size() + all.imu.size() + all.packets.size() + 1;
     std::size_t rows = 0, samples = 0;
     for (; packet_ < all.packets.size() && rows + samples < max_rows; ++packet_) {
       const Packet& packet = all.packets[packet_];
@@ -102,7 +104,7 @@ class SharedReader final : public Reader {
       samples += packet.data_type == livox::kImuDataType ? 1 : 0;
     }
     if (all.packets.empty()) {
-      rows = rows_of_whole_packets(max_rows);
+      rows = rows_of_whole_packets(all, max_rows);
       samples = std::min(max_rows, all.imu.size() - sample_);
     }
     chunk.observations.append(all.observations, row_, row_ + rows);
@@ -114,13 +116,20 @@ class SharedReader final : public Reader {
     }
     row_ += rows;
     sample_ += samples;
-    return rows > 0 || samples > 0 || !chunk.packets.empty();
+    given_ += rows;
+    const bool some = rows > 0 || samples > 0 || !chunk.packets.empty();
+    if (row_ == all.observations.size() && sample_ == all.imu.size() &&
+        packet_ == all.packets.size()) {
+      ++chunk_;
+      row_ = packet_ = sample_ = begin_ = 0;
+    }
+    return some || read_held(chunk, max_rows);
   }
 
   /// Up to the last beginning of a packet within max_rows, or the first one behind.
-  std::size_t rows_of_whole_packets(std::size_t max_rows) const {
-    const auto& begins = first_->recording->data.packet_begins;
-    const std::size_t left = first_->recording->data.observations.size() - row_;
+  std::size_t rows_of_whole_packets(const Chunk& all, std::size_t max_rows) const {
+    const auto& begins = all.packet_begins;
+    const std::size_t left = all.observations.size() - row_;
     if (left <= max_rows || begins.empty()) return std::min(left, max_rows);
     auto end = std::upper_bound(begins.begin(), begins.end(), row_ + max_rows);
     if (end != begins.begin() && *(end - 1) > row_) --end;
@@ -130,13 +139,17 @@ class SharedReader final : public Reader {
   std::shared_ptr<SharedInput> input_;
   Progress progress_;
   std::shared_ptr<const FirstRows> first_;
-  std::size_t row_ = 0, packet_ = 0, sample_ = 0, begin_ = 0;  ///< the next of each
+  std::size_t chunk_ = 0, row_ = 0, packet_ = 0, sample_ = 0, begin_ = 0;  ///< the next of each
+  std::size_t given_ = 0;                                                  ///< rows
   std::unique_ptr<Reader> rest_;
 };
 
-SharedInput::SharedInput(std::shared_ptr<const Recording> recording, std::string name)
-    : path_(std::move(name)),
-      first_(std::make_shared<const FirstRows>(FirstRows{std::move(recording)})) {}
+SharedInput::SharedInput(const std::shared_ptr<const Recording>& recording, std::string name)
+    : path_(std::move(name)) {
+  FirstRows all{recording->header, recording->warnings, {{recording, &recording->data}}};
+  all.rows = recording->data.observations.size();
+  first_ = std::make_shared<const FirstRows>(std::move(all));
+}
 
 io::InputFile SharedInput::file() {
   const std::lock_guard lock(opening_);
@@ -179,26 +192,26 @@ std::shared_ptr<const FirstRows> SharedInput::first_rows(const Progress& progres
   const std::lock_guard lock(mutex_);
   if (first_) return first_;
   rest_ = open(progress);
-  const auto recording = std::make_shared<Recording>();
   FirstRows first;
-  Chunk chunk;
+  first.are_decoded = true;
+  bool in_packets = false;
   try {
-    const Chunk& all = recording->data;
-    while (all.observations.size() < (all.packets.empty() ? kMostFirstRows : kFirstRows)) {
-      first.ended = !rest_->read(chunk, kFirstRows);
+    while (first.rows < (in_packets ? kFirstRows : kFirstRowsWithoutPackets)) {
+      auto chunk = std::make_shared<Chunk>();
+      first.ended = !rest_->read(*chunk);
       if (first.ended) break;
-      ++first.reads;
-      recording->data.append(std::move(chunk));
+      in_packets = in_packets || !chunk->packets.empty();
+      first.rows += chunk->observations.size();
+      first.chunks.push_back(std::move(chunk));
       progress.check();
     }
   } catch (const FileError& error) {
     first.failure = error;
   }
-  recording->header = rest_->header();
-  recording->warnings = rest_->warnings();
+  first.header = rest_->header();
+  first.warnings = rest_->warnings();
   first.clock_wraps = rest_->clock_wraps();
   first.fraction = rest_->fraction_read();
-  first.recording = recording;
   if (first.ended || first.failure) rest_.reset();
   first_ = std::make_shared<const FirstRows>(std::move(first));
   return first_;
@@ -210,8 +223,8 @@ std::unique_ptr<Reader> SharedInput::behind(const FirstRows& first, const Progre
   if (rest_) return std::move(rest_);
   std::unique_ptr<Reader> reader = open(progress);
   Chunk chunk;
-  for (std::size_t i = 0; i < first.reads; ++i) {
-    reader->read(chunk, kFirstRows);
+  for (std::size_t i = 0; i < first.chunks.size(); ++i) {
+    reader->read(chunk);
     progress.check();
   }
   return reader;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "risley/io/block_file.hpp"
 #include "risley/recordings/reader.hpp"
@@ -17,14 +18,17 @@ namespace risley::recordings {
 
 struct TimesJudgement;  // judged_times.cpp
 
-/// The first rows of a recording, with all that is known behind them.
+/// The first rows of a recording, and what was known behind them.
 struct FirstRows {
-  std::shared_ptr<const Recording> recording;
+  RecordingHeader header;
+  std::vector<ReadWarning> warnings;
+  std::vector<std::shared_ptr<const Chunk>> chunks;
+  std::size_t rows = 0;
+  bool are_decoded = false;  ///< in chunks of kDefaultChunkRows, and not columns in memory
   std::uint64_t clock_wraps = 0;
   double fraction = 1;  ///< of the file that they are
   bool ended = true;    ///< there are no more
   std::optional<FileError> failure = {};
-  std::size_t reads = 0;  ///< calls that gave them
 };
 
 /// What the copies of a Source share: a file that is opened once and the first rows of it, which
@@ -33,7 +37,7 @@ struct FirstRows {
 class SharedInput : public std::enable_shared_from_this<SharedInput> {
  public:
   explicit SharedInput(std::string path) : path_(std::move(path)) {}
-  explicit SharedInput(std::shared_ptr<const Recording> recording, std::string name);
+  SharedInput(const std::shared_ptr<const Recording>& recording, std::string name);
 
   const std::string& path() const { return path_; }
   /// The open file. @throws FileError; for a folder, too
