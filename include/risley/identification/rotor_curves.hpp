@@ -37,10 +37,10 @@ struct RotorCurves {
   int segment_of(double time) const;
   /// The first of the degree + 1 coefficients that act in a segment.
   int first_coefficient(int segment) const { return smooth ? segment : segment * (degree + 1); }
-  double angle(int rotor, double time) const {  ///< rad, not wrapped
-    return weighted(rotor, time, &CurveWeights::value);
-  }
-  double angular_velocity(int rotor, double time) const {  ///< rad/s
+  /// rad, not wrapped
+  double angle(int rotor, double time) const { return weighted(rotor, time, &CurveWeights::value); }
+  /// rad/s
+  double angular_velocity(int rotor, double time) const {
     return weighted(rotor, time, &CurveWeights::rate);
   }
   double mean_angular_velocity(int rotor) const;  ///< from begin to end, rad/s

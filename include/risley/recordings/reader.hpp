@@ -59,6 +59,7 @@ class Reader {
   std::vector<ReadWarning> warnings_;
   std::uint64_t clock_wraps_ = 0;
 
+  /// Adds to warnings().
   void warn(FilePlace place, std::string message, std::uint64_t lost_records = 0) {
     warnings_.push_back({place, std::move(message), lost_records});
   }
