@@ -13,7 +13,7 @@
 #include "risley/core/error.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/inspect_trajectory.hpp"
-#include "risley/jobs/recording_input.hpp"
+#include "risley/jobs/prepared_recording.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"

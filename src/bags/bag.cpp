@@ -4,7 +4,6 @@
 
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -46,18 +45,9 @@ std::string_view name_of(BagKind kind) {
   return "mcap";
 }
 
-std::optional<BagKind> bag_kind_of_file(const std::string& path) {
-  if (is_folder(path)) {
-    try {
-      return bag_kind_of_file(files_of_bag_folder(path).front());
-    } catch (const FileError&) {
-      return std::nullopt;
-    }
-  }
+std::optional<BagKind> bag_kind_of(const io::InputFile& file) {
   std::array<char, 32> head{};
-  std::ifstream stream(path, std::ios::binary);
-  stream.read(head.data(), static_cast<std::streamsize>(head.size()));
-  return bag_kind({head.data(), static_cast<std::size_t>(stream.gcount())});
+  return bag_kind({head.data(), file.read(0, head.data(), head.size())});
 }
 
 std::string words_of(const std::vector<Topic>& topics) {
@@ -104,29 +94,30 @@ Topic ros1_topic(const std::string& name, const std::string& type, const std::st
   return topic;
 }
 
-std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind, const Progress& progress) {
-  if (is_folder(path)) return open_bag_folder(path, files_of_bag_folder(path), kind, progress);
-  switch (kind) {
+std::unique_ptr<Bag> open_bag(const io::InputFile& file, const Progress& progress) {
+  const std::optional<BagKind> kind = bag_kind_of(file);
+  if (!kind) throw FileError(file.path(), {0, {}}, "is not a ROS 1 or ROS 2 bag");
+  switch (*kind) {
     case BagKind::ros1:
-      return open_ros1_bag(path, progress);
+      return open_ros1_bag(file, progress);
     case BagKind::ros2:
-      return open_ros2_bag(path, progress);
+      return open_ros2_bag(file.path(), progress);
     case BagKind::mcap:
       break;
   }
-  return open_mcap_bag(path, progress);
+  return open_mcap_bag(file, progress);
 }
 
 std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress) {
-  const std::string first = is_folder(path) ? files_of_bag_folder(path).front() : path;
-  const std::optional<BagKind> kind = bag_kind_of_file(first);
-  if (!kind) throw FileError(first, {0, {}}, "is not a ROS 1 or ROS 2 bag");
-  return open_bag(path, *kind, progress);
+  return is_folder(path) ? open_bag_folder(path, progress)
+                         : open_bag(io::InputFile(path), progress);
 }
 
 std::vector<Topic> list_topics(const std::string& path, const Progress& progress) {
-  if (!is_folder(path) && bag_kind_of_file(path) == BagKind::ros1) return list_ros1_topics(path);
-  return open_bag(path, progress)->topics();
+  if (is_folder(path)) return open_bag(path, progress)->topics();
+  const io::InputFile file(path);
+  if (bag_kind_of(file) == BagKind::ros1) return list_ros1_topics(file);
+  return open_bag(file, progress)->topics();
 }
 
 }  // namespace risley::bags

@@ -112,10 +112,10 @@ auto key_of(const Topic& topic) {
 /// Several bags as one. A topic is the same in all of them if its name and type are.
 class BagFolder final : public Bag {
  public:
-  BagFolder(const std::string& folder, std::vector<std::string> files, BagKind kind,
+  BagFolder(const std::string& folder, std::vector<io::InputFile> files, BagKind kind,
             const Progress& progress)
       : Bag(kind, folder, progress), files_(std::move(files)) {
-    for (const std::string& file : files_) {
+    for (const io::InputFile& file : files_) {
       progress_.check();
       try {
         const std::unique_ptr<Bag> bag = open_file(file);
@@ -171,14 +171,14 @@ class BagFolder final : public Bag {
   }
 
  private:
-  std::unique_ptr<Bag> open_file(const std::string& file) const {
-    if (bag_kind_of_file(file) != kind()) {
+  std::unique_ptr<Bag> open_file(const io::InputFile& file) const {
+    if (bag_kind_of(file) != kind()) {
       throw FileError(
-          file, {0, {}},
+          file.path(), {0, {}},
           fmt::format("expected a bag of the same kind as the first file of the folder, {}",
                       name_of(kind())));
     }
-    return open_bag(file, kind(), progress_);
+    return open_bag(file, progress_);
   }
 
   std::size_t find(const Topic& topic) const {
@@ -202,7 +202,7 @@ class BagFolder final : public Bag {
     part_ = std::move(part);
   }
 
-  std::vector<std::string> files_;
+  std::vector<io::InputFile> files_;
   std::vector<bool> wanted_;
   std::unique_ptr<Bag> part_;          ///< the file that is being read
   std::size_t read_ = 0;               ///< files before it
@@ -256,9 +256,12 @@ std::vector<std::string> files_of_bag_folder(const std::string& folder) {
   return files;
 }
 
-std::unique_ptr<Bag> open_bag_folder(const std::string& folder, std::vector<std::string> files,
-                                     BagKind kind, const Progress& progress) {
-  return std::make_unique<BagFolder>(folder, std::move(files), kind, progress);
+std::unique_ptr<Bag> open_bag_folder(const std::string& folder, const Progress& progress) {
+  const std::vector<std::string> names = files_of_bag_folder(folder);
+  const std::vector<io::InputFile> files(names.begin(), names.end());
+  const std::optional<BagKind> kind = bag_kind_of(files.front());
+  if (!kind) throw FileError(files.front().path(), {0, {}}, "is not a ROS 2 bag");
+  return std::make_unique<BagFolder>(folder, files, *kind, progress);
 }
 
 }  // namespace risley::bags

@@ -44,15 +44,17 @@ std::optional<MessageKind> ros2_kind(std::string_view type);
 /// @param md5  empty where it is not known: then the name decides
 Topic ros1_topic(const std::string& name, const std::string& type, const std::string& md5);
 
-std::unique_ptr<Bag> open_ros1_bag(const std::string& path,
-                                   const Progress& progress);  // ros1_bag.cpp
-std::vector<Topic> list_ros1_topics(const std::string& path);  // ros1_bag.cpp
+std::unique_ptr<Bag> open_ros1_bag(const io::InputFile& file,
+                                   const Progress& progress);    // ros1_bag.cpp
+std::vector<Topic> list_ros1_topics(const io::InputFile& file);  // ros1_bag.cpp
 std::unique_ptr<Bag> open_ros2_bag(const std::string& path,
                                    const Progress& progress);  // ros2_bag.cpp
-std::unique_ptr<Bag> open_mcap_bag(const std::string& path,
+std::unique_ptr<Bag> open_mcap_bag(const io::InputFile& file,
                                    const Progress& progress);  // mcap_bag.cpp
-/// A folder of bags of one kind. @param files  as files_of_bag_folder() gives them
-std::unique_ptr<Bag> open_bag_folder(const std::string& folder, std::vector<std::string> files,
-                                     BagKind kind, const Progress& progress);  // bag_folder.cpp
+/// A folder of bags of one kind, as files_of_bag_folder() takes it.
+std::unique_ptr<Bag> open_bag_folder(const std::string& folder,
+                                     const Progress& progress);  // bag_folder.cpp
+/// The kind of a bag; nothing where it is none.
+std::optional<BagKind> bag_kind_of(const io::InputFile& file);  // bag.cpp
 
 }  // namespace risley::bags

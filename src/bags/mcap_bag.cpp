@@ -104,8 +104,8 @@ Topic topic_of_channel(const Channel& channel, const std::string& type) {
 
 class McapBag final : public Bag {
  public:
-  McapBag(const std::string& path, const Progress& progress)
-      : Bag(BagKind::mcap, path, progress), file_(path) {
+  McapBag(const io::InputFile& file, const Progress& progress)
+      : Bag(BagKind::mcap, file.path(), progress), file_(file) {
     check_beginning();
     find_end();
     if (!take_summary()) look_for_channels();
@@ -628,8 +628,8 @@ class McapBag final : public Bag {
 
 }  // namespace
 
-std::unique_ptr<Bag> open_mcap_bag(const std::string& path, const Progress& progress) {
-  return std::make_unique<McapBag>(path, progress);
+std::unique_ptr<Bag> open_mcap_bag(const io::InputFile& file, const Progress& progress) {
+  return std::make_unique<McapBag>(file, progress);
 }
 
 }  // namespace risley::bags

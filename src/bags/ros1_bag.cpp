@@ -83,13 +83,13 @@ std::vector<Topic> topics_of(std::vector<TopicKey> keys, std::vector<TopicKey>* 
 class BagStructure {
  public:
   /// @throws FileError
-  static void check(const std::string& path, const Progress& progress) {
-    BagStructure(path).check_records(progress);
+  static void check(const io::InputFile& file, const Progress& progress) {
+    BagStructure(file).check_records(progress);
   }
 
   /// The topics by the connections of the index. @throws FileError
-  static std::vector<Topic> topics(const std::string& path) {
-    return BagStructure(path).index_topics();
+  static std::vector<Topic> topics(const io::InputFile& file) {
+    return BagStructure(file).index_topics();
   }
 
  private:
@@ -108,11 +108,8 @@ class BagStructure {
 
     std::uint64_t data_bytes() const { return end - data; }
   };
-  explicit BagStructure(const std::string& path) : path_(path), stream_(path, std::ios::binary) {
-    stream_.seekg(0, std::ios::end);
-    size_ = static_cast<std::uint64_t>(stream_.tellg());
-    if (!stream_) throw FileError(path_, {}, "cannot be read");
-  }
+  explicit BagStructure(const io::InputFile& file)
+      : path_(file.path()), file_(file), size_(file.size()) {}
 
   [[noreturn]] void fail(std::uint64_t offset, const std::string& problem) const {
     if (unpacked_.empty()) throw FileError(path_, {offset, {}}, problem);
@@ -132,9 +129,7 @@ class BagStructure {
       std::copy_n(unpacked_.data() + offset, count, bytes);
       return;
     }
-    stream_.seekg(static_cast<std::streamoff>(offset));
-    stream_.read(bytes, static_cast<std::streamsize>(count));
-    if (!stream_) fail(offset, "cannot be read");
+    if (file_.read(offset, bytes, count) < count) fail(offset, "cannot be read");
   }
   std::uint32_t read_u32(std::uint64_t offset) {
     std::uint32_t value = 0;
@@ -388,7 +383,7 @@ class BagStructure {
   }
 
   std::string path_;
-  std::ifstream stream_;
+  io::InputFile file_;
   std::uint64_t size_ = 0;
   std::vector<std::uint64_t> chunks_;
   std::vector<std::uint32_t> messages_;  ///< where those of the last chunk begin in it
@@ -397,11 +392,12 @@ class BagStructure {
 
 class Ros1Bag final : public Bag {
  public:
-  Ros1Bag(const std::string& path, const Progress& progress) : Bag(BagKind::ros1, path, progress) {
-    BagStructure::check(path, progress_);
+  Ros1Bag(const io::InputFile& file, const Progress& progress)
+      : Bag(BagKind::ros1, file.path(), progress), file_(file) {
+    BagStructure::check(file, progress_);
     guarded("be opened", [&] {
       bag_.reset(new rosbag::Bag);
-      bag_->open(path, rosbag::bagmode::Read);
+      bag_->open(file.name_for_libraries(), rosbag::bagmode::Read);
       find_topics();
     });
   }
@@ -472,6 +468,7 @@ class Ros1Bag final : public Bag {
     return static_cast<std::size_t>(found - known_.begin());
   }
 
+  io::InputFile file_;  ///< open as long as the library reads it
   std::unique_ptr<rosbag::Bag, DeleteInRosbag> bag_;
   std::unique_ptr<rosbag::View, DeleteInRosbag> view_;
   rosbag::View::iterator position_;
@@ -483,10 +480,12 @@ class Ros1Bag final : public Bag {
 
 }  // namespace
 
-std::unique_ptr<Bag> open_ros1_bag(const std::string& path, const Progress& progress) {
-  return std::make_unique<Ros1Bag>(path, progress);
+std::unique_ptr<Bag> open_ros1_bag(const io::InputFile& file, const Progress& progress) {
+  return std::make_unique<Ros1Bag>(file, progress);
 }
 
-std::vector<Topic> list_ros1_topics(const std::string& path) { return BagStructure::topics(path); }
+std::vector<Topic> list_ros1_topics(const io::InputFile& file) {
+  return BagStructure::topics(file);
+}
 
 }  // namespace risley::bags

@@ -536,16 +536,17 @@ Solution solve(const Estimate& estimate, const EstimateOptions& options, const P
 /// A start from the first second, or, where that holds too little, from the first place in the
 /// series that has enough.
 Start start_anywhere(const PackedSeries& series, const AngleSeries& head,
-                     const EstimateOptions& options, const Estimate& estimate,
+                     const EstimateOptions& options, const Estimate& estimate, StartFindings found,
                      const Progress& progress) {
-  const auto start_of = [&](const AngleSeries& shots) {
+  const auto start_of = [&](const AngleSeries& shots, StartFindings* known = nullptr) {
     progress.check();
     return find_start(shots, options.sensor,
                       {estimate.free, options.angle_noise.value_or(options.sensor.angle_noise),
-                       options.mirrored, options.turned});
+                       options.mirrored, options.turned},
+                      known);
   };
   try {
-    return start_of(head);
+    return start_of(head, &found);
   } catch (const EstimationError& error) {
     std::optional<WrongClock> wrong_clock;
     if (const auto* own = dynamic_cast<const WrongClock*>(&error)) wrong_clock = *own;
@@ -602,7 +603,7 @@ std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
 }
 
 Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
-                  const EstimateOptions& options, const Progress& progress) {
+                  const EstimateOptions& options, const Progress& progress, StartFindings found) {
   if (series.size() == 0) throw EstimationError("the recording holds no valid shot");
   Estimate estimate;
   estimate.method = method;
@@ -633,7 +634,7 @@ Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
   estimate.start = start_anywhere(
       estimate.series,
       head_is_used ? head : estimate.series.rows({0, std::min(kHeadRows, estimate.series.size())}),
-      options, estimate, progress);
+      options, estimate, head_is_used ? std::move(found) : StartFindings(), progress);
   estimate.mirrored = estimate.start.mirrored;
   if (estimate.start.mirrored || estimate.start.frame) {
     estimate.series.change([&](AngleSeries& rows) { prepare_shots(rows, estimate.start); });

@@ -33,10 +33,9 @@ namespace {
 constexpr double kAccelerationSigma = radians_from_degrees(200.0);
 /// Shots that a start is fitted to, at first and where answers have to be told apart.
 constexpr std::size_t kEnoughShots = 1000, kManyShots = 20000;
-/// Speeds are first looked for so near to the sensor's, as a share of them; those of a sensor whose
-/// clock or rotors are further off are found among all pairs.
-constexpr double kUsualShare = 0.06, kFarthestShare = 0.2;
-constexpr std::size_t kMostCandidates = 4;
+/// Speeds of a sensor whose clock or rotors are further off than is usual are found among all
+/// pairs, within this share of the sensor's.
+constexpr double kFarthestShare = 0.2;
 /// A pair of lines that leaves so many times as much as the best need not be tried, unless it
 /// leaves no more than what two lines cannot describe anyway, as a mean square.
 constexpr double kHopeless = 4.0, kSecondOrder = 3e-5;
@@ -258,18 +257,35 @@ struct Answer {
 class StartWindow {
  public:
   /// @param frame  of the recording, roughly
+  /// @param found  about the head
   StartWindow(const AngleSeries& head, const sensors::Sensor& sensor, const StartOptions& options,
-              const Eigen::Matrix3d& frame)
+              const Eigen::Matrix3d& frame, StartFindings& found)
       : options_(options),
+        found_(found),
         frame_(frame),
-        series_(head),
+        turned_(frame.isIdentity() ? AngleSeries() : head),
+        series_(frame.isIdentity() ? head : turned_),
         noise_(least_noise(options)),
         frame_parameters_(frame_parameters(sensor.prisms(), kFrameSigma)) {
-    if (!frame.isIdentity()) turn(series_, frame.transpose());
-    search_.emplace(series_);
+    if (frame.isIdentity()) {
+      if (!found.lines) found.lines = std::make_shared<const LineSearch>(head);
+      search_ = found.lines;
+    } else {
+      turn(turned_, frame.transpose());
+      search_ = std::make_shared<const LineSearch>(turned_);
+    }
   }
+  StartWindow(const StartWindow&) = delete;
+  StartWindow& operator=(const StartWindow&) = delete;
 
   const LineSearch& search() const { return *search_; }
+  /// The lines near a hypothesis's speeds.
+  std::vector<RotorLines> near(const std::vector<double>& speeds) const {
+    if (search_ != found_.lines) return search_->near(speeds, kUsualShare, kMostMinima);
+    const auto [known, is_new] = found_.near.try_emplace(speeds);
+    if (is_new) known->second = search_->near(speeds, kUsualShare, kMostMinima);
+    return known->second;
+  }
 
   /// @param most           shots to take part
   /// @param frame_is_free  whether the frame's turn is fitted too
@@ -351,10 +367,12 @@ class StartWindow {
   }
 
   const StartOptions& options_;
+  StartFindings& found_;
   Eigen::Matrix3d frame_;
-  AngleSeries series_;
+  AngleSeries turned_;
+  const AngleSeries& series_;
   double noise_;
-  std::optional<LineSearch> search_;
+  std::shared_ptr<const LineSearch> search_;
   std::vector<FreeParameter> frame_parameters_;
 };
 
@@ -492,9 +510,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
     }
     trials.insert(trials.end(), twins.begin(), twins.end());
     if (twin != nullptr) continue;
-    for (RotorLines& lines : search.near(speeds, kUsualShare, kMostCandidates)) {
-      trials.push_back({&h, std::move(lines)});
-    }
+    for (const RotorLines& lines : window.near(speeds)) trials.push_back({&h, lines});
   }
   std::vector<Answer> answers = answers_of(window, trials, frame_is_free);
   if (answers.empty() || answers.front().fit.rms > kGoodResidual) {
@@ -502,7 +518,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
     for (const double speed : sensor.angular_velocity) fastest = std::max(fastest, std::abs(speed));
     std::vector<RotorLines> everywhere;
     if (turning_rotors(sensor) == 2 && sensor.prisms() == 2) {
-      everywhere = search.anywhere(2.1 * fastest, kMostCandidates);
+      everywhere = search.anywhere(2.1 * fastest, kMostMinima);
     }
     std::vector<Trial> farther;
     for (const RotorLines& lines : everywhere) {
@@ -565,14 +581,14 @@ Eigen::Vector3d mean_direction(const AngleSeries& series) {
 /// The frame about whose X axis the lines turn, to a degree or so: the constant of the fit says by
 /// how much the axis was missed.
 Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sensor,
-                             const StartOptions& options) {
+                             const StartOptions& options, StartFindings& found) {
   const Eigen::Vector3d middle = mean_direction(head);
   Eigen::Matrix3d frame =
       recording_from_sensor({std::atan2(middle.y(), middle.x()),
                              std::atan2(-middle.z(), std::hypot(middle.x(), middle.y()))});
   constexpr int kRounds = 6;
   for (int round = 0; round < kRounds; ++round) {
-    const StartWindow window(head, sensor, options, frame);
+    const StartWindow window(head, sensor, options, frame, found);
     std::optional<RotorLines> best;
     for (const Hypothesis& h : hypotheses_of(sensor, options.mirrored)) {
       for (const RotorLines& lines : window.search().near(h.recorded_speeds(), kUsualShare, 1)) {
@@ -592,10 +608,16 @@ Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sen
   return frame;
 }
 
-}  // namespace
+/// Whether a start of one is a start of the other.
+bool turn_alike(const sensors::Sensor& a, const sensors::Sensor& b) {
+  return a.train.face_order() == b.train.face_order() && a.train.emitters() == b.train.emitters() &&
+         a.train.parameters() == b.train.parameters() && a.angular_velocity == b.angular_velocity &&
+         a.combination == b.combination && a.combinations == b.combinations &&
+         a.field_of_view == b.field_of_view;
+}
 
-Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
-                 const StartOptions& options) {
+Start new_start(const AngleSeries& head, const sensors::Sensor& sensor, const StartOptions& options,
+                StartFindings& found) {
   if (turning_rotors(sensor) == 0) {
     throw InvalidArgument(fmt::format(
         "{}: the speeds of all rotors are 0 deg/s, at least one must turn", sensor.name));
@@ -615,16 +637,31 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
   const bool turned =
       options.turned.value_or(share_outside(head, sensor.field_of_view) > kFewOutside);
   const std::vector<Hypothesis> hypotheses = hypotheses_of(sensor, options.mirrored);
-  const StartWindow window(
-      head, sensor, options,
-      turned ? turned_frame(head, sensor, options) : Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
-  const Answer found = find_in_window(window, sensor, hypotheses, turned);
-  Start start = window.start_of(found);
+  const StartWindow window(head, sensor, options,
+                           turned ? turned_frame(head, sensor, options, found)
+                                  : Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
+                           found);
+  const Answer answer = find_in_window(window, sensor, hypotheses, turned);
+  Start start = window.start_of(answer);
   if (turned || options.turned || options.free.empty()) return start;
   // A small turn leaves the shots in the field of view and shows in the residuals alone.
-  Start free = window.start_of(window.answer(found.trial, kEnoughShots, true));
+  Start free = window.start_of(window.answer(answer.trial, kEnoughShots, true));
   const bool far = std::hypot(free.frame->yaw, free.frame->pitch) > kLeastTurn;
   if (far && free.residual_rms < (1.0 - kTurnGain) * start.residual_rms) return free;
+  return start;
+}
+
+}  // namespace
+
+Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
+                 const StartOptions& options, StartFindings* found) {
+  StartFindings own;
+  if (found == nullptr) found = &own;
+  for (const StartFindings::Known& known : found->starts) {
+    if (known.options == options && turn_alike(known.sensor, sensor)) return known.start;
+  }
+  Start start = new_start(head, sensor, options, *found);
+  found->starts.push_back({sensor, options, start});
   return start;
 }
 

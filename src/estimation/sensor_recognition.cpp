@@ -27,9 +27,6 @@
 namespace risley::estimation {
 namespace {
 
-/// How far the clock of a recording may be off, and rotors from their nominal speeds.
-constexpr double kSpeedShare = 0.06;
-constexpr std::size_t kMostMinima = 4;
 constexpr int kMostFrames = 5;
 /// The axis has been found when it moves by less, and is lost when by more, as a sine.
 constexpr double kAxisFound = 0.01, kAxisLost = 0.5;
@@ -169,6 +166,8 @@ AngleSeries in_frame(const AngleSeries& shots, const Eigen::Matrix3d& frame) {
   return turned;
 }
 
+using LinesNear = decltype(StartFindings::near);
+
 /// Matches lines of sensors with shots, in one frame of the recording after the other.
 class LineMatcher {
  public:
@@ -181,10 +180,11 @@ class LineMatcher {
     }
   }
 
-  /// Tries every candidate in a frame. @return the optical axis of the best one there
-  Complex try_frame(const AngleSeries& shots, const Eigen::Matrix3d& frame) {
-    const std::map<std::vector<double>, std::vector<RotorLines>> known =
-        lines_near_speeds(LineSearch(in_frame(shots, frame)));
+  /// Tries every candidate in a frame. @param search  in the shots, turned back by the frame
+  /// @return the optical axis of the best one there
+  /// @param[in,out] known  lines near some speeds
+  Complex try_frame(const LineSearch& search, const Eigen::Matrix3d& frame, LinesNear& known) {
+    find_lines_near(search, known);
     double least = std::numeric_limits<double>::infinity();
     Complex axis = 0;
     for (SensorMatch& match : matches_) {
@@ -252,24 +252,21 @@ class LineMatcher {
     return expected;
   }
 
-  /// The lines of a recording near the speeds that candidates have, by these.
-  std::map<std::vector<double>, std::vector<RotorLines>> lines_near_speeds(
-      const LineSearch& search) const {
-    std::map<std::vector<double>, std::vector<RotorLines>> found;
+  /// Adds the lines of a recording near the speeds that candidates have.
+  void find_lines_near(const LineSearch& search, LinesNear& found) const {
+    std::vector<LinesNear::value_type*> wanted;
     for (const Candidate& candidate : candidates_) {
       for (const sensors::Sensor& sensor : candidate.combinations) {
         for (const bool mirrored : {false, true}) {
-          found.try_emplace(expected_lines(sensor, candidate.lines, mirrored).speeds);
+          const auto [one, is_new] =
+              found.try_emplace(expected_lines(sensor, candidate.lines, mirrored).speeds);
+          if (is_new) wanted.push_back(&*one);
         }
       }
     }
-    std::vector<decltype(found)::value_type*> each;
-    each.reserve(found.size());
-    for (auto& one : found) each.push_back(&one);
-    parallel::for_each(each.size(), [&](std::size_t i) {
-      each[i]->second = search.near(each[i]->first, kSpeedShare, kMostMinima);
+    parallel::for_each(wanted.size(), [&](std::size_t i) {
+      wanted[i]->second = search.near(wanted[i]->first, kUsualShare, kMostMinima);
     });
-    return found;
   }
 
   BeamSource beams_;
@@ -296,20 +293,25 @@ std::vector<std::uint8_t> emitters_in_order(const FiringOrder& order, int emitte
 }
 
 SensorRecognition recognise_sensor(const AngleSeries& head,
-                                   std::span<const sensors::Sensor> candidates, BeamSource beams) {
+                                   std::span<const sensors::Sensor> candidates, BeamSource beams,
+                                   StartFindings* found) {
   SensorRecognition result;
   if (candidates.empty()) return result;
-  const ShotRange window = LineSearch(head).shots();
-  const AngleSeries shots = rows_of(head, window.begin, window.end);
+  StartFindings own;
+  if (found == nullptr) found = &own;
+  if (!found->lines) found->lines = std::make_shared<const LineSearch>(head);
   LineMatcher matcher(candidates, beams);
-  Complex axis = matcher.try_frame(shots, Eigen::Matrix3d::Identity());
+  Complex axis = matcher.try_frame(*found->lines, Eigen::Matrix3d::Identity(), found->near);
   result.matches = matcher.sorted();
   if (!lines_decide(result.matches) || std::abs(axis) > kAxisFound) {
     const bool near = lines_decide(result.matches);
+    const ShotRange window = found->lines->shots();
+    const AngleSeries shots = rows_of(head, window.begin, window.end);
     Eigen::Matrix3d frame =
         near ? frame_with_axis(Eigen::Matrix3d::Identity(), axis) : frame_about_mean(shots);
     for (int round = 0; round < kMostFrames; ++round) {
-      axis = matcher.try_frame(shots, frame);
+      LinesNear known;
+      axis = matcher.try_frame(LineSearch(in_frame(shots, frame)), frame, known);
       if (std::abs(axis) < kAxisFound || std::abs(axis) > kAxisLost) break;
       frame = frame_with_axis(frame, axis);
     }
@@ -321,7 +323,7 @@ SensorRecognition recognise_sensor(const AngleSeries& head,
   const double worth = kWorthATrial * result.matches.front().misfit;
   for (SensorMatch& match : result.matches) {
     if (!(match.misfit <= worth)) continue;
-    match.residual = start_residual(head, candidates[match.candidate], match.order, beams);
+    match.residual = start_residual(head, candidates[match.candidate], match.order, beams, found);
   }
   std::stable_sort(result.matches.begin(), result.matches.end(),
                    [](const SensorMatch& a, const SensorMatch& b) {
@@ -337,9 +339,15 @@ SensorRecognition recognise_sensor(const AngleSeries& head,
 }
 
 std::optional<double> start_residual(const AngleSeries& head, const sensors::Sensor& sensor,
-                                     const FiringOrder& order, BeamSource beams) {
-  AngleSeries shots = head;
-  if (beams == BeamSource::counted) number_beams(shots, sensor, order);
+                                     const FiringOrder& order, BeamSource beams,
+                                     StartFindings* found) {
+  AngleSeries numbered;
+  if (beams == BeamSource::counted) {
+    numbered = head;
+    number_beams(numbered, sensor, order);
+    found = nullptr;
+  }
+  const AngleSeries& shots = beams == BeamSource::counted ? numbered : head;
   StartOptions options;
   EstimateOptions usual;
   usual.sensor = sensor;
@@ -347,7 +355,7 @@ std::optional<double> start_residual(const AngleSeries& head, const sensors::Sen
   options.angle_noise = sensor.angle_noise;
   options.mirrored.reset();
   try {
-    const Start start = find_start(shots, sensor, options);
+    const Start start = find_start(shots, sensor, options, found);
     // Where times are wrong, parameters bend as far as they can and mean nothing.
     constexpr double kRightTimes = radians_from_degrees(0.1);
     if (start.residual_rms > kRightTimes) return start.residual_rms;

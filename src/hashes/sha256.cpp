@@ -27,13 +27,13 @@ std::string hexadecimal(const unsigned char* digest, unsigned int length) {
 
 }  // namespace
 
-std::string sha256_of_file(const std::string& path, const Progress& progress) {
+std::string sha256_of_file(const io::InputFile& file, const Progress& progress) {
   auto in_library = io::ForkLock::instance().share();
   const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(),
                                                                    EVP_MD_CTX_free);
   require_done(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
   in_library.unlock();
-  io::read_bytes(path, [&](std::span<const char> bytes) {
+  io::read_bytes(file, [&](std::span<const char> bytes) {
     progress.check();
     const auto again = io::ForkLock::instance().share();
     require_done(EVP_DigestUpdate(context.get(), bytes.data(), bytes.size()) == 1);

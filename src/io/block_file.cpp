@@ -31,40 +31,65 @@ int FileDescriptor::close() {
   return result == 0 ? 0 : errno;
 }
 
-BlockInput::BlockInput(std::string path)
-    : path_(std::move(path)), file_(::open(path_.c_str(), O_RDONLY | O_CLOEXEC)) {
-  if (file_.get() < 0) {
-    throw FileError(path_, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
-  }
+InputFile::InputFile(std::string path, std::string_view expected) : path_(std::move(path)) {
+  // A pipe would keep open() waiting without O_NONBLOCK, which regular files do not know.
+  const int descriptor = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  const int problem = errno;
+  file_ = std::make_shared<const FileDescriptor>(descriptor);
   struct stat status {};
-  if (::fstat(file_.get(), &status) != 0 || !S_ISREG(status.st_mode)) {
-    throw FileError(path_, {}, "is not a regular file");
+  const bool found =
+      descriptor < 0 ? ::stat(path_.c_str(), &status) == 0 : ::fstat(descriptor, &status) == 0;
+  if (!found && problem == ENOENT) throw FileError(path_, {}, "no such file");
+  if (found && !S_ISREG(status.st_mode)) {
+    throw FileError(
+        path_, {},
+        fmt::format("is {}, expected {}",
+                    S_ISDIR(status.st_mode) ? "a folder" : "not a regular file", expected));
+  }
+  if (descriptor < 0 || !found) {
+    throw FileError(path_, {}, fmt::format("cannot be read: {}", std::strerror(problem)));
   }
   size_ = static_cast<std::uint64_t>(status.st_size);
-  block_.resize(std::min<std::uint64_t>(kBlockBytes, size_));
 }
+
+std::string InputFile::name_for_libraries() const {
+  std::string name = fmt::format("/proc/{}/fd/{}", ::getpid(), file_->get());
+  return ::access(name.c_str(), R_OK) == 0 ? name : path_;
+}
+
+std::size_t InputFile::read(std::uint64_t offset, void* bytes, std::size_t most) const {
+  std::size_t done = 0;
+  while (done < most) {
+    const ssize_t got = ::pread(file_->get(), static_cast<char*>(bytes) + done, most - done,
+                                static_cast<off_t>(offset + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) {
+      throw FileError(path_, {offset + done, {}},
+                      fmt::format("cannot be read: {}", std::strerror(errno)));
+    }
+    if (got == 0) break;
+    done += static_cast<std::size_t>(got);
+  }
+  return done;
+}
+
+BlockInput::BlockInput(InputFile file)
+    : file_(std::move(file)), block_(std::min<std::uint64_t>(kBlockBytes, file_.size())) {}
 
 const std::uint8_t* BlockInput::at(std::uint64_t offset, std::size_t count) {
   const bool held = offset >= block_offset_ && offset - block_offset_ <= block_bytes_ &&
                     count <= block_bytes_ - (offset - block_offset_);
   if (!held) {
-    if (count > block_.size() || offset > size_ - count) {
+    if (count > block_.size() || offset > size() - count) {
       throw InvalidArgument(fmt::format("bytes = [{}, {}), allowed at most {} within [0, {})",
-                                        offset, offset + count, block_.size(), size_));
+                                        offset, offset + count, block_.size(), size()));
     }
     block_offset_ = offset;
     block_bytes_ = 0;
-    while (block_bytes_ < count) {
-      const ssize_t got =
-          ::pread(file_.get(), block_.data() + block_bytes_, block_.size() - block_bytes_,
-                  static_cast<off_t>(offset + block_bytes_));
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0) {
-        throw FileError(path_, {offset + block_bytes_, {}},
-                        got < 0 ? fmt::format("cannot be read: {}", std::strerror(errno))
-                                : std::string("the file became shorter while it was read"));
-      }
-      block_bytes_ += static_cast<std::size_t>(got);
+    block_bytes_ = file_.read(offset, block_.data(), block_.size());
+    if (block_bytes_ < count) {
+      throw FileError(path(), {offset + block_bytes_, {}},
+                      "the file became shorter while it was read");
     }
   }
   return block_.data() + (offset - block_offset_);

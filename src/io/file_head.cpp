@@ -4,14 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 
 #include <fmt/format.h>
 
-#include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/text_dialect.hpp"
 
@@ -66,21 +62,10 @@ std::string in_plain_dialect(std::string_view text) {
 
 }  // namespace
 
-std::string read_file_head(const std::string& path, std::size_t bytes, std::string_view expected) {
-  namespace fs = std::filesystem;
-  std::error_code code;
-  const fs::file_status status = fs::status(path, code);
-  if (status.type() == fs::file_type::not_found) throw FileError(path, {}, "no such file");
-  if (status.type() != fs::file_type::regular) {
-    throw FileError(path, {}, fmt::format("is not a regular file, expected {}", expected));
-  }
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw FileError(path, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
+std::string read_file_head(const InputFile& file, std::size_t bytes) {
   constexpr std::size_t kBytesPerUnit = 2;
   std::string raw(kBytesPerUnit * std::max(bytes, kDialectBytes), '\0');
-  stream.read(raw.data(), static_cast<std::streamsize>(raw.size()));
-  if (stream.bad()) throw FileError(path, {}, "cannot be read");
-  raw.resize(static_cast<std::size_t>(stream.gcount()));
+  raw.resize(file.read(0, raw.data(), raw.size()));
   std::string text;
   TextDecoder(encoding_of(raw)).append(raw, text);
   text.resize(std::min(text.size(), std::max(bytes, kDialectBytes)));

@@ -15,23 +15,18 @@
 namespace risley::io {
 namespace {
 
-/// An open file, closed whatever happens.
-class Descriptor {
- public:
-  explicit Descriptor(const std::string& path)
-      : value_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {}
-  ~Descriptor() {
-    if (value_ >= 0) ::close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return value_; }
-
- private:
-  int value_;
-};
+constexpr std::size_t kBytesAtOnce = std::size_t{1} << 18;
 
 }  // namespace
+
+void read_bytes(const InputFile& file, const std::function<void(std::span<const char>)>& take) {
+  std::vector<char> buffer(kBytesAtOnce);
+  std::uint64_t offset = 0;
+  while (const std::size_t count = file.read(offset, buffer.data(), buffer.size())) {
+    take({buffer.data(), count});
+    offset += count;
+  }
+}
 
 void read_bytes(const std::string& path, const std::function<void(std::span<const char>)>& take) {
   const auto refuse = [&path](int error) {
@@ -40,9 +35,9 @@ void read_bytes(const std::string& path, const std::function<void(std::span<cons
                     : error == EISDIR ? "is a folder, expected a file"
                                       : fmt::format("cannot be read: {}", std::strerror(error)));
   };
-  const Descriptor file(path);
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) refuse(errno);
-  std::vector<char> buffer(1 << 18);
+  std::vector<char> buffer(kBytesAtOnce);
   while (true) {
     const ssize_t count = ::read(file.get(), buffer.data(), buffer.size());
     if (count == 0) return;

@@ -107,17 +107,8 @@ std::string normalized_header(std::string_view text) {
   return header;
 }
 
-LineReader::LineReader(const std::string& path, LinesOf lines_of)
-    : path_(path), file_(nullptr, &std::fclose), buffer_(kReadBlock) {
-  std::error_code code;
-  if (std::filesystem::is_directory(path, code)) {
-    throw FileError(path, {}, "is a folder, expected a file");
-  }
-  file_.reset(std::fopen(path.c_str(), "rb"));
-  if (!file_) throw FileError(path, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
-  std::setvbuf(file_.get(), nullptr, _IONBF, 0);
-  file_size_ = std::filesystem::file_size(path, code);
-  if (code) file_size_ = 0;
+LineReader::LineReader(InputFile file, LinesOf lines_of)
+    : file_(std::move(file)), buffer_(kReadBlock) {
   refill();
   const TextEncoding encoding = encoding_of({buffer_.data(), end_});
   if (encoding != TextEncoding::utf8) {
@@ -131,24 +122,20 @@ LineReader::LineReader(const std::string& path, LinesOf lines_of)
 }
 
 double LineReader::fraction_read() const {
-  if (file_size_ == 0) return at_end_ ? 1.0 : 0.0;
+  if (file_.size() == 0) return at_end_ ? 1.0 : 0.0;
   const double consumed = static_cast<double>(bytes_read_) - static_cast<double>(end_ - begin_);
-  return std::clamp(consumed / static_cast<double>(file_size_), 0.0, 1.0);
+  return std::clamp(consumed / static_cast<double>(file_.size()), 0.0, 1.0);
 }
 
 void LineReader::require_length(std::size_t length) const {
   if (length <= kLongestLine) return;
   throw FileError(
-      path_, {.byte_offset = {}, .line = line_number_ + 1},
+      file_.path(), {.byte_offset = {}, .line = line_number_ + 1},
       fmt::format("expected a line of at most {} bytes, found a longer one", kLongestLine));
 }
 
 std::size_t LineReader::read_bytes(char* to, std::size_t most) {
-  const std::size_t count = std::fread(to, 1, most, file_.get());
-  if (count == 0 && std::ferror(file_.get()) != 0) {
-    throw FileError(path_, {.byte_offset = bytes_read_, .line = {}},
-                    fmt::format("cannot be read: {}", std::strerror(errno)));
-  }
+  const std::size_t count = file_.read(bytes_read_, to, most);
   at_end_ = count == 0;
   bytes_read_ += count;
   return count;

@@ -129,8 +129,9 @@ calibration::FlightCalibrationOptions settings_of(const CalibrateFlightOptions& 
   return settings;
 }
 
+/// The recordings, then all others.
 std::vector<recordings::Source> inputs_of(const CalibrateFlightOptions& options) {
-  std::vector<recordings::Source> inputs = options.recordings;
+  std::vector<recordings::Source> inputs = held_open(options.recordings);
   for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
   if (!options.control.empty()) inputs.emplace_back(options.control);
   return inputs;
@@ -164,7 +165,8 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
   check_flight_options(options);
   ResultFolder folder(options.files.folder);
   std::optional<InputHashes> hashes;
-  if (folder) hashes.emplace(inputs_of(options), progress);
+  std::vector<recordings::Source> inputs = inputs_of(options);
+  if (folder) hashes.emplace(inputs, progress);
   CalibratedFlight result;
   cloud::MovingPlatform platform = platform_of(options, progress.stage("reading"));
   result.mount = platform.mount;
@@ -176,7 +178,7 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
   result.strips = trajectories::flown_strips(trajectories::Interpolation(platform.trajectory));
   std::vector<RangedRecording> recordings;
   for (std::size_t r = 0; r < options.recordings.size(); ++r) {
-    recordings.push_back(read_ranged(options, r, result, progress));
+    recordings.push_back(read_ranged(std::move(inputs[r]), options, r, result, progress));
   }
   const auto first = std::min_element(recordings.begin(), recordings.end(),
                                       [](const RangedRecording& a, const RangedRecording& b) {

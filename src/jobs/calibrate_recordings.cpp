@@ -109,7 +109,8 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
   calibration::CalibrationOptions settings = checked_settings(options);
   ResultFolder folder(options.files.folder);
   std::optional<InputHashes> hashes;
-  if (folder) hashes.emplace(options.recordings, progress);
+  std::vector<recordings::Source> sources = held_open(options.recordings);
+  if (folder) hashes.emplace(sources, progress);
   CalibratedRecordings result;
   std::vector<RangedRecording> recordings;
   for (std::size_t r = 0; r < options.recordings.size(); ++r) {
@@ -117,7 +118,7 @@ CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& opti
       folder.add_states(states_name(options, r), estimate, options.files.states,
                         hashes->with_input(options.files.provenance, r), own);
     };
-    recordings.push_back(read_ranged(options, r, result, progress,
+    recordings.push_back(read_ranged(std::move(sources[r]), options, r, result, progress,
                                      folder && options.files.states != StatesRows::none
                                          ? EstimateTaker(states)
                                          : EstimateTaker()));

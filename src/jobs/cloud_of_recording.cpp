@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -13,8 +14,8 @@
 #include "risley/core/error.hpp"
 #include "risley/hashes/sha256.hpp"
 #include "risley/jobs/compare_results.hpp"
+#include "risley/jobs/prepared_recording.hpp"
 #include "risley/jobs/provenance.hpp"
-#include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -35,14 +36,9 @@ std::optional<std::chrono::sys_days> day_of(const recordings::Source& recording)
 
 /// Where the recording names its sensor, that has to be of the calibration's kind: to find it out
 /// from the shots takes long.
-void require_same_type(const CloudOfRecordingOptions& options, const sensors::Sensor& calibration,
-                       const Progress& progress) {
-  std::error_code ignored;
-  if (!options.recording.recording() &&
-      !std::filesystem::is_regular_file(options.recording.name(), ignored)) {
-    return;  // read once
-  }
-  const auto reader = recordings::open_recording(options.recording, options.reading, progress);
+void require_same_type(const recordings::Source& recording, const CloudOfRecordingOptions& options,
+                       const sensors::Sensor& calibration, const Progress& progress) {
+  const auto reader = recordings::open_recording(recording, options.reading, progress);
   for (const recordings::Device& device : reader->header().devices) {
     if (device.type == recordings::kUnknownDeviceType || device.type_inferred) continue;
     if (device.type == calibration.device_type) continue;
@@ -66,8 +62,9 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   }
   const sensors::Sensor calibration = load_result(options.calibration);
   cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read
-  require_same_type(options, calibration, progress);
-  std::vector<recordings::Source> inputs{options.recording};
+  recordings::Source recording = options.recording.held_open();
+  require_same_type(recording, options, calibration, progress);
+  std::vector<recordings::Source> inputs{recording};
   if (moves(options.platform)) {
     if (!options.platform.crs.empty()) {  // before anything is read
       const std::string& datum = options.platform.datum;
@@ -77,6 +74,7 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
     for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
   }
   InputHashes hashes(inputs, progress);
+  inputs.clear();
   settings.provenance = [&] {
     Provenance provenance = hashes.with_inputs(options.provenance);
     provenance.emplace_back("calibration", options.calibration);
@@ -87,8 +85,10 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
     return provenance;
   };
   if (!settings.writer.date) settings.writer.date = day_of(options.recording);
-  const SensorFrameRecording input =
-      open_in_sensor_frame(options.recording, options.reading, calibration, progress);
+  PreparedRecording input =
+      prepare_recording(std::exchange(recording, {}), options.reading,
+                        {.sensor_frame = true, .sensor = calibration}, progress);
+  input.source = {};  // and with it what was decoded first
   RecordingCloud result{
       options.recording.name(), options.output, options.calibration, calibration.reference,
       cloud::make_cloud(*input.reader, calibration, options.output, settings, progress)};

@@ -6,20 +6,18 @@
 
 #include <fmt/format.h>
 
+#include "risley/jobs/prepared_recording.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/recordings/writer.hpp"
-
-#include "jobs/packet_recording.hpp"
 
 namespace risley::jobs {
 namespace {
 
 /// The header to write, with a type of sensor where the recording does not tell it.
-recordings::RecordingHeader header_of(const recordings::Reader& reader,
+recordings::RecordingHeader header_of(PreparedRecording& input,
                                       const ConvertRecordingOptions& options,
-                                      const PlacedInput& input, ConvertedRecording& result,
-                                      const Progress& progress) {
-  recordings::RecordingHeader header = reader.header();
+                                      ConvertedRecording& result, const Progress& progress) {
+  recordings::RecordingHeader header = input.reader->header();
   if (options.sensor_type) {
     for (recordings::Device& device : header.devices) {
       const std::string told = recordings::device_type_name(device.type);
@@ -35,9 +33,7 @@ recordings::RecordingHeader header_of(const recordings::Reader& reader,
   recordings::Device& device = header.devices.front();
   const bool named = device.type != recordings::kUnknownDeviceType && !device.type_inferred;
   if (named || header.devices.size() > 1) return header;
-  result.choice = input.choice
-                      ? input.choice
-                      : choose_sensor(options.recording, options.reading, header, {}, progress);
+  result.choice = input.choose({}, progress);
   if (result.choice->chosen_by == ChosenBy::scan) {
     device.type = static_cast<std::uint8_t>(result.choice->sensor.device_type);
   }
@@ -49,12 +45,12 @@ recordings::RecordingHeader header_of(const recordings::Reader& reader,
 ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
                                      const Progress& progress) {
   ConvertedRecording result;
-  const PlacedInput input =
-      place_input(options.recording, options.reading, UntoldShots::guessed, progress.silent());
+  PreparedRecording input = prepare_recording(options.recording, options.reading,
+                                              {.untold = UntoldShots::guessed}, progress.silent());
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const auto writer = recordings::create_recording(
-      options.output, header_of(*reader, options, input, result, progress.silent()),
-      options.format);
+      options.output, header_of(input, options, result, progress.silent()), options.format);
+  input.source = {};  // and with it what was decoded first
   // While one chunk is written, the next is read.
   recordings::Chunk chunk, next;
   parallel::TaskGroup writing;
@@ -78,7 +74,7 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
   result.left_out = writer->left_out();
   result.input_format = reader->header().format;
   result.warnings = reader->warnings();
-  for (const std::string& words : input.words) result.warnings.push_back({{}, words});
+  for (const std::string& words : input.warnings) result.warnings.push_back({{}, words});
   result.time_uncertainty = input.time_uncertainty;
   return result;
 }

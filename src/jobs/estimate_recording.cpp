@@ -113,9 +113,10 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
   check(options);
   ResultFolder folder(options.files.folder);
   std::optional<InputHashes> hashes;
-  if (folder) hashes.emplace(std::vector{options.recording}, progress);
+  recordings::Source recording = options.recording.held_open();
+  if (folder) hashes.emplace(std::vector{recording}, progress);
   EstimationInput input =
-      read_for_estimation({options.recording,
+      read_for_estimation({std::move(recording),
                            options.reading,
                            options.sensor,
                            {.rate = options.rate, .ranges = false, .rows = false}},
@@ -140,8 +141,9 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
   result.head = std::move(input.head);
   result.reading_time = input.reading_time;
   const Stopwatch watch;
-  result.estimate = estimation::estimate(options.method, std::move(input.series), result.head,
-                                         settings, progress.stage("estimating"));
+  result.estimate =
+      estimation::estimate(options.method, std::move(input.series), result.head, settings,
+                           progress.stage("estimating"), std::move(input.found));
   result.solving_time = watch.seconds();
   if (const auto& factor = result.estimate.speed_factor) {
     result.warnings.push_back(clock_words(*factor, result.recording.header.counted_rate));

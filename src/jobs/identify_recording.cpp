@@ -12,12 +12,12 @@
 #include "risley/core/number_text.hpp"
 #include "risley/identification/soundness.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/jobs/prepared_recording.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/plausibility.hpp"
 #include "risley/sensors/preset.hpp"
 
-#include "jobs/packet_recording.hpp"
 #include "jobs/stopwatch.hpp"
 
 namespace risley::jobs {
@@ -26,10 +26,10 @@ namespace {
 using identification::EmitterTiming;
 using identification::Identification;
 
-estimation::AngleSeries read(const IdentifyRecordingOptions& options, IdentifiedRecording& result,
+estimation::AngleSeries read(const recordings::Source& recording,
+                             const IdentifyRecordingOptions& options, IdentifiedRecording& result,
                              const Progress& progress) {
-  const PlacedInput input =
-      place_input(options.recording, options.reading, UntoldShots::left_out, progress);
+  const PreparedRecording input = prepare_recording(recording, options.reading, {}, progress);
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_one_device(header, options.recording.name());
@@ -41,7 +41,7 @@ estimation::AngleSeries read(const IdentifyRecordingOptions& options, Identified
     progress.report(reader->fraction_read());
   }
   for (const auto& warning : reader->warnings()) result.warnings.push_back(warning_text(warning));
-  result.warnings.insert(result.warnings.end(), input.words.begin(), input.words.end());
+  result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
   add_left_out_words(selector.counts(), result.warnings);
   result.cropped = input.choice.has_value();
   if (result.cropped) {
@@ -143,12 +143,12 @@ void say_what_is_never_told(IdentifiedRecording& result) {
       "the first prism, cannot be seen");
 }
 
-void write(const IdentifyRecordingOptions& options, IdentifiedRecording& result,
-           const Progress& progress) {
+void write(const recordings::Source& recording, const IdentifyRecordingOptions& options,
+           IdentifiedRecording& result, const Progress& progress) {
   if (options.output.empty()) return;
   if (result.verdict != IdentificationVerdict::identified && !options.undecided) return;
   sensors::Sensor sensor = result.sensor.sensor;
-  sensor.provenance = with_inputs(options.provenance, {options.recording}, progress);
+  sensor.provenance = with_inputs(options.provenance, {recording}, progress);
   io::write_text_file(options.output, sensors::preset_text(sensor));
   result.written = true;
 }
@@ -172,7 +172,9 @@ IdentifiedRecording identify_recording(const IdentifyRecordingOptions& options,
   progress.check();
   IdentifiedRecording result;
   const Stopwatch reading;
-  const estimation::AngleSeries series = read(options, result, progress.stage("reading"));
+  const recordings::Source recording = options.recording.held_open();
+  const estimation::AngleSeries series =
+      read(recording, options, result, progress.stage("reading"));
   result.reading_time = reading.seconds();
   const Stopwatch solving;
   try {
@@ -192,7 +194,7 @@ IdentifiedRecording identify_recording(const IdentifyRecordingOptions& options,
       sensors::load_sensor(result.like.empty() ? kUsualSensor : result.like));
   judge(result);
   say_what_is_never_told(result);
-  write(options, result, progress.silent());
+  write(recording, options, result, progress.silent());
   return result;
 }
 

@@ -63,8 +63,9 @@ JudgedObservability judge_observability(const ObservabilityOptions& options,
     settings.cartesian = input.whole_steps;
     result.shape = settings.sensor.shape();
     const Progress estimating = progress.stage("estimating");
-    const estimation::Estimate estimate = estimation::estimate(
-        estimation::Method::map, std::move(input.series), input.head, settings, estimating);
+    const estimation::Estimate estimate =
+        estimation::estimate(estimation::Method::map, std::move(input.series), input.head, settings,
+                             estimating, std::move(input.found));
     result.warnings = std::move(input.warnings);
     result.warnings.insert(result.warnings.end(), estimate.warnings.begin(),
                            estimate.warnings.end());

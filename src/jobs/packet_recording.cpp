@@ -10,8 +10,6 @@
 
 #include "risley/core/error.hpp"
 
-#include "jobs/open_input.hpp"
-
 namespace risley::jobs {
 namespace {
 
@@ -22,22 +20,18 @@ constexpr std::size_t kFewestPackets = 10;
 
 }  // namespace
 
-bool PacketRecording::is_one(const recordings::RecordingHeader& header) {
-  return header.packet_shots > 0 && header.devices.size() == 1;
-}
-
-std::optional<PacketRecording> PacketRecording::open(const recordings::Source& source,
-                                                     const recordings::ReadOptions& options,
+std::optional<PacketRecording> PacketRecording::open(const PreparedRecording& recording,
                                                      const Progress& progress) {
+  const recordings::RecordingHeader& header = recording.reader->header();
+  if (header.packet_shots == 0 || header.devices.size() != 1) return std::nullopt;
   recordings::ReadOptions as_it_is;
-  as_it_is.extrinsics = options.extrinsics;
-  const auto reader = open_input(source, as_it_is, progress);
-  if (!is_one(reader->header())) return std::nullopt;
+  as_it_is.extrinsics = recording.reading.extrinsics;
+  const auto reader = recordings::open_recording(recording.source, as_it_is, progress);
   const auto variance = [](float step) { return step * step / 12.0F; };
   PacketRecording result;
   estimation::PacketShots& shots = result.shots_;
   shots.places = reader->header().packet_shots;
-  shots.cartesian = reader->header().cartesian && !options.extrinsics;
+  shots.cartesian = reader->header().cartesian && !as_it_is.extrinsics;
   recordings::Chunk chunk;
   try {
     while (reader->read(chunk)) {
@@ -170,25 +164,6 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
   }
   result.places = places_of_rows(found.place, rate, std::move(found.firing_order));
   result.places.cut_coordinates = found.cut_coordinates;
-  return result;
-}
-
-PlacedInput place_input(const recordings::Source& source, const recordings::ReadOptions& options,
-                        UntoldShots untold, const Progress& progress) {
-  PlacedInput result{options, open_input(source, options, progress), {}, {}, 0};
-  if (!PacketRecording::is_one(result.reader->header())) return result;
-  const auto packets = PacketRecording::open(source, options, progress);
-  if (!packets) return result;
-  result.reading.shot_rate.reset();
-  result.reading.packet_places = packets->middle_places();
-  result.reader = open_input(source, result.reading, progress);
-  result.choice = choose_sensor(source, result.reading, result.reader->header(), {}, progress);
-  PlacedRows placed =
-      packets->place_rows(result.choice->sensor, options.shot_rate, untold, progress);
-  result.reading.packet_places = std::move(placed.places);
-  result.words = std::move(placed.words);
-  result.time_uncertainty = placed.time_uncertainty;
-  result.reader = open_input(source, result.reading, progress);
   return result;
 }
 

@@ -4,24 +4,17 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "risley/core/progress.hpp"
 #include "risley/estimation/packet_places.hpp"
-#include "risley/jobs/sensor_choice.hpp"
+#include "risley/jobs/prepared_recording.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::jobs {
-
-/// What becomes of shots that the rotors do not tell the times of.
-enum class UntoldShots {
-  left_out,  ///< they lose their directions
-  guessed,   ///< they get times in their order
-};
 
 /// When the rows of a recording were fired, as far as it is known.
 struct PlacedRows {
@@ -34,11 +27,8 @@ struct PlacedRows {
 /// shots, and its rows.
 class PacketRecording {
  public:
-  /// Whether a recording has one time for each packet, and is of one sensor.
-  static bool is_one(const recordings::RecordingHeader& header);
   /// Empty for any other recording. One may end within a packet.
-  static std::optional<PacketRecording> open(const recordings::Source& source,
-                                             const recordings::ReadOptions& options,
+  static std::optional<PacketRecording> open(const PreparedRecording& recording,
                                              const Progress& progress);
 
   /// Every shot in the middle of the places that it may have, which is no worse than a few degrees
@@ -62,21 +52,5 @@ class PacketRecording {
   std::vector<std::uint8_t> index_;     // of each row's shot among those of its packet in the file
   std::uint8_t last_beam_ = 0;          // as the kind of packets says
 };
-
-/// A recording that is not estimated, opened, and which sensor made it.
-struct PlacedInput {
-  recordings::ReadOptions reading;  ///< with the places of rows whose packets lack points
-  std::unique_ptr<recordings::Reader> reader;  ///< as reading says, at its first row
-  std::optional<SensorChoice> choice;          ///< where such places were looked for
-  std::vector<std::string> words;              ///< as PlacedRows
-  double time_uncertainty = 0;                 ///< as PlacedRows
-};
-
-/// Opens a recording and finds when the shots of packets that lack points were fired; others are
-/// read as asked for.
-/// @throws EstimationError as PacketRecording::place_rows(); as recordings::open_recording,
-///         choose_sensor()
-PlacedInput place_input(const recordings::Source& source, const recordings::ReadOptions& options,
-                        UntoldShots untold, const Progress& progress);
 
 }  // namespace risley::jobs

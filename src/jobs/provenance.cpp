@@ -24,7 +24,7 @@ bool is_read_once(const std::string& path) {
 }  // namespace
 
 struct InputHashes::Input {
-  recordings::Source source;
+  std::string memory;  ///< name of columns in memory
   /// Files and their SHA-256, which is empty for what can be read only once.
   std::vector<std::pair<std::string, std::string>> hashes{};
   parallel::TaskGroup task{};  ///< that finds them
@@ -38,7 +38,7 @@ struct InputHashes::Input {
       return name;
     };
     task.wait();
-    if (source.recording()) add(source.name());
+    if (!memory.empty()) add(memory);
     for (const auto& [file, hash] : hashes) {
       const std::string name = add(file);
       if (!hash.empty()) provenance.emplace_back(name + "_sha256", hash);
@@ -48,12 +48,14 @@ struct InputHashes::Input {
 
 InputHashes::InputHashes(const std::vector<recordings::Source>& inputs, const Progress& progress) {
   for (const recordings::Source& source : inputs) {
-    Input& input = *inputs_.emplace_back(new Input{source});
-    input.task.run([&input, own = progress.silent()] {
-      for (const std::string& file : recordings::recording_files(input.source)) {
-        input.hashes.emplace_back(file,
-                                  is_read_once(file) ? "" : hashes::sha256_of_file(file, own));
+    Input& input = *inputs_.emplace_back(new Input{source.recording() ? source.name() : ""});
+    input.task.run([&input, source = recordings::Source(source),
+                    own = progress.silent()]() mutable {
+      for (const std::string& file : recordings::recording_files(source)) {
+        input.hashes.emplace_back(
+            file, is_read_once(file) ? "" : hashes::sha256_of_file(source.open_file(file), own));
       }
+      source = {};  // and with it what was read of it
     });
   }
 }

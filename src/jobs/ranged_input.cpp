@@ -38,12 +38,17 @@ void check_ranged_input(const RangedInputOptions& options) {
   require_recordings(options.recordings);
 }
 
-RangedRecording read_ranged(const RangedInputOptions& options, std::size_t number,
-                            RangedInput& result, const Progress& progress,
+std::vector<recordings::Source> held_open(std::vector<recordings::Source> sources) {
+  for (recordings::Source& source : sources) source = source.held_open();
+  return sources;
+}
+
+RangedRecording read_ranged(recordings::Source source, const RangedInputOptions& options,
+                            std::size_t number, RangedInput& result, const Progress& progress,
                             const EstimateTaker& take) {
-  const std::string& path = options.recordings[number].name();
+  const std::string path = source.name();
   EstimationInput input =
-      read_for_estimation({options.recordings[number],
+      read_for_estimation({std::move(source),
                            options.reading,
                            options.sensor,
                            {.rate = options.rate, .ranges = true, .rows = false}},
@@ -75,7 +80,7 @@ RangedRecording read_ranged(const RangedInputOptions& options, std::size_t numbe
   const estimation::Estimate estimate = [&] {
     try {
       return estimation::estimate(estimation::Method::map, std::move(input.series), input.head,
-                                  settings, angles);
+                                  settings, angles, std::move(input.found));
     } catch (const EstimationError& error) {
       throw EstimationError(fmt::format("{}: {}", path, error.what()));
     }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <vector>
 
 #include "risley/calibration/plane_points.hpp"
 #include "risley/core/progress.hpp"
@@ -18,10 +19,15 @@ using EstimateTaker = std::function<void(const estimation::Estimate&, const Prog
 /// @throws InvalidArgument for no recordings, one that is given twice, rate or noise out of range
 void check_ranged_input(const RangedInputOptions& options);
 
+/// Each held open.
+std::vector<recordings::Source> held_open(std::vector<recordings::Source> sources);
+
 /// Reads one recording, finds its rotation angles, and adds to the result what there is to know
 /// beside its shots. Stages: reading, rotation angles.
 /// @throws as read_for_estimation(), estimate(), ranged_recording(); the message names the file
-calibration::RangedRecording read_ranged(const RangedInputOptions& options, std::size_t number,
+/// @param source  the recording of that number, perhaps held open
+calibration::RangedRecording read_ranged(recordings::Source source,
+                                         const RangedInputOptions& options, std::size_t number,
                                          RangedInput& result, const Progress& progress,
                                          const EstimateTaker& take = {});
 

@@ -25,7 +25,8 @@ double interval_ns(const recordings::livox::ShotGrid& grid) {
 
 }  // namespace
 
-RecordedScan::RecordedScan(std::string path, std::uint8_t sensor_type) : path_(std::move(path)) {
+RecordedScan::RecordedScan(std::string path, std::uint8_t sensor_type)
+    : path_(std::move(path)), source_(recordings::Source(path_).held_open()) {
   open();
   const recordings::RecordingHeader& header = reader_->header();
   recordings::require_times(header);
@@ -53,7 +54,7 @@ RecordedScan::RecordedScan(std::string path, std::uint8_t sensor_type) : path_(s
 }
 
 void RecordedScan::open() {
-  reader_ = recordings::open_recording(path_);
+  reader_ = recordings::open_recording(source_);
   chunk_.clear();
   row_ = 0;
   begin_ns_.reset();

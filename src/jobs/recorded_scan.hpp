@@ -35,6 +35,7 @@ class RecordedScan {
   std::int64_t slot_of_row() const;
 
   std::string path_;
+  recordings::Source source_;  ///< held open
   recordings::Device device_;
   recordings::livox::ShotGrid grid_;
   std::unique_ptr<recordings::Reader> reader_;

@@ -63,15 +63,10 @@ std::vector<Sensor> variants_of(const Sensor& sensor) {
   return result;
 }
 
-/// The first shots of a recording and what their beams are.
-struct FirstShots {
-  AngleSeries head;
-  BeamSource beams = BeamSource::recorded;
-};
-
 FirstShots first_shots(const recordings::Source& source, const recordings::ReadOptions& reading,
                        std::span<const Sensor> candidates, const Progress& progress) {
-  FirstShots shots{first_second(source, reading, progress)};
+  FirstShots shots;
+  shots.head = first_second(source, reading, progress);
   if (!reading.shot_rate) return shots;
   const std::vector<std::uint8_t>& beam = shots.head.beam;
   if (std::any_of(beam.begin(), beam.end(), [](std::uint8_t one) { return one != 0; })) {
@@ -88,10 +83,9 @@ FirstShots first_shots(const recordings::Source& source, const recordings::ReadO
 }
 
 /// Empty where there are too few shots.
-std::optional<SensorRecognition> recognised(const FirstShots& shots,
-                                            std::span<const Sensor> candidates) {
+std::optional<SensorRecognition> recognised(FirstShots& shots, std::span<const Sensor> candidates) {
   try {
-    return estimation::recognise_sensor(shots.head, candidates, shots.beams);
+    return estimation::recognise_sensor(shots.head, candidates, shots.beams, &shots.found);
   } catch (const EstimationError&) {
     return std::nullopt;
   }
@@ -104,6 +98,17 @@ std::string misfit_text(double misfit) {
                                : "no lines at all";
 }
 
+std::vector<PresetMisfit> best_two(const SensorRecognition& found,
+                                   std::span<const Sensor> candidates) {
+  std::vector<PresetMisfit> misfits;
+  for (const SensorMatch& match : found.matches) {
+    if (misfits.size() < 2) {
+      misfits.push_back({candidates[match.candidate].name, misfit_of(match)});
+    }
+  }
+  return misfits;
+}
+
 /// What was found of a recognition's best match; its words are the caller's.
 void take(const SensorRecognition& found, std::span<const Sensor> candidates,
           SensorChoice& choice) {
@@ -113,11 +118,7 @@ void take(const SensorRecognition& found, std::span<const Sensor> candidates,
   choice.order = best.order;
   choice.frame = best.frame;
   if (std::abs(best.roll) > kLeastRoll) choice.roll = best.roll;
-  choice.misfits.clear();
-  for (const SensorMatch& match : found.matches) {
-    choice.misfits.push_back({candidates[match.candidate].name, misfit_of(match)});
-    if (choice.misfits.size() == 2) break;
-  }
+  choice.misfits = best_two(found, candidates);
 }
 
 std::string comparison(const std::vector<PresetMisfit>& misfits) {
@@ -130,14 +131,17 @@ std::string comparison(const std::vector<PresetMisfit>& misfits) {
 }
 
 /// Exchanges the type's preset for a variant where the shots leave no doubt.
-void try_variants(const FirstShots& shots, SensorChoice& choice) {
+void try_variants(FirstShots& shots, SensorChoice& choice) {
   const std::vector<Sensor> variants = variants_of(choice.sensor);
   if (variants.empty()) return;
-  const auto own = estimation::start_residual(shots.head, choice.sensor, choice.order, shots.beams);
+  const auto residual = [&](const Sensor& sensor) {
+    return estimation::start_residual(shots.head, sensor, choice.order, shots.beams, &shots.found);
+  };
+  const auto own = residual(choice.sensor);
   const double rounding = std::sqrt(shots.head.zenith_rounding_variance[shots.head.size() / 2]);
   if (!own || *own < kPoorOptics * std::hypot(choice.sensor.angle_noise, rounding)) return;
   for (const Sensor& variant : variants) {
-    const auto other = estimation::start_residual(shots.head, variant, choice.order, shots.beams);
+    const auto other = residual(variant);
     if (!other || !(*other < kBetterOptics * *own)) continue;
     choice.misfits = {{variant.name, *other}, {choice.sensor.name, *own}};
     choice.sensor = variant;
@@ -194,10 +198,7 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
   }
   choice.chosen_by = ChosenBy::guess;
   choice.fits = false;
-  for (const SensorMatch& match : found->matches) {
-    choice.misfits.push_back({candidates[match.candidate].name, misfit_of(match)});
-    if (choice.misfits.size() == 2) break;
-  }
+  choice.misfits = best_two(*found, candidates);
   choice.words = "no built-in preset describes the scan: " + comparison(choice.misfits);
   choice.warnings.push_back(fmt::format(
       "{}; {} is assumed. Option sensor names the sensor, by a preset or a calibration file; the "
@@ -255,7 +256,8 @@ std::string too_near_words(const AngleSeries& shots, const Sensor& sensor) {
 /// Says why no sensor can have made the shots, where that is so.
 std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> candidates) {
   if (shots.size() < recordings::kFewestJudged) return {};
-  if (const auto problem = recordings::not_a_scan(shots.azimuth, shots.zenith, shots.range)) {
+  const double radius = recordings::cone_radius(shots.azimuth, shots.zenith);
+  if (const auto problem = recordings::not_a_scan(radius, shots.size(), shots.range)) {
     return *problem;
   }
   double widest = 0;
@@ -264,9 +266,9 @@ std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> c
     widest = std::max(widest, sensor.field_of_view);
   }
   constexpr double kMargin = radians_from_degrees(10.0);
+  if (radius < 0.5 * widest + kMargin) return {};
   const recordings::DirectionSpread spread =
       recordings::direction_spread(shots.azimuth, shots.zenith);
-  if (spread.radius < 0.5 * widest + kMargin) return {};
   return fmt::format(
       "directions span {} x {} deg (azimuth, zenith), more than the field of view of {}: they are "
       "probably {}",
@@ -337,7 +339,8 @@ bool are_as_counted(const AngleSeries& shots, double rate) {
 template <class Count>
 bool is_at_fault_by_count(std::span<const Sensor> some, double misfit, Count&& count,
                           SensorChoice& choice) {
-  const auto found = recognised(count(), some);
+  FirstShots counted = count();
+  const auto found = recognised(counted, some);
   if (!found || !found->fits || misfit_of(found->matches.front()) > kBetterCounted * misfit) {
     return false;
   }
@@ -352,10 +355,10 @@ bool is_at_fault_by_count(std::span<const Sensor> some, double misfit, Count&& c
 }
 
 /// What the type that a file names says, and whether the shots contradict it.
+/// @param types  gives the presets of all types
 /// @param count  gives the first shots as counted at the rate of that type
-template <class Count>
-SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
-                            std::span<const Sensor> candidates, Count&& count) {
+template <class Types, class Count>
+SensorChoice choose_by_name(FirstShots& shots, const Sensor& named, Types&& types, Count&& count) {
   SensorChoice choice;
   choice.sensor = named;
   const auto alone = recognised(shots, {&named, 1});
@@ -369,6 +372,7 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   }
   const bool by_lines = alone && alone->decided && !alone->matches.front().residual;
   if (!alone || by_lines) return choice;
+  const std::span<const Sensor> candidates = types();
   const auto found = recognised(shots, candidates);
   if (!found || !found->decided) return choice;
   const SensorMatch& best = found->matches.front();
@@ -402,70 +406,77 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
     if (const auto found = recognised(shots, {&*given, 1})) take(*found, {&*given, 1}, choice);
     return choice;
   }
-  const std::vector<Sensor> candidates = type_presets();
+  std::vector<Sensor> all;  // takes a while to read
+  const auto candidates = [&all]() -> std::span<const Sensor> {
+    if (all.empty()) all = type_presets();
+    return all;
+  };
   const recordings::Device& device = header.devices.front();
-  const Sensor* named = nullptr;
+  std::optional<Sensor> named;
   if (device.type != recordings::kUnknownDeviceType) {
-    for (const Sensor& sensor : candidates) {
-      if (sensor.device_type == device.type) named = &sensor;
-    }
-    if (named == nullptr) {
+    named = preset_of_type(device.type);
+    if (!named) {
       throw InvalidArgument(
           fmt::format("there is no built-in preset for the recording's sensor ({}): name one with "
                       "option sensor",
                       recordings::device_type_name(device.type)));
     }
   }
-  if (named != nullptr && (!has_times || !one_sensor)) {
+  if (named && (!has_times || !one_sensor)) {
     choice.sensor = *named;
     choice.chosen_by = ChosenBy::file;
     choice.words = "named by the file";
     return choice;
   }
-  if (!has_times) return choose_without_times(source, reading, candidates, shots, progress);
-  if (one_sensor) shots = first_shots(source, reading, candidates, progress);
-  if (!are_possible(shots, candidates, choice)) {
-    choice.sensor = named != nullptr ? *named : sensors::load_sensor(kUsualSensor);
-    if (named != nullptr) choice.chosen_by = ChosenBy::file;
+  if (!has_times) return choose_without_times(source, reading, candidates(), shots, progress);
+  if (one_sensor) {
+    // Beams that are counted may be those of any.
+    shots = first_shots(source, reading,
+                        reading.shot_rate ? candidates() : std::span<const Sensor>(), progress);
+  }
+  const bool named_may = named && are_possible(shots, {&*named, 1}, choice);
+  if (!named_may && !are_possible(shots, candidates(), choice = {})) {
+    choice.sensor = named ? *named : sensors::load_sensor(kUsualSensor);
+    if (named) choice.chosen_by = ChosenBy::file;
     return choice;
   }
   const auto count = [&] {
     if (reading.shot_rate || are_as_counted(shots.head, named->shot_rate)) return FirstShots{};
     recordings::ReadOptions counting = reading;
     counting.shot_rate = named->shot_rate;
-    return first_shots(source, counting, {named, 1}, progress);
+    return first_shots(source, counting, {&*named, 1}, progress);
   };
-  if (named != nullptr && !device.type_inferred) {
+  if (named && !device.type_inferred) {
     const int lines = choice.lines;
     choice = choose_by_name(shots, *named, candidates, count);
     choice.lines = lines;
     return choice;
   }
-  const auto found = recognised(shots, candidates);
+  const auto found = recognised(shots, candidates());
   const Sensor* const best =
-      found && found->decided ? &candidates[found->matches.front().candidate] : nullptr;
-  if (named != nullptr && best != nullptr &&
+      found && found->decided ? &candidates()[found->matches.front().candidate] : nullptr;
+  if (named && best != nullptr &&
       best->shot_rate != named->shot_rate) {  // the rate within packets and messages is another one
     std::vector<Sensor> some;
-    std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(some),
+    std::copy_if(all.begin(), all.end(), std::back_inserter(some),
                  [&](const Sensor& sensor) { return sensor.shot_rate == named->shot_rate; });
     choice.chosen_by = ChosenBy::scan;
     choice.words = "recognised from the scan, where shots are counted";
     if (is_at_fault_by_count(some, misfit_of(found->matches.front()), count, choice)) return choice;
   }
   if (found && found->decided) {
-    take(*found, candidates, choice);
+    take(*found, all, choice);
     choice.chosen_by = ChosenBy::scan;
     choice.words = "recognised from the scan: " + comparison(choice.misfits);
     try_variants(shots, choice);
-  } else if (named != nullptr) {
+  } else if (named) {
     choice.sensor = *named;
     choice.chosen_by = ChosenBy::file;
     choice.words = "by the rates, tags and returns of the file";
   } else {
-    guess(shots, found, candidates, choice);
+    guess(shots, found, all, choice);
     if (choice.fits != true && one_sensor && !reading.shot_rate && header.packet_shots == 0) {
-      SensorChoice counted = choose_without_times(source, reading, candidates, shots, progress);
+      SensorChoice counted = choose_without_times(source, reading, all, shots, progress);
       if (counted.fits != true) return choice;
       choice = std::move(counted);
       choice.times_at_fault = true;
@@ -528,10 +539,9 @@ AngleSeries first_second(const recordings::Source& source, const recordings::Rea
 }
 
 std::optional<Sensor> preset_of_type(int device_type) {
-  for (Sensor& sensor : type_presets()) {
-    if (sensor.device_type == device_type) return std::move(sensor);
-  }
-  return std::nullopt;
+  const auto* type = recordings::livox_type(static_cast<std::uint8_t>(device_type));
+  if (type == nullptr) return std::nullopt;
+  return sensors::load_sensor(lower_case(std::string(type->name)));
 }
 
 std::optional<Sensor> given_sensor(const std::string& name_or_path) {
@@ -541,8 +551,10 @@ std::optional<Sensor> given_sensor(const std::string& name_or_path) {
 
 SensorChoice choose_sensor(const recordings::Source& source, const recordings::ReadOptions& reading,
                            const recordings::RecordingHeader& header,
-                           const std::optional<Sensor>& given, const Progress& progress) {
-  FirstShots shots;
+                           const std::optional<Sensor>& given, const Progress& progress,
+                           FirstShots* looked_at) {
+  FirstShots own;
+  FirstShots& shots = looked_at != nullptr ? *looked_at : own;
   SensorChoice choice = choose(source, reading, header, given, shots, progress);
   // The reach of the specification is that on grey walls.
   constexpr double kOnBrightWalls = 1.5;

@@ -40,25 +40,128 @@ std::vector<std::vector<std::size_t>> rows_by_device(const Observations& rows) {
   return which;
 }
 
-/// Looks ahead into a recording, and reads it with its times put right.
+/// What is done about one device's times.
+struct DeviceTimes {
+  OrderJudgement order;
+  std::int64_t window_ns = 0;  ///< within which rows are mixed
+  std::optional<TimeGrid> grid;
+};
+
+}  // namespace
+
+struct TimesJudgement {
+  std::vector<DeviceTimes> devices;
+  bool counted = false, in_packets = false;
+  bool changes = false;  ///< there is anything to put right, or to tell
+  bool none = false;     ///< all times are the same
+  double counted_rate = 0;
+  std::size_t rows = 0;  ///< that were judged
+};
+
+namespace {
+
+/// Judges the first rows.
+class TimesJudge {
+ public:
+  TimesJudge(Reader& reader, bool counted) : reader_(reader) { result_.counted = counted; }
+
+  TimesJudgement judge(const Progress& progress) {
+    const RecordingHeader& header = reader_.header();
+    if (!header.has_times || header.packet_shots > 0) return {};
+    Observations rows;
+    look_ahead(rows, progress);
+    if (result_.counted && result_.in_packets) return {};
+    result_.rows = rows.size();
+    std::vector<std::vector<std::size_t>> which = rows_by_device(rows);
+    result_.devices.resize(std::max(header.devices.size(), which.size()));
+    for (std::size_t i = 0; i < which.size(); ++i) {
+      judge(rows, std::move(which[i]), result_.devices[i]);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void look_ahead(Observations& rows, const Progress& progress) {
+    Chunk chunk;
+    try {
+      while (rows.size() < (result_.in_packets ? kRowsOfPacketsJudged : kRowsJudged)) {
+        ended_ = !reader_.read(chunk);
+        if (ended_) return;
+        result_.in_packets = result_.in_packets || !chunk.packets.empty();
+        rows.append(chunk.observations);
+        progress.check();
+      }
+    } catch (const FileError&) {  // who reads on is told of it
+      ended_ = true;
+    }
+  }
+
+  void judge(const Observations& rows, std::vector<std::size_t> which, DeviceTimes& device) {
+    if (result_.in_packets) {  // writers fill packets up with records without a return
+      std::erase_if(which, [&rows](std::size_t row) { return rows.valid[row] == 0; });
+    }
+    device.order = judge_order(rows, which, result_.in_packets);
+    switch (device.order.order) {
+      case RowOrder::mixed: {
+        const auto [first, last] = std::minmax_element(
+            which.begin(), which.end(),
+            [&rows](std::size_t a, std::size_t b) { return rows.time_ns[a] < rows.time_ns[b]; });
+        const std::int64_t span = saturating_difference(rows.time_ns[*last], rows.time_ns[*first]);
+        constexpr std::int64_t kShare = 8;
+        const bool near = !ended_ && device.order.depth_ns < span / kShare;
+        device.window_ns =
+            near ? 2 * device.order.depth_ns : std::numeric_limits<std::int64_t>::max();
+        order_by_time(rows, which);
+        result_.changes = true;
+        break;
+      }
+      case RowOrder::begins_anew:
+      case RowOrder::constant:
+        if (result_.counted) return;
+        result_.changes = true;
+        if (device.order.order == RowOrder::constant) result_.none = true;
+        if (!result_.none) result_.counted_rate = 1e9 / device.order.step_ns;
+        return;
+      case RowOrder::overlapping:
+        result_.changes = true;  // which is told
+        break;
+      case RowOrder::ascending:
+        break;
+    }
+    if (result_.in_packets || result_.counted) return;
+    device.grid.emplace(rows, which);
+    result_.changes = result_.changes || !device.grid->words().empty();
+  }
+
+  Reader& reader_;
+  TimesJudgement result_;
+  bool ended_ = false;
+};
+
+/// Reads a recording with its times put right.
 class JudgedReader final : public Reader {
  public:
-  /// @param counted  whoever reads counts the shots
-  JudgedReader(std::unique_ptr<Reader> inner, bool counted, const Progress& progress)
-      : inner_(std::move(inner)), counted_(counted) {
+  JudgedReader(std::unique_ptr<Reader> inner, std::shared_ptr<const TimesJudgement> judgement)
+      : inner_(std::move(inner)),
+        judgement_(std::move(judgement)),
+        devices_(judgement_->devices.begin(), judgement_->devices.end()) {
     header_ = inner_->header();
-    if (!header_.has_times || header_.packet_shots > 0) return;
-    std::vector<Chunk> ahead = look_ahead(progress);
-    if (counted_ && in_packets_) return;
-    judge(ahead);
-    if (!changes_) return;
-    for (Chunk& chunk : ahead) take(std::move(chunk));
+    if (judgement_->none) {
+      header_.has_times = false;
+      header_.all_times_equal = true;
+    }
+    if (judgement_->counted_rate > 0) header_.counted_rate = judgement_->counted_rate;
+    if (judgement_->none || judgement_->counted_rate > 0) {
+      header_.time_reference = TimeReference::relative;
+    }
+    Chunk chunk;
+    for (std::size_t rows = 0; rows < judgement_->rows && next(chunk);) {
+      rows += chunk.observations.size();
+      take(std::move(chunk));
+    }
     settle();
     describe();
   }
-
-  /// Whether there is anything to put right, or to tell.
-  bool changes() const { return changes_; }
 
   bool read(Chunk& chunk, std::size_t max_rows) override {
     chunk.clear();
@@ -83,11 +186,8 @@ class JudgedReader final : public Reader {
   }
 
  private:
-  /// What is done about one device's times.
-  struct Device {
-    OrderJudgement order;
-    std::int64_t window_ns = 0;  ///< within which rows are mixed
-    std::optional<TimeGrid> grid;
+  struct Device : DeviceTimes {
+    explicit Device(const DeviceTimes& judged) : DeviceTimes(judged) {}
     std::optional<std::int64_t> latest_ns;  ///< time that was read
     // Of times that begin anew:
     std::int64_t run_begin_ns = 0, last_ns = 0, run_shot = 0, last_shot = -1;
@@ -107,68 +207,6 @@ class JudgedReader final : public Reader {
     return false;
   }
 
-  std::vector<Chunk> look_ahead(const Progress& progress) {
-    std::vector<Chunk> ahead;
-    std::size_t rows = 0;
-    Chunk chunk;
-    while (rows < (in_packets_ ? kRowsOfPacketsJudged : kRowsJudged) && next(chunk)) {
-      in_packets_ = in_packets_ || !chunk.packets.empty();
-      rows += chunk.observations.size();
-      ahead.push_back(std::move(chunk));
-      progress.check();
-    }
-    return ahead;
-  }
-
-  void judge(const std::vector<Chunk>& ahead) {
-    Observations rows;
-    for (const Chunk& chunk : ahead) rows.append(chunk.observations);
-    std::vector<std::vector<std::size_t>> which = rows_by_device(rows);
-    devices_.resize(std::max(header_.devices.size(), which.size()));
-    for (std::size_t i = 0; i < which.size(); ++i) judge(rows, std::move(which[i]), devices_[i]);
-  }
-
-  void judge(const Observations& rows, std::vector<std::size_t> which, Device& device) {
-    if (in_packets_) {  // writers fill packets up with records without a return
-      std::erase_if(which, [&rows](std::size_t row) { return rows.valid[row] == 0; });
-    }
-    device.order = judge_order(rows, which, in_packets_);
-    switch (device.order.order) {
-      case RowOrder::mixed: {
-        const auto [first, last] = std::minmax_element(
-            which.begin(), which.end(),
-            [&rows](std::size_t a, std::size_t b) { return rows.time_ns[a] < rows.time_ns[b]; });
-        const std::int64_t span = saturating_difference(rows.time_ns[*last], rows.time_ns[*first]);
-        constexpr std::int64_t kShare = 8;
-        const bool near = !is_at_end() && device.order.depth_ns < span / kShare;
-        device.window_ns =
-            near ? 2 * device.order.depth_ns : std::numeric_limits<std::int64_t>::max();
-        order_by_time(rows, which);
-        changes_ = true;
-        break;
-      }
-      case RowOrder::begins_anew:
-      case RowOrder::constant:
-        if (counted_) return;
-        changes_ = true;
-        if (device.order.order == RowOrder::constant) {
-          header_.has_times = false;
-          header_.all_times_equal = true;
-        }
-        if (header_.has_times) header_.counted_rate = 1e9 / device.order.step_ns;
-        header_.time_reference = TimeReference::relative;
-        return;
-      case RowOrder::overlapping:
-        changes_ = true;  // which is told
-        break;
-      case RowOrder::ascending:
-        break;
-    }
-    if (in_packets_ || counted_) return;
-    device.grid.emplace(rows, which);
-    changes_ = changes_ || !device.grid->words().empty();
-  }
-
   /// Takes rows of the inner reader into hand.
   void take(Chunk&& chunk) {
     for (std::size_t row = 0; row < chunk.observations.size(); ++row) {
@@ -179,7 +217,7 @@ class JudgedReader final : public Reader {
         ++mixed_rows_;
       }
       device.latest_ns = std::max(device.latest_ns.value_or(time_ns), time_ns);
-      if (!counted_) count(chunk.observations, row, device);
+      if (!judgement_->counted) count(chunk.observations, row, device);
     }
     const bool anew = header_.counted_rate > 0 || !header_.has_times;
     if (anew) lost_samples_ += chunk.imu.size();
@@ -285,13 +323,13 @@ class JudgedReader final : public Reader {
                       mixed_rows_));
     }
     for (const Device& device : devices_) {
-      if (device.order.order == RowOrder::begins_anew && !counted_) {
+      if (device.order.order == RowOrder::begins_anew && !judgement_->counted) {
         warn(
             fmt::format("times begin anew with every message or packet and tell nothing beyond "
                         "one: shots were counted in the order of the file, at the {:.6g} shots "
                         "per second within messages; option shot_rate names another rate",
                         1e9 / device.order.step_ns));
-      } else if (device.order.order == RowOrder::constant && !counted_) {
+      } else if (device.order.order == RowOrder::constant && !judgement_->counted) {
         warn(
             "all times are the same, and tell nothing: shots are numbered in the order of the "
             "file; option shot_rate counts their times");
@@ -307,7 +345,7 @@ class JudgedReader final : public Reader {
       warn(fmt::format("{} shots do not stand on that grid, and their times were left as they are",
                        off_grid_));
     }
-    if (in_packets_) {
+    if (judgement_->in_packets) {
       warn("packet headers hold the times that were put right, and were left out");
     }
     if (lost_samples_ > 0) {
@@ -319,7 +357,8 @@ class JudgedReader final : public Reader {
   }
 
   std::unique_ptr<Reader> inner_;
-  bool counted_, in_packets_ = false, changes_ = false, ended_ = false;
+  std::shared_ptr<const TimesJudgement> judgement_;
+  bool ended_ = false;
   std::optional<FileError> failure_;
   std::vector<Device> devices_;
   Observations held_, ordered_, ready_;  ///< as read; in order; on the grid
@@ -330,11 +369,15 @@ class JudgedReader final : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> with_judged_times(const OpenReader& open, const ReadOptions& options,
-                                          const Progress& progress) {
-  auto reader = std::make_unique<JudgedReader>(open(), options.shot_rate.has_value(), progress);
-  if (reader->changes()) return reader;
-  return open();
+std::shared_ptr<const TimesJudgement> judge_times(Reader& reader, bool counted,
+                                                  const Progress& progress) {
+  return std::make_shared<const TimesJudgement>(TimesJudge(reader, counted).judge(progress));
+}
+
+std::unique_ptr<Reader> with_judged_times(const std::function<std::unique_ptr<Reader>()>& open,
+                                          std::shared_ptr<const TimesJudgement> judgement) {
+  if (!judgement->changes) return open();
+  return std::make_unique<JudgedReader>(open(), std::move(judgement));
 }
 
 }  // namespace risley::recordings

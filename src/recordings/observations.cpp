@@ -135,6 +135,18 @@ void Chunk::clear() {
   packet_begins.clear();
 }
 
+void Chunk::append(Chunk&& next) {
+  const std::size_t rows = observations.size();
+  if (rows == 0 && packets.empty() && imu.empty()) {
+    std::swap(*this, next);
+    return;
+  }
+  for (const std::size_t row : next.packet_begins) packet_begins.push_back(rows + row);
+  observations.append(next.observations);
+  packets.insert(packets.end(), next.packets.begin(), next.packets.end());
+  imu.insert(imu.end(), next.imu.begin(), next.imu.end());
+}
+
 const LivoxType* livox_type(std::uint8_t number) {
   const auto* const found =
       std::find_if(kLivoxTypes.begin(), kLivoxTypes.end(),

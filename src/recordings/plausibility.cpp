@@ -74,24 +74,29 @@ std::vector<LengthUnit> likely_units(double median, double high, double reach) {
 
 }  // namespace
 
-DirectionSpread direction_spread(std::span<const double> azimuth, std::span<const double> zenith) {
+double cone_radius(std::span<const double> azimuth, std::span<const double> zenith) {
   require_at_least("directions", static_cast<long long>(azimuth.size()), 1);
   require_length("zenith", zenith.size(), azimuth.size());
-  DirectionSpread spread;
   Vector3<double> sum;
-  const auto direction = [&](std::size_t i) {
-    return direction_from_angles(SphericalAngles<double>{azimuth[i], zenith[i]});
-  };
-  for (std::size_t i = 0; i < azimuth.size(); ++i) sum = sum + direction(i);
+  std::vector<Vector3<double>> directions(azimuth.size());
+  for (std::size_t i = 0; i < azimuth.size(); ++i) {
+    directions[i] = direction_from_angles(SphericalAngles<double>{azimuth[i], zenith[i]});
+    sum = sum + directions[i];
+  }
   const double length = norm(sum);
   const Vector3<double> mean = length > 0 ? (1.0 / length) * sum : Vector3<double>{1, 0, 0};
   std::vector<double> off(azimuth.size());
   for (std::size_t i = 0; i < azimuth.size(); ++i) {
-    const Vector3<double> one = direction(i);
+    const Vector3<double>& one = directions[i];
     const Vector3<double> apart{one.x - mean.x, one.y - mean.y, one.z - mean.z};
     off[i] = 2.0 * std::asin(std::min(1.0, 0.5 * norm(apart)));
   }
-  spread.radius = quantile(off, 0.99);
+  return quantile(off, 0.99);
+}
+
+DirectionSpread direction_spread(std::span<const double> azimuth, std::span<const double> zenith) {
+  DirectionSpread spread;
+  spread.radius = cone_radius(azimuth, zenith);
   find_arc({azimuth.begin(), azimuth.end()}, spread);
   std::vector<double> sorted(zenith.begin(), zenith.end());
   spread.zenith_from = quantile(sorted, 0.005);
@@ -103,11 +108,15 @@ std::optional<std::string> not_a_scan(std::span<const double> azimuth,
                                       std::span<const double> zenith,
                                       std::span<const double> range) {
   if (azimuth.size() < kFewestRanges) return std::nullopt;
-  const double radius = direction_spread(azimuth, zenith).radius;
+  return not_a_scan(cone_radius(azimuth, zenith), azimuth.size(), range);
+}
+
+std::optional<std::string> not_a_scan(double radius, std::size_t directions,
+                                      std::span<const double> range) {
   std::vector<double> ranges = finite(range);
   const double median = ranges.empty() ? 0.0 : quantile(ranges, 0.5);
   const bool is_far = median > kFarthestReach;
-  if (!is_far && azimuth.size() < kFewestJudged) return std::nullopt;
+  if (!is_far && directions < kFewestJudged) return std::nullopt;
   if (!(radius < (is_far ? kNarrowestFar : kNarrowest))) return std::nullopt;
   const double span_deg = 2.0 * degrees_from_radians(radius);
   if (is_far) {

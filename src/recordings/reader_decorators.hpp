@@ -39,16 +39,21 @@ class DecoratingReader : public Reader {
   std::optional<FileError> failure_;
 };
 
-/// Opens the same recording again and again.
-using OpenReader = std::function<std::unique_ptr<Reader>()>;
+/// What the first rows say of a recording's times.
+struct TimesJudgement;
 
-/// Judges times before anybody trusts them, by the first rows of each device. Rows that do not
-/// stand in the order of firing are sorted by their times; times that begin anew with every message
-/// are counted; times that are all the same are none; rounded ones, also where shots share them,
-/// are put on the even grid that they show together. Each is told as a warning. Sound times are
-/// left as they are.
-std::unique_ptr<Reader> with_judged_times(const OpenReader& open, const ReadOptions& options,
-                                          const Progress& progress);
+/// Judges times before anybody trusts them, by the first rows of each device.
+/// @param counted  whoever reads counts the shots
+std::shared_ptr<const TimesJudgement> judge_times(Reader& reader, bool counted,
+                                                  const Progress& progress);
+
+/// Rows that do not stand in the order of firing are sorted by their times; times that begin anew
+/// with every message are counted; times that are all the same are none; rounded ones, also where
+/// shots share them, are put on the even grid that they show together. Each is told as a warning.
+/// Sound times are left as they are.
+/// @param open  gives the rows from the first one on
+std::unique_ptr<Reader> with_judged_times(const std::function<std::unique_ptr<Reader>()>& open,
+                                          std::shared_ptr<const TimesJudgement> judgement);
 
 /// Leaves the rows of one sensor, see ReadOptions::device.
 /// @param path  for errors

@@ -13,6 +13,8 @@
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/reader.hpp"
 
+#include "recordings/shared_input.hpp"
+
 namespace risley::recordings {
 namespace {
 
@@ -57,6 +59,22 @@ bool Source::is_same_as(const Source& other) const {
   if (recording_ || other.recording_) return recording_ == other.recording_;
   std::error_code ignored;
   return std::filesystem::equivalent(name_, other.name_, ignored);
+}
+
+Source Source::held_open() const {
+  Source result = *this;
+  result.shared_ = shared();
+  return result;
+}
+
+io::InputFile Source::open_file(const std::string& path) const {
+  return path == name_ ? shared()->file() : io::InputFile(path);
+}
+
+std::shared_ptr<SharedInput> Source::shared() const {
+  if (shared_) return shared_;
+  if (recording_) return std::make_shared<SharedInput>(recording_, name_);
+  return std::make_shared<SharedInput>(name_);
 }
 
 namespace {

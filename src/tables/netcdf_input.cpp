@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "risley/core/error.hpp"
 #include "risley/tables/netcdf.hpp"
@@ -106,7 +107,8 @@ NetcdfDimension take_dimension(Unpacker& parcel) {
 /// Answers requests about one file, in the process of its own.
 class Service {
  public:
-  explicit Service(std::string path) : path_(std::move(path)) {}
+  explicit Service(const io::InputFile& file)
+      : path_(file.path()), name_(file.name_for_libraries()) {}
 
   std::string operator()(std::string_view request) {
     Parcel answer;
@@ -125,7 +127,8 @@ class Service {
   void serve(Unpacker& asked, Parcel& answer) {
     switch (asked.take<Request>()) {
       case Request::open:
-        file_ = std::make_shared<NetcdfFile>(path_);
+        // Some systems keep processes out of each other's files.
+        file_ = std::make_shared<NetcdfFile>(::access(name_.c_str(), R_OK) == 0 ? name_ : path_);
         break;
       case Request::has_attribute:
         answer.put(file_->has_attribute(asked.take_text()));
@@ -173,7 +176,7 @@ class Service {
     }
   }
 
-  std::string path_;
+  std::string path_, name_;
   std::shared_ptr<NetcdfFile> file_;  // shared: a service is copied, an open file cannot be
 };
 
@@ -193,11 +196,11 @@ Parcel request(Request kind, const std::string& name) {
 /// The process that reads the file.
 class NetcdfInput::Process {
  public:
-  Process(const NetcdfInput& owner, const std::string& path, const Progress& progress)
+  Process(const NetcdfInput& owner, const io::InputFile& file, const Progress& progress)
       : owner_(owner) {
     try {
       const NetcdfLock lock;  // the copy of this process finds the library at rest
-      process_.emplace(Service(path), progress);
+      process_.emplace(Service(file), progress);
     } catch (const ProcessEnded& error) {
       owner_.fail(error.what());
     }
@@ -221,14 +224,14 @@ class NetcdfInput::Process {
   std::optional<ConfinedProcess> process_;
 };
 
-NetcdfInput::NetcdfInput(const std::string& path, const Progress& progress)
-    : path_(path), process_(std::make_unique<Process>(*this, path, progress)) {
+NetcdfInput::NetcdfInput(io::InputFile file, const Progress& progress)
+    : file_(std::move(file)), process_(std::make_unique<Process>(*this, file_, progress)) {
   process_->ask(request(Request::open), "the file");
 }
 
 NetcdfInput::~NetcdfInput() = default;
 
-void NetcdfInput::fail(const std::string& problem) const { throw FileError(path_, {}, problem); }
+void NetcdfInput::fail(const std::string& problem) const { throw FileError(path(), {}, problem); }
 
 bool NetcdfInput::has_attribute(const std::string& name) const {
   const std::string answer =

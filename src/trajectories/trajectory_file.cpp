@@ -54,9 +54,10 @@ FileHead read_file_head(const std::string& path) {
     throw FileError(path, {}, "is a folder whose first file is not a ROS 2 bag");
   }
   FileHead head;
-  head.bytes = io::read_file_head(path, kHeadBytes, "a trajectory");
+  const io::InputFile file(path, "a trajectory");
+  head.bytes = io::read_file_head(file, kHeadBytes);
   head.name = lower_case(fs::path(path).filename().string());
-  head.size = fs::file_size(path, code);
+  head.size = file.size();
   return head;
 }
 

@@ -120,8 +120,7 @@ TEST(FileHead, TellsWhatStandsForAFile) {
   const TestFolder folder;
   const auto words = [&](const std::string& name, const std::string& bytes) {
     put_file(folder.file(name), bytes);
-    return stands_for_another(folder.file(name),
-                              read_file_head(folder.file(name), 4096, "a recording"))
+    return stands_for_another(folder.file(name), read_file_head(folder.file(name), 4096))
         .value_or("");
   };
   const auto has = [](const std::string& text, const std::string& part) {
@@ -142,8 +141,8 @@ TEST(FileHead, TellsWhatStandsForAFile) {
   EXPECT_TRUE(has(words("a.zip", "PK\x03\x04"s), "unzip a.zip"));
   EXPECT_TRUE(has(words("a.tar", std::string(257, 'a') + "ustar"), "tar xf a.tar"));
   EXPECT_EQ(words("a.txt", "x,y,z\n1,2,3\n"), "");
-  EXPECT_THROW(read_file_head(folder.file("none"), 16, "a recording"), FileError);
-  EXPECT_THROW(read_file_head(folder.path().string(), 16, "a recording"), FileError);
+  EXPECT_THROW(read_file_head(folder.file("none"), 16), FileError);
+  EXPECT_THROW(read_file_head(folder.path().string(), 16), FileError);
 }
 
 }  // namespace risley::io::text_dialect_test

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 // Everything from a recording to a cloud through the jobs alone, as another front end would do it,
 // and what cancelling them leaves behind: nothing.
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -12,8 +13,10 @@
 #include <thread>
 #include <vector>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
 #include <unistd.h>
 
 #include "risley/core/angle.hpp"
@@ -24,6 +27,7 @@
 #include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/convert_recording.hpp"
 #include "risley/jobs/estimate_recording.hpp"
+#include "risley/jobs/identify_recording.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/observability.hpp"
 #include "risley/jobs/plan_calibration.hpp"
@@ -150,6 +154,87 @@ TEST_F(JobsTest, LeadFromARecordingToACloud) {
                                             "estimate/calibration.yaml", "estimate/states.nc"}));
   const sensors::Sensor written = sensors::load_sensor(path("calibration/calibration.yaml"));
   EXPECT_EQ(written.provenance.front(), (std::pair<std::string, std::string>{"command", "test"}));
+}
+
+/// Counts how often anybody opens a file, in child processes too.
+class OpenCounter {
+ public:
+  explicit OpenCounter(const std::string& path) : events_(::inotify_init1(IN_CLOEXEC)) {
+    // What lies between keeps the kernel from taking two in a row for one.
+    ::inotify_add_watch(events_, path.c_str(), IN_OPEN | IN_ACCESS | IN_CLOSE);
+    ::fcntl(events_, F_SETFL, O_NONBLOCK);
+  }
+  ~OpenCounter() { ::close(events_); }
+  int opens() const {
+    int count = 0;
+    alignas(inotify_event) std::array<char, 4096> bytes;
+    for (ssize_t got = 0; (got = ::read(events_, bytes.data(), bytes.size())) > 0;) {
+      for (ssize_t at = 0; at < got;) {
+        const auto* event = reinterpret_cast<const inotify_event*>(bytes.data() + at);
+        count += (event->mask & IN_OPEN) != 0 ? 1 : 0;
+        at += static_cast<ssize_t>(sizeof(inotify_event) + event->len);
+      }
+    }
+    return count;
+  }
+
+ private:
+  int events_;
+};
+
+TEST_F(JobsTest, OpenTheirInputOnce) {
+  const std::string lvx = path("hall.lvx"), csv = path("hall.csv");
+  convert_recording({.recording = hall(), .output = lvx});
+  convert_recording({.recording = hall(), .output = csv});
+  auto estimate = estimation();
+  estimate.truth.clear();
+  estimate.details = false;
+  estimate_recording(estimate);
+  const std::string calibrated = path("estimate/calibration.yaml");
+  const std::vector<std::pair<const char*, std::function<void(const std::string&)>>> jobs = {
+      {"info", [](const std::string& input) { inspect_recording({.recording = input}); }},
+      {"estimate",
+       [&](const std::string& input) {
+         estimate.recording = input;
+         estimate_recording(estimate);
+       }},
+      {"observability",
+       [](const std::string& input) { judge_observability({.recording = input}); }},
+      {"identify",
+       [&](const std::string& input) {
+         identify_recording({.recording = input, .output = path("identified.yaml")});
+       }},
+      {"convert",
+       [&](const std::string& input) {
+         convert_recording({.recording = input, .output = path("converted.nc")});
+       }},
+      {"calibrate",
+       [&](const std::string& input) {
+         auto options = calibration();
+         options.recordings = {input};
+         options.truths.clear();
+         options.details = false;
+         calibrate_recordings(options);
+       }},
+      {"cloud",
+       [&](const std::string& input) {
+         auto options = cloud(calibrated);
+         options.recording = input;
+         cloud_of_recording(options);
+       }},
+  };
+  for (const auto& [name, job] : jobs) {
+    for (const std::string& input : {lvx, csv}) {
+      const OpenCounter counter(input);
+      job(input);
+      EXPECT_EQ(counter.opens(), 1) << name << ' ' << input;
+    }
+    // The process that reads NetCDF gets the open file; its libraries open that by its number: one
+    // looks for links that lead out of it, the other reads.
+    const OpenCounter counter(hall());
+    job(hall());
+    EXPECT_LE(counter.opens(), 1 + 5) << name;
+  }
 }
 
 TEST_F(JobsTest, TextsAppearWithTheOtherFilesAndOlderOnesStepAside) {

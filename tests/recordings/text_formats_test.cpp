@@ -197,8 +197,8 @@ TEST(ScanSequence, RefusesOtherHeaders) {
     ASSERT_TRUE(outcome.error);
     EXPECT_EQ(outcome.error->place().line, 1U);
   }
-  EXPECT_THROW(kScanSequenceCsvFormat.open("/no/such/file.csv", {}), FileError);
-  EXPECT_THROW(kScanSequenceCsvFormat.open("/", {}), FileError);
+  EXPECT_THROW(kScanSequenceCsvFormat.open(std::string("/no/such/file.csv"), {}), FileError);
+  EXPECT_THROW(kScanSequenceCsvFormat.open(std::string("/"), {}), FileError);
 }
 
 TEST(ScanSequence, ShotNumbersAreNoSeconds) {

@@ -16,6 +16,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/io/block_file.hpp"
 
 namespace risley::bags {
 
@@ -37,9 +38,6 @@ enum class Serialisation : std::uint8_t {
 
 /// Which kind of bag a file is that begins with these bytes; nothing where it is none.
 std::optional<BagKind> bag_kind(std::string_view head);
-/// The same of the file's own bytes, or of those of a folder's first file; nothing also where it
-/// cannot be read.
-std::optional<BagKind> bag_kind_of_file(const std::string& path);
 
 /// Whether a folder holds one recording of ROS 2: it has a metadata.yaml, or lacks it and has files
 /// named as rosbag2 names the parts of a bag (drive_0.mcap, drive_1.mcap).
@@ -136,13 +134,12 @@ class Bag {
   BagKind kind_;
 };
 
-/// Opens a bag of a kind. The structure of a ROS 1 bag is checked to its end before; an MCAP file
-/// without a sound summary is looked through for its topics.
-/// @param path  of a file, or of a folder as files_of_bag_folder() takes it
+/// Opens a bag of the kind that the file's bytes tell. The structure of a ROS 1 bag is checked to
+/// its end before; an MCAP file without a sound summary is looked through for its topics.
 /// @param progress  cancels opening and reading; its flag must outlive the bag
 /// @throws FileError when it is no bag, is cut off or damaged
-std::unique_ptr<Bag> open_bag(const std::string& path, BagKind kind, const Progress& progress = {});
-/// The same of the kind that the file's bytes tell.
+std::unique_ptr<Bag> open_bag(const io::InputFile& file, const Progress& progress = {});
+/// The same of a file, or of a folder as files_of_bag_folder() takes it, by its path.
 std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress = {});
 
 /// The topics of a bag, from its index alone.

@@ -118,8 +118,10 @@ ShotResiduals residuals_of_shots(const Estimate& estimate);
 /// clock was reset or the recording paused; the batch estimator takes all.
 /// @param series  shots to use, as recorded
 /// @param head    all shots of the first second, as recorded, for the start
+/// @param found   about the head before
 /// @throws EstimationError when the data cannot answer, InvalidArgument for unknown parameters
 Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
-                  const EstimateOptions& options, const Progress& progress = {});
+                  const EstimateOptions& options, const Progress& progress = {},
+                  StartFindings found = {});
 
 }  // namespace risley::estimation

@@ -16,6 +16,8 @@ struct FreeParameter {
   std::string name;         ///< as in parameter_list()
   std::vector<int> places;  ///< of the flat parameter vector that take its value
   double prior_sigma = 0;   ///< SI units
+
+  friend bool operator==(const FreeParameter&, const FreeParameter&) = default;
 };
 
 /// Whether all prisms of a train are of one glass.

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -10,6 +12,7 @@
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/frame_turn.hpp"
 #include "risley/estimation/free_parameters.hpp"
+#include "risley/estimation/spectral_lines.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::estimation {
@@ -29,6 +32,8 @@ struct StartOptions {
   /// Whether the recording's frame is turned against the sensor's; empty finds out: it is when
   /// shots lie outside the sensor's field of view.
   std::optional<bool> turned;
+
+  friend bool operator==(const StartOptions&, const StartOptions&) = default;
 };
 
 /// What an estimation starts from. All of the recording as it is to be used: turned if mirrored,
@@ -45,6 +50,21 @@ struct Start {
   double residual_rms = 0;         ///< of the fit, rad; robust, so that outliers do not count
 };
 
+/// What was found out about some shots on the way to a start, so that who asks next need not look
+/// for it again. It holds for these shots alone.
+struct StartFindings {
+  /// A question that was asked, and its answer.
+  struct Known {
+    sensors::Sensor sensor;
+    StartOptions options;
+    Start start;
+  };
+  std::shared_ptr<const LineSearch> lines;  ///< in the shots' own frame
+  /// Those near some speeds, within kUsualShare.
+  std::map<std::vector<double>, std::vector<RotorLines>> near;
+  std::vector<Known> starts;
+};
+
 /// Speeds, combination and rotation angles from fits of lines, then a robust least-squares fit of
 /// parameters and motion to the same shots, for every combination of the sensor's speeds and both
 /// mirror images that may be; the one that leaves least is the answer. It needs no zero position
@@ -54,12 +74,13 @@ struct Start {
 /// other sign), as public copies of some vendor files do, cannot be told from the speeds: a
 /// mirrored first combination turns like the second. The optics can: prisms bend differently when
 /// met from the other side, and the fit leaves a tenth of a degree for the wrong image.
-/// @param head  every shot of about the first second, as recorded
+/// @param head   every shot of about the first second, as recorded
+/// @param found  about the head before; this adds to it
 /// @throws EstimationError naming what is missing: duration, shots, matching speeds; also when two
 ///         answers fit equally well, and when the recording's clock rather than the rotors must be
 ///         off (WrongClock)
 Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
-                 const StartOptions& options);
+                 const StartOptions& options, StartFindings* found = nullptr);
 
 /// The shots as a start says they are to be used: turned if mirrored, and into the sensor's frame.
 void prepare_shots(AngleSeries& series, const Start& start);

@@ -11,6 +11,7 @@
 
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/frame_turn.hpp"
+#include "risley/estimation/initialisation.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::estimation {
@@ -62,14 +63,18 @@ inline constexpr double kClearlyWorse = 1.5;
 /// sensor is tried in all its speed combinations, as recorded and mirrored, whatever way the
 /// recording's frame is turned. Where lines do not decide, because shots in a corner of the field
 /// tell little of their amplitudes, the sensors' optics do. docs/theory/start.md
-/// @param head  every shot of about the first second, as recorded
+/// @param head   every shot of about the first second, as recorded
+/// @param found  about the head before; this adds to it
 /// @throws EstimationError as LineSearch
 SensorRecognition recognise_sensor(const AngleSeries& head,
-                                   std::span<const sensors::Sensor> candidates, BeamSource beams);
+                                   std::span<const sensors::Sensor> candidates, BeamSource beams,
+                                   StartFindings* found = nullptr);
 
 /// Residuals of a start with a sensor's optics, rad; empty where there is no start.
+/// @param found  as recognise_sensor()
 std::optional<double> start_residual(const AngleSeries& head, const sensors::Sensor& sensor,
-                                     const FiringOrder& order, BeamSource beams);
+                                     const FiringOrder& order, BeamSource beams,
+                                     StartFindings* found = nullptr);
 
 /// The beams of a sensor instead of those that were counted; one emitter fires all.
 void number_beams(AngleSeries& series, const sensors::Sensor& sensor, const FiringOrder& order);

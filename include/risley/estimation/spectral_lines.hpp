@@ -110,6 +110,11 @@ class LineSearch {
   std::vector<Complex> value_;
 };
 
+/// Speeds of a sensor's rotors are looked for so near to what is usual, as a share of it, and so
+/// many minima are tried.
+inline constexpr double kUsualShare = 0.06;
+inline constexpr std::size_t kMostMinima = 4;
+
 /// Duration of the shortest window that tells the rotors of a sensor apart, s.
 inline constexpr double kShortestStart = 0.02;
 

@@ -6,11 +6,12 @@
 #include <string_view>
 
 #include "risley/core/progress.hpp"
+#include "risley/io/block_file.hpp"
 
 namespace risley::hashes {
 
 /// SHA-256 of a file's bytes as 64 hexadecimal digits. @throws FileError, Cancelled
-std::string sha256_of_file(const std::string& path, const Progress& progress = {});
+std::string sha256_of_file(const io::InputFile& file, const Progress& progress = {});
 
 /// SHA-256 of a text as 64 hexadecimal digits.
 std::string sha256(std::string_view text);

@@ -4,7 +4,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -29,14 +31,40 @@ class FileDescriptor {
   int value_;
 };
 
-/// A binary file read through one block of memory; going forward costs one copy per byte.
-class BlockInput {
+/// A regular file that is opened once and read by all who hold a copy of this, each at places of
+/// its own and in any thread.
+class InputFile {
  public:
-  /// @throws FileError when the file is missing or not a regular file
-  explicit BlockInput(std::string path);
+  /// Opens it: a path is an input file wherever one is expected.
+  /// @param expected  for messages: "a recording"
+  /// @throws FileError when it is missing or not a regular file
+  InputFile(std::string path,  // NOLINT(google-explicit-constructor)
+            std::string_view expected = "a file");
 
   const std::string& path() const { return path_; }  ///< as it was given
   std::uint64_t size() const { return size_; }       ///< bytes, when it was opened
+  /// A name by which a library that opens files itself gets this one, also in a child process,
+  /// whatever has its path by then. Lives as long as this process has the file open.
+  std::string name_for_libraries() const;
+
+  /// Reads bytes from an offset on. @return how many; fewer than `most` only at the end
+  /// @throws FileError when the disk fails
+  std::size_t read(std::uint64_t offset, void* bytes, std::size_t most) const;
+
+ private:
+  std::string path_;
+  std::shared_ptr<const FileDescriptor> file_;
+  std::uint64_t size_ = 0;
+};
+
+/// A binary file read through one block of memory; going forward costs one copy per byte.
+class BlockInput {
+ public:
+  explicit BlockInput(InputFile file);
+
+  const std::string& path() const { return file_.path(); }  ///< as InputFile
+  std::uint64_t size() const { return file_.size(); }       ///< as InputFile
+  const InputFile& file() const { return file_; }           ///< that is read
 
   /// The bytes [offset, offset + count), until the next call; they must lie inside the file.
   /// @param count  at most kBlockBytes
@@ -47,9 +75,7 @@ class BlockInput {
   static constexpr std::size_t kBlockBytes = std::size_t{1} << 18;
 
  private:
-  std::string path_;
-  FileDescriptor file_;
-  std::uint64_t size_ = 0;
+  InputFile file_;
   std::vector<std::uint8_t> block_;
   std::uint64_t block_offset_ = 0;
   std::size_t block_bytes_ = 0;

@@ -8,13 +8,14 @@
 #include <string>
 #include <string_view>
 
+#include "risley/io/block_file.hpp"
+
 namespace risley::io {
 
-/// The first bytes of a regular file; of a text they are as LineReader reads tables: UTF-8 in plain
+/// The first bytes of a file; of a text they are as LineReader reads tables: UTF-8 in plain
 /// dialect.
-/// @param expected  "a recording", for messages
-/// @throws FileError when the file is missing, another kind of file or cannot be read
-std::string read_file_head(const std::string& path, std::size_t bytes, std::string_view expected);
+/// @throws FileError when it cannot be read
+std::string read_file_head(const InputFile& file, std::size_t bytes);
 
 /// Where a file is not what its name says but something that stands for it: what it is and how one
 /// gets at the file. Whole files that were compressed, pointers of Git LFS and git-annex, pages of

@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/io/block_file.hpp"
 #include "risley/io/output_file.hpp"
 #include "risley/io/text_dialect.hpp"
 
@@ -32,14 +33,15 @@ enum class LinesOf : std::uint8_t { text, table };
 /// Reads a file line by line in large blocks, in constant memory; UTF-16 as UTF-8.
 class LineReader {
  public:
-  /// @throws FileError when the file is missing or cannot be read
-  explicit LineReader(const std::string& path, LinesOf lines_of = LinesOf::text);
+  /// @throws FileError when the file cannot be read
+  explicit LineReader(InputFile file, LinesOf lines_of = LinesOf::text);
 
   /// The next line without its line end (LF or CR LF) and, in line 1, without a byte order mark;
   /// it lives until the next call. false at the end of the file.
   /// @throws FileError when the disk fails or a line is longer than 64 KiB
   bool next(std::string_view& line);
 
+  const InputFile& file() const { return file_; }             ///< that is read
   std::uint64_t line_number() const { return line_number_; }  ///< of the last line, from 1
   bool has_line_end() const { return has_line_end_; }         ///< of the last line
   double fraction_read() const;                               ///< of the file's bytes, [0, 1]
@@ -49,12 +51,11 @@ class LineReader {
   std::size_t read_bytes(char* to, std::size_t most);
   void require_length(std::size_t length) const;
 
-  std::string path_;
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  InputFile file_;
   std::vector<char> buffer_;
   std::size_t begin_ = 0, end_ = 0;  ///< unread part of the buffer
   bool at_end_ = false, has_line_end_ = true;
-  std::uint64_t line_number_ = 0, bytes_read_ = 0, file_size_ = 0;
+  std::uint64_t line_number_ = 0, bytes_read_ = 0;
   std::optional<TextDecoder> decoder_;  ///< of what is no UTF-8
   TextDialect dialect_;
   std::string raw_, decoded_, plain_;  ///< bytes of the file, their text, a line in plain dialect

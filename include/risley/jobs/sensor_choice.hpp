@@ -64,6 +64,13 @@ struct SensorChoice {
   estimation::FrameTurn frame;
 };
 
+/// The first shots of a recording, up to damage, and what was found out about them.
+struct FirstShots {
+  estimation::AngleSeries head;  ///< every shot of the first second
+  estimation::BeamSource beams = estimation::BeamSource::recorded;
+  estimation::StartFindings found;
+};
+
 /// Chooses the sensor of a recording: the one that was asked for, that of the type which the file
 /// names, or the built-in preset that describes the shots of the first second best, by speeds of
 /// the rotors, how far the prisms bend and emitters together. Where times are missing, those of
@@ -74,11 +81,12 @@ struct SensorChoice {
 /// see whether the times are at fault.
 /// @param header  of the recording
 /// @param given   sensor that was asked for
+/// @param shots   gets the first ones, where they were looked at
 /// @throws FileError, InvalidArgument, Cancelled
 SensorChoice choose_sensor(const recordings::Source& source, const recordings::ReadOptions& reading,
                            const recordings::RecordingHeader& header,
                            const std::optional<sensors::Sensor>& given,
-                           const Progress& progress = {});
+                           const Progress& progress = {}, FirstShots* shots = nullptr);
 
 /// @throws InvalidArgument when the recording names more lines than the sensor has emitters
 /// @throws FileError when no sensor can have made the recording

@@ -94,6 +94,8 @@ struct Chunk {
 
   /// Leaves no row, packet or inertial sample.
   void clear();
+  /// What follows this one.
+  void append(Chunk&& next);
 };
 
 /// Device::type of Livox's sensors.

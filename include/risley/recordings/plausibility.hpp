@@ -23,6 +23,8 @@ struct DirectionSpread {
   double zenith_from = 0, zenith_to = 0;    ///< without the outer 0.5 % on either side, rad
 };
 
+/// DirectionSpread::radius alone, which takes a third of the time.
+double cone_radius(std::span<const double> azimuth, std::span<const double> zenith);
 /// @param azimuth, zenith  rad, not empty
 DirectionSpread direction_spread(std::span<const double> azimuth, std::span<const double> zenith);
 
@@ -31,6 +33,9 @@ DirectionSpread direction_spread(std::span<const double> azimuth, std::span<cons
 /// @param range  m, of the same shots; empty or NaN where they have none
 std::optional<std::string> not_a_scan(std::span<const double> azimuth,
                                       std::span<const double> zenith,
+                                      std::span<const double> range);
+/// The same where the cone_radius() of so many directions is known.
+std::optional<std::string> not_a_scan(double radius, std::size_t directions,
                                       std::span<const double> range);
 
 /// What is wrong with ranges beyond a sensor's reach, in words with the unit that they are likely

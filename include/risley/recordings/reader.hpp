@@ -50,6 +50,10 @@ class Reader {
   /// Part of the file already read, [0, 1].
   virtual double fraction_read() const = 0;
 
+  /// Another reader of the same open file, at its beginning; none where the format opens one. Both
+  /// belong to one thread.
+  virtual std::unique_ptr<Reader> again() const { return nullptr; }
+
  protected:
   RecordingHeader header_;
   std::vector<ReadWarning> warnings_;

@@ -7,11 +7,17 @@
 #include <string>
 #include <vector>
 
+#include "risley/io/block_file.hpp"
+
 namespace risley::recordings {
 
 struct Recording;
+class SharedInput;
 
 /// Where a recording is: a file, or a folder of ROS 2, by its path, or columns in memory.
+///
+/// A file is opened anew by each that reads it, unless somebody holds it open for a while: see
+/// held_open().
 class Source {
  public:
   Source() = default;
@@ -35,10 +41,21 @@ class Source {
   const std::shared_ptr<const Recording>& recording() const { return recording_; }
   /// Whether two are the same file, folder or columns.
   bool is_same_as(const Source& other) const;
+  /// The same source for one job: its copies open the file once, at first, and all read that,
+  /// whatever has its path by then. What they decode first, a second of the fastest sensor, is
+  /// kept for the next one of them, until one reads on behind it. A Progress given with one of the
+  /// copies must outlive all of them.
+  Source held_open() const;
+  /// One of its files to be read: the one that is held open, where it is that. @throws FileError
+  io::InputFile open_file(const std::string& path) const;
+
+  /// What copies share; for readers alone.
+  std::shared_ptr<SharedInput> shared() const;
 
  private:
   std::string name_;
   std::shared_ptr<const Recording> recording_;
+  std::shared_ptr<SharedInput> shared_;  ///< where it is held open
 };
 
 /// The files of which a recording consists: its own, or metadata.yaml and the bags that it names

@@ -30,6 +30,8 @@ struct Knowledge {
 struct SpeedCombination {
   std::vector<double> angular_velocity;  ///< nominal [prisms], rad/s
   std::vector<FaceOrder> face_order;     ///< of the train that runs so; empty: always the same
+
+  friend bool operator==(const SpeedCombination&, const SpeedCombination&) = default;
 };
 
 /// When the emitters of a train fire.

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/io/block_file.hpp"
 #include "risley/io/output_file.hpp"
 
 /// @file
@@ -148,12 +149,12 @@ class NetcdfOutput {
 class NetcdfInput {
  public:
   /// @param progress  stops waiting for the library; its flag must outlive the file
-  explicit NetcdfInput(const std::string& path, const Progress& progress = {});
+  explicit NetcdfInput(io::InputFile file, const Progress& progress = {});
   ~NetcdfInput();
   NetcdfInput(const NetcdfInput&) = delete;
   NetcdfInput& operator=(const NetcdfInput&) = delete;
 
-  const std::string& path() const { return path_; }  ///< as it was given
+  const std::string& path() const { return file_.path(); }  ///< as it was given
 
   /// Whether the file has an attribute of that name.
   bool has_attribute(const std::string& name) const;
@@ -203,7 +204,7 @@ class NetcdfInput {
   void get(const NetcdfVariable& variable, NetcdfType type, std::size_t first, std::size_t count,
            void* values) const;
 
-  std::string path_;
+  io::InputFile file_;
   class Process;
   std::unique_ptr<Process> process_;
 };

@@ -20,8 +20,10 @@ std::uint64_t ByteSource::skip(std::uint64_t count) {
   return done;
 }
 
-FileSource::FileSource(const std::string& path, std::uint64_t begin, std::uint64_t end)
-    : file_(path), offset_(std::min(begin, file_.size())), end_(std::min(end, file_.size())) {}
+FileSource::FileSource(io::InputFile file, std::uint64_t begin, std::uint64_t end)
+    : file_(std::move(file)),
+      offset_(std::min(begin, file_.size())),
+      end_(std::min(end, file_.size())) {}
 
 std::size_t FileSource::read(std::uint8_t* bytes, std::size_t count) {
   std::size_t done = 0;

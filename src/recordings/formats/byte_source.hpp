@@ -37,7 +37,7 @@ class ByteSource {
 class FileSource final : public ByteSource {
  public:
   /// @throws FileError
-  FileSource(const std::string& path, std::uint64_t begin, std::uint64_t end);
+  FileSource(io::InputFile file, std::uint64_t begin, std::uint64_t end);
   std::size_t read(std::uint8_t* bytes, std::size_t count) override;
   std::uint64_t skip(std::uint64_t count) override;
   std::uint64_t file_offset() const override { return offset_; }

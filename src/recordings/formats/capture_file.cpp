@@ -89,14 +89,12 @@ bool is_capture(std::string_view head) {
 
 void CaptureFile::Close::operator()(pcap* capture) const { ::pcap_close(capture); }
 
-CaptureFile::CaptureFile(std::string path) : path_(std::move(path)) {
+CaptureFile::CaptureFile(const io::InputFile& input) : path_(input.path()), size_(input.size()) {
   std::array<char, PCAP_ERRBUF_SIZE> words{};
-  std::FILE* file = std::fopen(path_.c_str(), "rbe");
+  std::FILE* file = std::fopen(input.name_for_libraries().c_str(), "rbe");
   if (file == nullptr) {
     throw FileError(path_, {}, fmt::format("cannot be read: {}", std::strerror(errno)));
   }
-  if (std::fseek(file, 0, SEEK_END) == 0) size_ = static_cast<std::uint64_t>(::ftello(file));
-  std::rewind(file);
   capture_.reset(
       ::pcap_fopen_offline_with_tstamp_precision(file, PCAP_TSTAMP_PRECISION_NANO, words.data()));
   if (!capture_) {

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "risley/core/error.hpp"
+#include "risley/io/block_file.hpp"
 #include "risley/wire/address.hpp"
 
 struct pcap;
@@ -35,7 +36,7 @@ class CaptureFile {
  public:
   /// @throws FileError when it is no capture, cut off in its header, or of a link type that is not
   ///         Ethernet, Linux cooked (SLL, SLL2), raw IP or loopback
-  explicit CaptureFile(std::string path);
+  explicit CaptureFile(const io::InputFile& file);
 
   const std::string& path() const { return path_; }  ///< as it was given
   /// @return the next datagram; empty at the end of a whole file

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "risley/io/block_file.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/writer.hpp"
 
@@ -27,7 +28,7 @@ struct Format {
   bool (*recognises)(std::string_view head);
   /// @param progress  cancels where much may have to be looked through before there is a row, or
   ///                  nothing is heard of a library for long
-  std::unique_ptr<Reader> (*open)(const std::string& path, const Progress& progress);
+  std::unique_ptr<Reader> (*open)(const io::InputFile& file, const Progress& progress);
   /// nullptr when the format is only read.
   std::unique_ptr<Writer> (*create)(const std::string& path,
                                     const RecordingHeader& header) = nullptr;
@@ -36,8 +37,8 @@ struct Format {
 
 /// Format::open and Format::create of classes that need nothing but their arguments.
 template <class Opened>
-std::unique_ptr<Reader> open_with(const std::string& path, const Progress&) {
-  return std::make_unique<Opened>(path);
+std::unique_ptr<Reader> open_with(const io::InputFile& file, const Progress&) {
+  return std::make_unique<Opened>(file);
 }
 template <class Created>
 std::unique_ptr<Writer> create_with(const std::string& path, const RecordingHeader& header) {

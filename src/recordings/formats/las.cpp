@@ -32,8 +32,8 @@ bool is_further_return(const Point& point, const Point& before) {
 
 class LasReader final : public Reader {
  public:
-  LasReader(const std::string& path, std::string_view format) : path_(path) {
-    io::BlockInput input(path);
+  LasReader(const io::InputFile& file, std::string_view format) : path_(file.path()) {
+    io::BlockInput input(file);
     file_ = read_header(input, warnings_);
     source_ = file_.compressed ? open_compressed_points(std::move(input), file_, warnings_)
                                : open_points(std::move(input), file_, warnings_);
@@ -296,8 +296,8 @@ const Format kLasFormat = {
     "",
     "LAS 1.0 to 1.4: points in the frame of the sensor (read only)",
     [](std::string_view head) { return las::is_las(head) && !las::is_compressed(head); },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<las::LasReader>(path, "las");
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<las::LasReader>(file, "las");
     },
 };
 
@@ -306,8 +306,8 @@ const Format kLazFormat = {
     "",
     "LAS compressed by LASzip: points in the frame of the sensor (read only)",
     [](std::string_view head) { return las::is_las(head) && las::is_compressed(head); },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<las::LasReader>(path, "laz");
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<las::LasReader>(file, "laz");
     },
 };
 

@@ -31,7 +31,7 @@ class LazPoints final : public PointSource {
                           0});
     }
     if (header_.points > 0) check_chunk_table(input);
-    stream_.open(path_, std::ios::binary);
+    stream_.open(input.file().name_for_libraries(), std::ios::binary);
     if (!stream_) fail({}, fmt::format("cannot be read: {}", std::strerror(errno)));
     if (laszip_create(&laszip_) != 0) fail({}, "cannot be read: LASzip could not be started");
     try {

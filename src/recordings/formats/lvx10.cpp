@@ -54,8 +54,8 @@ std::size_t probe_frame_header(io::BlockInput& file, std::uint64_t first_frame,
   return kLong;
 }
 
-std::unique_ptr<Reader> open_lvx10(const std::string& path, const Progress&) {
-  io::BlockInput file(path);
+std::unique_ptr<Reader> open_lvx10(const io::InputFile& input, const Progress&) {
+  io::BlockInput file(input);
   lvx_version(file);
   const std::size_t count = *lvx_header_bytes(file, kLvx10DeviceCountAt, 1, "number of devices");
   RecordingHeader header;

@@ -38,15 +38,15 @@ bool recognises_lvx11(std::string_view head) {
   return head.starts_with(kLvxName) && !kLvx10Format.recognises(head);
 }
 
-std::unique_ptr<Reader> open_lvx11(const std::string& path, const Progress&) {
-  io::BlockInput file(path);
+std::unique_ptr<Reader> open_lvx11(const io::InputFile& input, const Progress&) {
+  io::BlockInput file(input);
   const auto version_bytes = lvx_version(file);
   if (version_bytes[0] == 2) {
-    throw FileError(path, {kLvxName.size(), {}},
+    throw FileError(input.path(), {kLvxName.size(), {}},
                     "LVX 2 (HAP and Mid-360 generation) is not supported, only LVX 1.0 and 1.1");
   }
   if (version_bytes != std::array<std::uint8_t, 4>{1, 1, 0, 0}) {
-    throw FileError(path, {kLvxName.size(), {}},
+    throw FileError(input.path(), {kLvxName.size(), {}},
                     fmt::format("LVX version = {}, allowed 1.0.0.0 and 1.1.0.0",
                                 fmt::join(version_bytes, ".")));
   }

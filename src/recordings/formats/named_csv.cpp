@@ -193,14 +193,15 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   return head;
 }
 
-NamedTextLayout read_layout(const std::string& path) {
-  const auto head = find_head(io::read_file_head(path, kHeadBytes, "a recording"));
+NamedTextLayout read_layout(const io::InputFile& file) {
+  const auto head = find_head(io::read_file_head(file, kHeadBytes));
   if (!head) {
-    throw FileError(path, {{}, 1}, "expected a line with the names of the columns, found none");
+    throw FileError(file.path(), {{}, 1},
+                    "expected a line with the names of the columns, found none");
   }
   if (head->layout.names.empty()) {
     throw FileError(
-        path, {{}, head->layout.first_row_line},
+        file.path(), {{}, head->layout.first_row_line},
         "expected a line with the names of the columns before the first row, found numbers; add "
         "such a line, as in x_m,y_m,z_m or time_s,azimuth_deg,zenith_deg,range_m");
   }
@@ -217,8 +218,8 @@ const Format kNamedCsvFormat = {
       const auto head = find_head(bytes);
       return head && (head->has_row || has_directions(*head));
     },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<NamedTextReader>(path, kNamedCsv, read_layout(path));
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<NamedTextReader>(file, kNamedCsv, read_layout(file));
     },
 };
 

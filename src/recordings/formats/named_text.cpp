@@ -12,9 +12,9 @@
 
 namespace risley::recordings {
 
-NamedTextReader::NamedTextReader(const std::string& path, std::string_view format,
+NamedTextReader::NamedTextReader(const io::InputFile& file, std::string_view format,
                                  NamedTextLayout layout)
-    : TextTableReader(path, std::string(format)),
+    : TextTableReader(file, std::string(format)),
       layout_(std::move(layout)),
       columns_(find_columns()) {
   set_column_count(layout_.names.size(), layout_.delimiter, layout_.lists);
@@ -58,9 +58,9 @@ void NamedTextReader::append_row(Fields fields, Chunk& chunk) {
   columns_.append(cells_, chunk.observations);
 }
 
-HeaderLines::HeaderLines(const std::string& path) : path_(path) {
+HeaderLines::HeaderLines(const io::InputFile& input) : path_(input.path()) {
   constexpr std::uint64_t kLongestHeader = std::uint64_t{1} << 16;
-  io::BlockInput file(path);
+  io::BlockInput file(input);
   file_size_ = file.size();
   const auto count = static_cast<std::size_t>(std::min(file_size_, kLongestHeader));
   if (count > 0) bytes_.assign(reinterpret_cast<const char*>(file.at(0, count)), count);

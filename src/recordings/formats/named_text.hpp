@@ -28,7 +28,7 @@ struct NamedTextLayout {
 class NamedTextReader final : public TextTableReader {
  public:
   /// @throws FileError when no rows can be made of the columns
-  NamedTextReader(const std::string& path, std::string_view format, NamedTextLayout layout);
+  NamedTextReader(const io::InputFile& file, std::string_view format, NamedTextLayout layout);
 
  private:
   NamedColumns find_columns() const;
@@ -44,7 +44,7 @@ class NamedTextReader final : public TextTableReader {
 class HeaderLines {
  public:
   /// @throws FileError
-  explicit HeaderLines(const std::string& path);
+  explicit HeaderLines(const io::InputFile& input);
 
   /// The next line without its end and the blanks around it.
   /// @throws FileError at the end of the file, or of the longest header

@@ -135,7 +135,7 @@ template <class Values>
 using ElementOf = typename ColumnElement<Values>::Type;
 
 /// @throws FileError where the file is damaged or of another layout
-std::unique_ptr<Reader> open_recording(const std::string& path, const Progress& progress);
+std::unique_ptr<Reader> open_recording(const io::InputFile& file, const Progress& progress);
 
 /// @throws FileError where the file cannot be written, InvalidArgument for a header without device
 std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header);

@@ -85,7 +85,8 @@ struct GetRecords {
 
 class NetcdfReader final : public Reader {
  public:
-  NetcdfReader(const std::string& path, const Progress& progress) : file_(path, progress) {
+  explicit NetcdfReader(std::shared_ptr<const tables::NetcdfInput> input)
+      : input_(std::move(input)), file_(*input_) {
     read_header();
     const auto row = file_.dimension(kRowDimension);
     const auto packet = file_.dimension(kPacketDimension);
@@ -117,6 +118,8 @@ class NetcdfReader final : public Reader {
     if (!some && pending_) throw FileError(*pending_);
     return some;
   }
+
+  std::unique_ptr<Reader> again() const override { return std::make_unique<NetcdfReader>(input_); }
 
   double fraction_read() const override {
     const std::size_t total = row_count_ + imu_count_;
@@ -251,7 +254,8 @@ class NetcdfReader final : public Reader {
     chunk.imu.resize(samples);
   }
 
-  tables::NetcdfInput file_;
+  std::shared_ptr<const tables::NetcdfInput> input_;  ///< one process for all readers of a file
+  const tables::NetcdfInput& file_;
   Variables variables_;
   std::size_t row_count_ = 0, packet_count_ = 0, imu_count_ = 0;
   std::size_t row_ = 0, imu_sample_ = 0, packets_read_ = 0, next_packet_ = 0;
@@ -261,8 +265,9 @@ class NetcdfReader final : public Reader {
 
 }  // namespace
 
-std::unique_ptr<Reader> open_recording(const std::string& path, const Progress& progress) {
-  return std::make_unique<NetcdfReader>(path, progress);
+std::unique_ptr<Reader> open_recording(const io::InputFile& file, const Progress& progress) {
+  return std::make_unique<NetcdfReader>(
+      std::make_shared<const tables::NetcdfInput>(file, progress));
 }
 
 }  // namespace risley::recordings::netcdf

@@ -22,25 +22,25 @@ namespace {
 constexpr std::string_view kNpyName = "npy", kNpzName = "npz";
 constexpr std::string_view kMemberEnding = ".npy";
 
-BinaryTable npy_table(const std::string& path) {
-  FileSource source(path, 0, UINT64_MAX);
+BinaryTable npy_table(const io::InputFile& file) {
+  FileSource source(file, 0, UINT64_MAX);
   try {
     const ArrayHeader header = read_array_header(source);
     BinaryTable table;
     add_table(
         header,
-        [path](std::uint64_t offset) {
-          return std::make_unique<FileSource>(path, offset, UINT64_MAX);
+        [file](std::uint64_t offset) {
+          return std::make_unique<FileSource>(file, offset, UINT64_MAX);
         },
         table);
     const std::uint64_t end = header.data_offset + header.elements() * header.element_bytes;
-    const std::uint64_t size = io::BlockInput(path).size();
+    const std::uint64_t size = file.size();
     if (size > end) {
       table.warnings.push_back(fmt::format("{} bytes after the array were not read", size - end));
     }
     return table;
   } catch (const BadArray& bad) {
-    throw FileError(path, {0, {}}, bad.what());
+    throw FileError(file.path(), {0, {}}, bad.what());
   }
 }
 
@@ -73,9 +73,9 @@ const Member* find_table(const std::vector<Member>& members) {
   return tables == 1 ? only : nullptr;
 }
 
-std::vector<Member> npz_members(const std::string& path, std::vector<std::string>& left_out) {
+std::vector<Member> npz_members(const io::InputFile& file, std::vector<std::string>& left_out) {
   std::vector<Member> members;
-  for (const ZipMember& zipped : zip_members(path)) {
+  for (const ZipMember& zipped : zip_members(file)) {
     if (!zipped.name.ends_with(kMemberEnding)) {
       left_out.push_back(zipped.name);
       continue;
@@ -83,14 +83,14 @@ std::vector<Member> npz_members(const std::string& path, std::vector<std::string
     Member member;
     member.name = zipped.name.substr(0, zipped.name.size() - kMemberEnding.size());
     member.begin = zipped.begin;
-    member.open = [path, zipped](std::uint64_t offset) {
-      return open_member(path, zipped, offset);
+    member.open = [file, zipped](std::uint64_t offset) {
+      return open_member(file, zipped, offset);
     };
     const auto source = member.open(0);
     try {
       member.header = read_array_header(*source);
     } catch (const BadArray& bad) {
-      throw FileError(path, {zipped.begin, {}},
+      throw FileError(file.path(), {zipped.begin, {}},
                       fmt::format("member {}: {}", printable(zipped.name), bad.what()));
     }
     const std::uint64_t expected =
@@ -100,7 +100,7 @@ std::vector<Member> npz_members(const std::string& path, std::vector<std::string
       continue;
     }
     if (expected != zipped.bytes) {
-      throw FileError(path, {zipped.begin, {}},
+      throw FileError(file.path(), {zipped.begin, {}},
                       fmt::format("expected {} bytes in member {} ({} of {} bytes), found {}",
                                   expected, printable(zipped.name), member.header.shape_text(),
                                   member.header.element_bytes, zipped.bytes));
@@ -110,11 +110,12 @@ std::vector<Member> npz_members(const std::string& path, std::vector<std::string
   return members;
 }
 
-BinaryTable npz_table(const std::string& path) {
+BinaryTable npz_table(const io::InputFile& file) {
   std::vector<std::string> left_out;
-  const std::vector<Member> members = npz_members(path, left_out);
+  const std::vector<Member> members = npz_members(file, left_out);
   if (members.empty()) {
-    throw FileError(path, {0, {}}, "expected a zip file of NumPy arrays, found no array in it");
+    throw FileError(file.path(), {0, {}},
+                    "expected a zip file of NumPy arrays, found no array in it");
   }
   BinaryTable table;
   table.columns_offset = members.front().begin;
@@ -146,7 +147,7 @@ BinaryTable npz_table(const std::string& path) {
       }
     }
   } else {
-    throw FileError(path, {table.columns_offset, {}},
+    throw FileError(file.path(), {table.columns_offset, {}},
                     fmt::format("expected arrays x, y and z of equal length, or one array of "
                                 "points; found {}",
                                 printable(found)));
@@ -175,8 +176,8 @@ const Format kNpyFormat = {
     "",
     "NumPy array of named fields, or of rows x y z [intensity] (read only)",
     [](std::string_view head) { return head.starts_with(kArraySignature); },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<BinaryTableReader>(path, kNpyName, npy_table(path));
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<BinaryTableReader>(file.path(), kNpyName, npy_table(file));
     },
 };
 
@@ -185,8 +186,8 @@ const Format kNpzFormat = {
     "",
     "NumPy arrays by name, such as x, y, z and time (read only)",
     [](std::string_view head) { return head.starts_with("PK\x03\x04"); },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      return std::make_unique<BinaryTableReader>(path, kNpzName, npz_table(path));
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      return std::make_unique<BinaryTableReader>(file.path(), kNpzName, npz_table(file));
     },
 };
 

@@ -50,7 +50,7 @@ RecordParts parts_of(const OpenpylivoxLayout& layout) {
 
 class OpenpylivoxBinReader final : public Reader {
  public:
-  explicit OpenpylivoxBinReader(const std::string& path) : input_(path) {
+  explicit OpenpylivoxBinReader(const io::InputFile& file) : input_(file) {
     header_.format = kOpenpylivoxBinName;
     layout_ = read_layout();
     parts_ = parts_of(layout_);

@@ -47,8 +47,8 @@ const Variant* find_variant(std::string_view header) {
 
 class OpenpylivoxCsvReader final : public TextTableReader {
  public:
-  explicit OpenpylivoxCsvReader(const std::string& path)
-      : TextTableReader(path, std::string(kOpenpylivoxCsvName)) {
+  explicit OpenpylivoxCsvReader(const io::InputFile& file)
+      : TextTableReader(file, std::string(kOpenpylivoxCsvName)) {
     const Variant* const variant = find_variant(table_header());
     if (variant == nullptr) refuse_header("of an openpylivox table (//X,Y,Z,Inten-sity,Time, ...)");
     variant_ = *variant;

@@ -83,7 +83,7 @@ std::optional<wire::Broadcast> broadcast_of(const CapturedDatagram& datagram) {
 /// Reads captures. The first look at the file finds its sensors.
 class PcapReader final : public Reader {
  public:
-  PcapReader(const std::string& path, const Progress& progress);
+  PcapReader(const io::InputFile& file, const Progress& progress);
 
   bool read(Chunk& chunk, std::size_t max_rows) override;
   double fraction_read() const override { return file_.fraction_read(); }
@@ -137,7 +137,7 @@ class PcapReader final : public Reader {
   std::map<wire::Address, Named> named_;
 };
 
-PcapReader::PcapReader(const std::string& path, const Progress& progress) : file_(path) {
+PcapReader::PcapReader(const io::InputFile& file, const Progress& progress) : file_(file) {
   header_.format = kPcapFormat.name;
   look_through(progress);
   for (std::size_t row = 0; row < header_.devices.size(); ++row) {
@@ -150,7 +150,7 @@ PcapReader::PcapReader(const std::string& path, const Progress& progress) : file
   seen_.clear();
   seen_rows_.clear();
   cut_ = 0;
-  file_ = CaptureFile(path);
+  file_ = CaptureFile(file);
 }
 
 void PcapReader::look_through(const Progress& progress) {
@@ -419,8 +419,8 @@ const Format kPcapFormat = {
     "",
     "capture of a network, pcap or pcapng: packets of Livox sensors (read only)",
     is_capture,
-    [](const std::string& path, const Progress& progress) -> std::unique_ptr<Reader> {
-      return std::make_unique<PcapReader>(path, progress);
+    [](const io::InputFile& file, const Progress& progress) -> std::unique_ptr<Reader> {
+      return std::make_unique<PcapReader>(file, progress);
     },
 };
 

@@ -49,8 +49,8 @@ void per_field(const HeaderLines& lines, PcdHeader& header,
   for (std::size_t i = 1; i < words.size(); ++i) take(header.fields[i - 1], words[i]);
 }
 
-PcdHeader read_pcd_header(const std::string& path) {
-  HeaderLines lines(path);
+PcdHeader read_pcd_header(const io::InputFile& file) {
+  HeaderLines lines(file);
   PcdHeader header;
   std::optional<std::uint64_t> width, height, points;
   try {
@@ -150,11 +150,11 @@ NamedTextLayout text_layout(PcdHeader header) {
   return layout;
 }
 
-BinaryTable binary_table(const std::string& path, PcdHeader header) {
-  const std::uint64_t file_size = io::BlockInput(path).size();
+BinaryTable binary_table(const io::InputFile& input, PcdHeader header) {
+  const std::uint64_t file_size = input.size();
   const bool packed = header.data == "binary_compressed";
   const auto fail = [&](std::uint64_t offset, const std::string& problem) {
-    throw FileError(path, {offset, {}}, problem);
+    throw FileError(input.path(), {offset, {}}, problem);
   };
   BinaryTable table;
   table.rows = header.points;
@@ -185,7 +185,7 @@ BinaryTable binary_table(const std::string& path, PcdHeader header) {
   }
   const std::uint64_t begin = header.data_offset;
   if (!packed) {
-    table.lanes.push_back({[=] { return std::make_unique<FileSource>(path, begin, UINT64_MAX); },
+    table.lanes.push_back({[=] { return std::make_unique<FileSource>(input, begin, UINT64_MAX); },
                            static_cast<std::size_t>(point_bytes)});
     const std::uint64_t left = file_size - begin;
     if (point_bytes > 0 && header.points <= left / point_bytes &&
@@ -199,7 +199,7 @@ BinaryTable binary_table(const std::string& path, PcdHeader header) {
   if (file_size - begin < kSizesBytes) {
     fail(begin, "expected the two sizes of the compressed points, found the end of the file");
   }
-  io::BlockInput file(path);
+  io::BlockInput file(input);
   const std::uint8_t* const sizes = file.at(begin, kSizesBytes);
   const auto packed_bytes = load<std::uint32_t>(sizes), all_bytes = load<std::uint32_t>(sizes + 4);
   std::uint64_t expected = 0;
@@ -218,7 +218,7 @@ BinaryTable binary_table(const std::string& path, PcdHeader header) {
     const std::uint64_t before = field_offsets[i] * header.points;
     const auto open = [=]() -> std::unique_ptr<ByteSource> {
       auto source = std::make_unique<LzfSource>(
-          std::make_unique<FileSource>(path, packed_begin, packed_begin + packed_bytes));
+          std::make_unique<FileSource>(input, packed_begin, packed_begin + packed_bytes));
       source->skip(before);
       return source;
     };
@@ -245,17 +245,18 @@ const Format kPcdFormat = {
     "",
     "PCD point cloud: text, binary or compressed binary (read only)",
     is_pcd,
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      PcdHeader header = read_pcd_header(path);
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      PcdHeader header = read_pcd_header(file);
       if (header.data == "ascii") {
-        return std::make_unique<NamedTextReader>(path, kPcd, text_layout(std::move(header)));
+        return std::make_unique<NamedTextReader>(file, kPcd, text_layout(std::move(header)));
       }
       if (header.data != "binary" && header.data != "binary_compressed") {
-        throw FileError(path, {{}, header.data_line - 1},
+        throw FileError(file.path(), {{}, header.data_line - 1},
                         fmt::format("expected DATA ascii, binary or binary_compressed, found {}",
                                     printable(header.data)));
       }
-      return std::make_unique<BinaryTableReader>(path, kPcd, binary_table(path, std::move(header)));
+      return std::make_unique<BinaryTableReader>(file.path(), kPcd,
+                                                 binary_table(file, std::move(header)));
     },
 };
 

@@ -89,8 +89,8 @@ void read_property(const HeaderLines& lines, const std::vector<std::string_view>
   header.elements.back().properties.push_back({std::string(name), *type, length});
 }
 
-PlyHeader read_ply_header(const std::string& path) {
-  HeaderLines lines(path);
+PlyHeader read_ply_header(const io::InputFile& file) {
+  HeaderLines lines(file);
   PlyHeader header;
   bool has_format = false;
   lines.next();  // "ply"
@@ -242,8 +242,8 @@ class WithoutLists final : public ByteSource {
   std::size_t given_ = 0;             ///< of it
 };
 
-BinaryTable binary_table(const std::string& path, const PlyHeader& header) {
-  io::BlockInput file(path);
+BinaryTable binary_table(const io::InputFile& input, const PlyHeader& header) {
+  io::BlockInput file(input);
   std::uint64_t begin = header.data_offset;
   for (auto element = header.elements.begin(); element + 1 != header.elements.end(); ++element) {
     begin = end_of(*element, begin, file);
@@ -264,12 +264,13 @@ BinaryTable binary_table(const std::string& path, const PlyHeader& header) {
   }
   if (lists.empty()) {
     table.lanes.push_back(
-        {[=] { return std::make_unique<FileSource>(path, begin, UINT64_MAX); }, offset});
+        {[=] { return std::make_unique<FileSource>(input, begin, UINT64_MAX); }, offset});
   } else {
     table.warnings.push_back(fmt::format("lists of the vertices were not used: {}", lists));
     table.lanes.push_back({[=, properties = vertices.properties] {
                              return std::make_unique<WithoutLists>(
-                                 std::make_unique<FileSource>(path, begin, UINT64_MAX), properties);
+                                 std::make_unique<FileSource>(input, begin, UINT64_MAX),
+                                 properties);
                            },
                            offset});
   }
@@ -283,12 +284,12 @@ const Format kPlyFormat = {
     "",
     "PLY point cloud: text or binary (read only)",
     [](std::string_view head) { return head.starts_with("ply\n") || head.starts_with("ply\r\n"); },
-    [](const std::string& path, const Progress&) -> std::unique_ptr<Reader> {
-      const PlyHeader header = read_ply_header(path);
+    [](const io::InputFile& file, const Progress&) -> std::unique_ptr<Reader> {
+      const PlyHeader header = read_ply_header(file);
       if (header.text) {
-        return std::make_unique<NamedTextReader>(path, kPly, text_layout(header));
+        return std::make_unique<NamedTextReader>(file, kPly, text_layout(header));
       }
-      return std::make_unique<BinaryTableReader>(path, kPly, binary_table(path, header));
+      return std::make_unique<BinaryTableReader>(file.path(), kPly, binary_table(file, header));
     },
 };
 

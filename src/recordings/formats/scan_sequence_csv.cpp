@@ -36,8 +36,8 @@ float resolution_of(int decimals) {
 
 class ScanSequenceReader final : public TextTableReader {
  public:
-  explicit ScanSequenceReader(const std::string& path)
-      : TextTableReader(path, std::string(kScanSequenceCsv)) {
+  explicit ScanSequenceReader(const io::InputFile& file)
+      : TextTableReader(file, std::string(kScanSequenceCsv)) {
     if (table_header() != kSequenceHeader) refuse_header(std::string(kSequenceHeader));
     set_column_count(3);
     header_.has_range = header_.has_intensity = false;

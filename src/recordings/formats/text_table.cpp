@@ -23,8 +23,8 @@ int decimals_of(std::string_view field) {
 
 }  // namespace
 
-TextTableReader::TextTableReader(const std::string& path, std::string format)
-    : path_(path), lines_(path, io::LinesOf::table) {
+TextTableReader::TextTableReader(const io::InputFile& file, std::string format)
+    : path_(file.path()), lines_(file, io::LinesOf::table) {
   header_.format = std::move(format);
   header_.devices.resize(1);
   std::string_view line;

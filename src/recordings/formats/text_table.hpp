@@ -53,7 +53,7 @@ class TextTableReader : public Reader {
   using Fields = std::span<const std::string_view>;
 
   /// Opens the file and reads its first line.
-  TextTableReader(const std::string& path, std::string format);
+  TextTableReader(const io::InputFile& file, std::string format);
 
   const std::string& table_header() const { return table_header_; }  ///< normalised
   /// How a row is built; to be called once by the constructor of the derived class.
@@ -107,7 +107,7 @@ class TextTableReader : public Reader {
 template <class Function>
 void TextTableReader::look_ahead(std::size_t max_rows, Function&& function) const {
   try {
-    LineReader lines(path_, io::LinesOf::table);
+    LineReader lines(lines_.file(), io::LinesOf::table);
     std::string_view line;
     std::vector<std::string_view> fields(fields_.size());
     std::size_t count = 0;

@@ -112,8 +112,8 @@ struct Sensor {
 
 class ViewerCsvReader final : public TextTableReader {
  public:
-  explicit ViewerCsvReader(const std::string& path)
-      : TextTableReader(path, std::string(kViewerCsv)) {
+  explicit ViewerCsvReader(const io::InputFile& file)
+      : TextTableReader(file, std::string(kViewerCsv)) {
     if (table_header() != kViewerHeader) refuse_header("of a Livox Viewer table (19 columns)");
     set_column_count(kColumnCount);
     header_.devices.clear();

@@ -33,7 +33,7 @@ constexpr std::uint64_t kMostExpansion = 1040;
 
 class ZipDirectory {
  public:
-  explicit ZipDirectory(const std::string& path) : file_(path) {}
+  explicit ZipDirectory(const io::InputFile& file) : file_(file) {}
 
   std::vector<ZipMember> members() {
     const std::uint64_t end = find_end();
@@ -172,12 +172,13 @@ class ZipDirectory {
 /// The bytes of a member, and at their end the test of the checksum.
 class MemberSource final : public ByteSource {
  public:
-  MemberSource(const std::string& path, const ZipMember& member)
+  MemberSource(const io::InputFile& file, const ZipMember& member)
       : member_(member),
-        packed_(path, member.begin, member.begin + member.packed_bytes),
+        packed_(file, member.begin, member.begin + member.packed_bytes),
         block_(member.method == kDeflated ? kBlockBytes : 0) {
     if (member.method == kDeflated && inflateInit2(&stream_, -MAX_WBITS) != Z_OK) {
-      throw FileError(path, {member.begin, {}}, "there is not enough memory to unpack a member");
+      throw FileError(file.path(), {member.begin, {}},
+                      "there is not enough memory to unpack a member");
     }
   }
   ~MemberSource() override {
@@ -240,11 +241,13 @@ class MemberSource final : public ByteSource {
 
 }  // namespace
 
-std::vector<ZipMember> zip_members(const std::string& path) { return ZipDirectory(path).members(); }
+std::vector<ZipMember> zip_members(const io::InputFile& file) {
+  return ZipDirectory(file).members();
+}
 
-std::unique_ptr<ByteSource> open_member(const std::string& path, const ZipMember& member,
+std::unique_ptr<ByteSource> open_member(const io::InputFile& file, const ZipMember& member,
                                         std::uint64_t offset) {
-  auto source = std::make_unique<MemberSource>(path, member);
+  auto source = std::make_unique<MemberSource>(file, member);
   source->skip(offset);
   return source;
 }
