@@ -88,7 +88,7 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   PreparedRecording input =
       prepare_recording(std::exchange(recording, {}), options.reading,
                         {.sensor_frame = true, .sensor = calibration}, progress);
-  input.source = {};  // and with it what was decoded first
+  input.close_questions();
   RecordingCloud result{
       options.recording.name(), options.output, options.calibration, calibration.reference,
       cloud::make_cloud(*input.reader, calibration, options.output, settings, progress)};

@@ -50,7 +50,7 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const auto writer = recordings::create_recording(
       options.output, header_of(input, options, result, progress.silent()), options.format);
-  input.source = {};  // and with it what was decoded first
+  input.close_questions();
   // While one chunk is written, the next is read.
   recordings::Chunk chunk, next;
   parallel::TaskGroup writing;

@@ -29,7 +29,8 @@ using identification::Identification;
 estimation::AngleSeries read(const recordings::Source& recording,
                              const IdentifyRecordingOptions& options, IdentifiedRecording& result,
                              const Progress& progress) {
-  const PreparedRecording input = prepare_recording(recording, options.reading, {}, progress);
+  PreparedRecording input = prepare_recording(recording, options.reading, {}, progress);
+  input.close_questions();
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_one_device(header, options.recording.name());

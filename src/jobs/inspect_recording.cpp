@@ -27,7 +27,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   }
   std::string removed;
   if (!input.reader->header().has_times) removed = input.removed_shots_words(progress.silent());
-  input.source = {};  // and with it what was decoded first
+  input.close_questions();
   const Progress reading = progress.stage("reading");
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   recordings::TimeAudit audit;

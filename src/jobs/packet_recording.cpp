@@ -22,11 +22,11 @@ constexpr std::size_t kFewestPackets = 10;
 
 std::optional<PacketRecording> PacketRecording::open(const PreparedRecording& recording,
                                                      const Progress& progress) {
-  const recordings::RecordingHeader& header = recording.reader->header();
-  if (header.packet_shots == 0 || header.devices.size() != 1) return std::nullopt;
   recordings::ReadOptions as_it_is;
   as_it_is.extrinsics = recording.reading.extrinsics;
+  if (recording.reader->header().devices.size() != 1) return std::nullopt;
   const auto reader = recordings::open_recording(recording.source, as_it_is, progress);
+  if (reader->header().packet_shots == 0) return std::nullopt;
   const auto variance = [](float step) { return step * step / 12.0F; };
   PacketRecording result;
   estimation::PacketShots& shots = result.shots_;

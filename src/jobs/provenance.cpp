@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/provenance.hpp"
 
+#include <algorithm>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -49,14 +50,21 @@ struct InputHashes::Input {
 InputHashes::InputHashes(const std::vector<recordings::Source>& inputs, const Progress& progress) {
   for (const recordings::Source& source : inputs) {
     Input& input = *inputs_.emplace_back(new Input{source.recording() ? source.name() : ""});
-    input.task.run([&input, source = recordings::Source(source),
-                    own = progress.silent()]() mutable {
-      for (const std::string& file : recordings::recording_files(source)) {
-        input.hashes.emplace_back(
-            file, is_read_once(file) ? "" : hashes::sha256_of_file(source.open_file(file), own));
-      }
-      source = {};  // and with it what was read of it
-    });
+    input.task.run(
+        [&input, source = recordings::Source(source), own = progress.silent()]() mutable {
+          std::vector<io::InputFile> files;
+          for (const std::string& file : recordings::recording_files(source)) {
+            input.hashes.emplace_back(file, "");
+            if (!is_read_once(file)) files.push_back(source.open_file(file));
+          }
+          source = {};  // and with it what was read of it
+          auto place = input.hashes.begin();
+          for (const io::InputFile& file : files) {
+            place = std::find_if(place, input.hashes.end(),
+                                 [&](const auto& one) { return one.first == file.path(); });
+            place->second = hashes::sha256_of_file(file, own);
+          }
+        });
   }
 }
 

@@ -31,7 +31,9 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
       prepare_recording(options.recording, options.reading,
                         {.sensor_frame = true, .sensor = given_sensor(options.sensor)}, progress);
   recordings::Reader& reader = *input.reader;
-  recordings::require_one_device(reader.header(), input.source.name());
+  const std::string name = input.source.name();
+  recordings::require_one_device(reader.header(), name);
+  input.source = {};  // the rows are read for the last time
   EstimationInput result;
   result.whole_steps = reader.header().cartesian && !input.turned_back && !input.cut_mended;
   estimation::SelectionOptions selection = options.selection;
@@ -52,7 +54,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
                              selector.add(chunks[slot].observations);
                              result.series.append(selector.take_series());
                            }}});
-  result.recording = {input.source.name(), reader.header(), audit.result()};
+  result.recording = {name, reader.header(), audit.result()};
   for (const auto& warning : reader.warnings()) result.warnings.push_back(warning_text(warning));
   result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
   result.choice = *std::move(input.choice);

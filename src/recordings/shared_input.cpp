@@ -52,19 +52,19 @@ std::string shown(std::string_view head) {
 class SharedReader final : public Reader {
  public:
   SharedReader(std::shared_ptr<SharedInput> input, const Progress& progress)
-      : input_(std::move(input)), progress_(progress), first_(input_->first_rows(progress)) {
-    header_ = first_->header;
-    warnings_ = first_->warnings;
-    clock_wraps_ = first_->clock_wraps;
+      : input_(std::move(input)), progress_(progress), first_(*input_->first_rows(progress)) {
+    header_ = first_.header;
+    warnings_ = first_.warnings;
+    clock_wraps_ = first_.clock_wraps;
   }
 
   bool read(Chunk& chunk, std::size_t max_rows) override {
+    if (input_.use_count() == 1) input_->first_.reset();  // nobody else asks any more
     if (!rest_) {
       if (read_held(chunk, max_rows)) return true;
-      if (first_->failure) throw FileError(*first_->failure);
-      if (first_->ended) return false;
-      rest_ = input_->behind(*first_, progress_);
-      first_.reset();
+      if (first_.failure) throw FileError(*first_.failure);
+      if (first_.ended) return false;
+      rest_ = input_->behind(first_, progress_);
     }
     const auto take_over = [this] {
       header_ = rest_->header();
@@ -83,18 +83,18 @@ class SharedReader final : public Reader {
 
   double fraction_read() const override {
     if (rest_) return rest_->fraction_read();
-    if (first_->rows == 0) return first_->fraction;
-    return first_->fraction * static_cast<double>(given_) / static_cast<double>(first_->rows);
+    if (first_.rows == 0) return first_.fraction;
+    return first_.fraction * static_cast<double>(given_) / static_cast<double>(first_.rows);
   }
 
  private:
   /// The next rows of the present chunk. A decoder's own chunks are given as they came.
   bool read_held(Chunk& chunk, std::size_t max_rows) {
     chunk.clear();
-    if (chunk_ == first_->chunks.size()) return false;
-    const Chunk& all = *first_->chunks[chunk_];
+    if (chunk_ == first_.chunks.size()) return false;
+    const Chunk& all = *first_.chunks[chunk_];
     const bool whole =
-        first_->are_decoded && row_ + sample_ + packet_ == 0 && max_rows >= kDefaultChunkRows;
+        first_.are_decoded && row_ + sample_ + packet_ == 0 && max_rows >= kDefaultChunkRows;
     if (whole) max_rows = all.observations.size() + all.imu.size() + all.packets.size() + 1;
     std::size_t rows = 0, samples = 0;
     for (; packet_ < all.packets.size() && rows + samples < max_rows; ++packet_) {
@@ -120,7 +120,7 @@ class SharedReader final : public Reader {
     const bool some = rows > 0 || samples > 0 || !chunk.packets.empty();
     if (row_ == all.observations.size() && sample_ == all.imu.size() &&
         packet_ == all.packets.size()) {
-      ++chunk_;
+      first_.chunks[chunk_++].reset();
       row_ = packet_ = sample_ = begin_ = 0;
     }
     return some || read_held(chunk, max_rows);
@@ -138,7 +138,7 @@ class SharedReader final : public Reader {
 
   std::shared_ptr<SharedInput> input_;
   Progress progress_;
-  std::shared_ptr<const FirstRows> first_;
+  FirstRows first_;
   std::size_t chunk_ = 0, row_ = 0, packet_ = 0, sample_ = 0, begin_ = 0;  ///< the next of each
   std::size_t given_ = 0;                                                  ///< rows
   std::unique_ptr<Reader> rest_;

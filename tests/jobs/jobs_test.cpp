@@ -184,30 +184,45 @@ class OpenCounter {
 
 TEST_F(JobsTest, OpenTheirInputOnce) {
   const std::string lvx = path("hall.lvx"), csv = path("hall.csv");
-  convert_recording({.recording = hall(), .output = lvx});
-  convert_recording({.recording = hall(), .output = csv});
+  const auto convert = [](const std::string& input, const std::string& output) {
+    ConvertRecordingOptions options;
+    options.recording = input;
+    options.output = output;
+    convert_recording(options);
+  };
+  convert(hall(), lvx);
+  convert(hall(), csv);
   auto estimate = estimation();
   estimate.truth.clear();
   estimate.details = false;
   estimate_recording(estimate);
   const std::string calibrated = path("estimate/calibration.yaml");
   const std::vector<std::pair<const char*, std::function<void(const std::string&)>>> jobs = {
-      {"info", [](const std::string& input) { inspect_recording({.recording = input}); }},
+      {"info",
+       [](const std::string& input) {
+         InspectRecordingOptions options;
+         options.recording = input;
+         inspect_recording(options);
+       }},
       {"estimate",
        [&](const std::string& input) {
          estimate.recording = input;
          estimate_recording(estimate);
        }},
       {"observability",
-       [](const std::string& input) { judge_observability({.recording = input}); }},
+       [](const std::string& input) {
+         ObservabilityOptions options;
+         options.recording = input;
+         judge_observability(options);
+       }},
       {"identify",
        [&](const std::string& input) {
-         identify_recording({.recording = input, .output = path("identified.yaml")});
+         IdentifyRecordingOptions options;
+         options.recording = input;
+         options.output = path("identified.yaml");
+         identify_recording(options);
        }},
-      {"convert",
-       [&](const std::string& input) {
-         convert_recording({.recording = input, .output = path("converted.nc")});
-       }},
+      {"convert", [&](const std::string& input) { convert(input, path("converted.nc")); }},
       {"calibrate",
        [&](const std::string& input) {
          auto options = calibration();

@@ -44,6 +44,11 @@ struct PreparedRecording {
   bool turned_back = false;     ///< by a pose, stated or given, or a roll that was found
   bool cut_mended = false;      ///< points were moved to the middle of where they were before a cut
 
+  /// Leaves what only questions need, before all rows are read.
+  void close_questions() {
+    source = {};
+    first = {};
+  }
   /// Begins at the first row again.
   void read_again(const Progress& progress);
   /// What is wrong with the shots of a recording without times where those without a return were
