@@ -20,7 +20,8 @@ const Format kMcapFormat = {
     "ROS 2 or ROS 1 bag in MCAP: messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::mcap; },
     [](const io::InputFile& file, const Progress& progress) -> std::unique_ptr<Reader> {
-      return std::make_unique<MessageReader>(bags::open_bag(file, progress), kMcap);
+      return std::make_unique<MessageReader>(bags::open_bag(file, bags::BagKind::mcap, progress),
+                                             kMcap);
     },
     nullptr,
 };

@@ -20,7 +20,8 @@ const Format kRos1BagFormat = {
     "ROS 1 bag: messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::ros1; },
     [](const io::InputFile& file, const Progress& progress) -> std::unique_ptr<Reader> {
-      return std::make_unique<MessageReader>(bags::open_bag(file, progress), kRos1Bag);
+      return std::make_unique<MessageReader>(bags::open_bag(file, bags::BagKind::ros1, progress),
+                                             kRos1Bag);
     },
     nullptr,
 };

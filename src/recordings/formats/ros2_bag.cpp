@@ -20,7 +20,8 @@ const Format kRos2BagFormat = {
     "ROS 2 bag in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
     [](std::string_view head) { return bags::bag_kind(head) == bags::BagKind::ros2; },
     [](const io::InputFile& file, const Progress& progress) -> std::unique_ptr<Reader> {
-      return std::make_unique<MessageReader>(bags::open_bag(file, progress), kRos2Bag);
+      return std::make_unique<MessageReader>(bags::open_bag(file, bags::BagKind::ros2, progress),
+                                             kRos2Bag);
     },
     nullptr,
 };
