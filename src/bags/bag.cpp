@@ -94,10 +94,8 @@ Topic ros1_topic(const std::string& name, const std::string& type, const std::st
   return topic;
 }
 
-std::unique_ptr<Bag> open_bag(const io::InputFile& file, const Progress& progress) {
-  const std::optional<BagKind> kind = bag_kind_of(file);
-  if (!kind) throw FileError(file.path(), {0, {}}, "is not a ROS 1 or ROS 2 bag");
-  switch (*kind) {
+std::unique_ptr<Bag> open_bag(const io::InputFile& file, BagKind kind, const Progress& progress) {
+  switch (kind) {
     case BagKind::ros1:
       return open_ros1_bag(file, progress);
     case BagKind::ros2:
@@ -109,15 +107,19 @@ std::unique_ptr<Bag> open_bag(const io::InputFile& file, const Progress& progres
 }
 
 std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress) {
-  return is_folder(path) ? open_bag_folder(path, progress)
-                         : open_bag(io::InputFile(path), progress);
+  if (is_folder(path)) return open_bag_folder(path, progress);
+  const io::InputFile file(path);
+  const std::optional<BagKind> kind = bag_kind_of(file);
+  if (!kind) throw FileError(path, {0, {}}, "is not a ROS 1 or ROS 2 bag");
+  return open_bag(file, *kind, progress);
 }
 
 std::vector<Topic> list_topics(const std::string& path, const Progress& progress) {
-  if (is_folder(path)) return open_bag(path, progress)->topics();
-  const io::InputFile file(path);
-  if (bag_kind_of(file) == BagKind::ros1) return list_ros1_topics(file);
-  return open_bag(file, progress)->topics();
+  if (!is_folder(path)) {
+    const io::InputFile file(path);
+    if (bag_kind_of(file) == BagKind::ros1) return list_ros1_topics(file);
+  }
+  return open_bag(path, progress)->topics();
 }
 
 }  // namespace risley::bags

@@ -178,7 +178,7 @@ class BagFolder final : public Bag {
           fmt::format("expected a bag of the same kind as the first file of the folder, {}",
                       name_of(kind())));
     }
-    return open_bag(file, progress_);
+    return open_bag(file, kind(), progress_);
   }
 
   std::size_t find(const Topic& topic) const {

@@ -47,8 +47,8 @@ std::string shown(std::string_view head) {
 
 }  // namespace
 
-/// Reads first rows that others have decoded, packets whole as their file would be read, and goes
-/// on behind them.
+/// Reads first rows that others have decoded, or columns in memory, packets whole as a file would
+/// be read, and goes on behind them.
 class SharedReader final : public Reader {
  public:
   SharedReader(std::shared_ptr<SharedInput> input, const Progress& progress)
@@ -59,7 +59,12 @@ class SharedReader final : public Reader {
   }
 
   bool read(Chunk& chunk, std::size_t max_rows) override {
+    progress_.check();
     if (input_.use_count() == 1) input_->first_.reset();  // nobody else asks any more
+    // Only the format knows where smaller chunks may end.
+    if (!rest_ && first_.are_decoded && given_ == 0 && max_rows < kDefaultChunkRows) {
+      rest_ = input_->behind({}, progress_);
+    }
     if (!rest_) {
       if (read_held(chunk, max_rows)) return true;
       if (first_.failure) throw FileError(*first_.failure);
@@ -93,9 +98,12 @@ class SharedReader final : public Reader {
     chunk.clear();
     if (chunk_ == first_.chunks.size()) return false;
     const Chunk& all = *first_.chunks[chunk_];
-    const bool whole =
-        first_.are_decoded && row_ + sample_ + packet_ == 0 && max_rows >= kDefaultChunkRows;
-    if (whole) max_rows = all.observations.size() + all.imu.size() + all.packets.size() + 1;
+    if (first_.are_decoded) {
+      chunk = all;
+      given_ += all.observations.size();
+      first_.chunks[chunk_++].reset();
+      return true;
+    }
     std::size_t rows = 0, samples = 0;
     for (; packet_ < all.packets.size() && rows + samples < max_rows; ++packet_) {
       const Packet& packet = all.packets[packet_];
@@ -219,8 +227,8 @@ std::shared_ptr<const FirstRows> SharedInput::first_rows(const Progress& progres
 
 std::unique_ptr<Reader> SharedInput::behind(const FirstRows& first, const Progress& progress) {
   const std::lock_guard lock(mutex_);
-  first_.reset();
-  if (rest_) return std::move(rest_);
+  if (first.rows > 0) first_.reset();
+  if (rest_ && first.rows > 0) return std::move(rest_);
   std::unique_ptr<Reader> reader = open(progress);
   Chunk chunk;
   for (std::size_t i = 0; i < first.chunks.size(); ++i) {

@@ -134,12 +134,14 @@ class Bag {
   BagKind kind_;
 };
 
-/// Opens a bag of the kind that the file's bytes tell. The structure of a ROS 1 bag is checked to
-/// its end before; an MCAP file without a sound summary is looked through for its topics.
+/// Opens a bag of a kind. The structure of a ROS 1 bag is checked to its end before; an MCAP file
+/// without a sound summary is looked through for its topics.
 /// @param progress  cancels opening and reading; its flag must outlive the bag
 /// @throws FileError when it is no bag, is cut off or damaged
-std::unique_ptr<Bag> open_bag(const io::InputFile& file, const Progress& progress = {});
-/// The same of a file, or of a folder as files_of_bag_folder() takes it, by its path.
+std::unique_ptr<Bag> open_bag(const io::InputFile& file, BagKind kind,
+                              const Progress& progress = {});
+/// The same of the kind that the bytes tell of a file, or of a folder as files_of_bag_folder()
+/// takes it, by its path.
 std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress = {});
 
 /// The topics of a bag, from its index alone.

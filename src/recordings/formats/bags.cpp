@@ -16,9 +16,9 @@ bool is_bag(std::string_view head) {
   return bags::bag_kind(head) == Kind;
 }
 
-template <const Format& Its>
+template <const Format& Its, bags::BagKind Kind>
 std::unique_ptr<Reader> open_bag(const io::InputFile& file, const Progress& progress) {
-  return std::make_unique<MessageReader>(bags::open_bag(file, progress), Its.name);
+  return std::make_unique<MessageReader>(bags::open_bag(file, Kind, progress), Its.name);
 }
 
 }  // namespace
@@ -28,7 +28,7 @@ const Format kRos1BagFormat = {
     "",
     "ROS 1 bag: messages of Livox drivers, point clouds (read only)",
     is_bag<bags::BagKind::ros1>,
-    open_bag<kRos1BagFormat>,
+    open_bag<kRos1BagFormat, bags::BagKind::ros1>,
 };
 
 const Format kRos2BagFormat = {
@@ -36,7 +36,7 @@ const Format kRos2BagFormat = {
     "",
     "ROS 2 bag in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
     is_bag<bags::BagKind::ros2>,
-    open_bag<kRos2BagFormat>,
+    open_bag<kRos2BagFormat, bags::BagKind::ros2>,
 };
 
 const Format kMcapFormat = {
@@ -44,7 +44,7 @@ const Format kMcapFormat = {
     "",
     "ROS 2 or ROS 1 bag in MCAP: messages of Livox drivers, point clouds (read only)",
     is_bag<bags::BagKind::mcap>,
-    open_bag<kMcapFormat>,
+    open_bag<kMcapFormat, bags::BagKind::mcap>,
 };
 
 }  // namespace risley::recordings
