@@ -52,16 +52,10 @@ const auto& solution_of(const Found& found) {
   }
 }
 
-report::Report report_of(const EstimatedRecording& found) { return report::estimate_report(found); }
-report::Report report_of(const CalibratedRecordings& found) {
-  return report::calibration_report(found);
-}
-report::Report report_of(const CalibratedFlight& found) { return report::flight_report(found); }
-
 /// The page of a result and the numbers behind it, as `-o DIR` of the command writes them.
 template <class Found>
 std::vector<NamedText> texts_of(const Found& found) {
-  const report::Report report = report_of(found);
+  const report::Report report = report::report_of(found);
   return {{"report.json", report::report_text(report)},
           {"report.html", report::report_page(report)}};
 }
@@ -96,7 +90,7 @@ py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const 
       "report_text",
       [](Found& found, const py::object& tell) {
         make_details(found, tell);
-        return unlocked([&] { return report::report_text(report_of(found)); });
+        return unlocked([&] { return report::report_text(report::report_of(found)); });
       },
       py::arg("tell"));
   return type;
