@@ -8,6 +8,7 @@ namespace risley::json {
 
 // Files of docs/schemas, which CMakeLists.txt embeds.
 
+std::string_view columns_schema();
 std::string_view common_schema();
 std::string_view estimate_schema();
 std::string_view calibrate_schema();

@@ -15,8 +15,4 @@ namespace risley::json {
 /// @throws FileError naming the first place that is missing or wrong, and what is expected there
 void require_schema(const Json& value, const std::string& schema, const std::string& path);
 
-/// The schema of a name in an object, found through its references; null where none knows it.
-/// @param place  a JSON pointer into what the schema describes
-Json schema_of(const std::string& schema, const std::string& place);
-
 }  // namespace risley::json
