@@ -31,11 +31,36 @@ class Verdict(NamedTuple):
     to_do: str
 
 
+class Fields(Dict[str, Any]):
+    """A part of a result whose keys are attributes, too."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self:
+            raise AttributeError(f"no {name}, only {', '.join(self)}")
+        return _with_attributes(self[name])
+
+
+def _with_attributes(value: Any) -> Any:
+    if isinstance(value, dict):
+        return Fields(value)
+    return [_with_attributes(one) for one in value] if isinstance(value, list) else value
+
+
 class _Answer:
-    """Result of a job, with the keys of the command's ``--json``."""
+    """Result of a job. The keys of the command's ``--json`` are its attributes, in the same units:
+    ``found.pointing_error.total_deg.value``; angles are in degrees there, as the names say.
+    """
 
     def __init__(self, found: Dict[str, Any]) -> None:
         self._dict = found
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # while it is unpickled, there is no _dict
+            raise AttributeError(name)
+        return getattr(Fields(self._dict), name)
+
+    def __dir__(self) -> List[str]:
+        return [*super().__dir__(), *self._dict]
 
     def to_dict(self) -> Dict[str, Any]:
         """The same as the command prints with ``--json``, without ``command`` and ``inputs``.
@@ -96,10 +121,6 @@ class Solution(_Columns):
         self.values = table.values
         #: One standard deviation each if held parameters are exact; shape (n,).
         self.sigmas_given_held = table.sigmas_given_held
-        #: Whether the numbers can be used.
-        self.converged = bool(self._dict["converged"])
-        #: Why they cannot be used; empty otherwise.
-        self.reason = str(self._dict["reason"])
         #: Stable code, what was found, and what follows from it.
         self.verdict = Verdict(**self._dict["verdict"])
         #: The sensor as it was found, with its covariance.
@@ -178,16 +199,6 @@ class Estimate(Solution):
 class Calibration(Solution):
     """What `risley.calibrate` found on walls: parameters and the offset of ranges."""
 
-    @property
-    def planes(self) -> List[Dict[str, Any]]:
-        """The walls, as in ``--json``."""
-        return list(self._dict["planes"])
-
-    @property
-    def pointing_error(self) -> Dict[str, Any]:
-        """Errors of the reported directions, with sigmas, in degrees."""
-        return dict(self._dict["pointing_error"])
-
 
 class FlightCalibration(Solution):
     """What `risley.calibrate` found in flight: boresight, lever arm, clock, ranges, parameters."""
@@ -199,11 +210,6 @@ class Plan(_Columns):
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned.to_dict(), planned.table)
 
-    @property
-    def advice(self) -> List[str]:
-        """What would improve it; for walls only."""
-        return list(self._dict.get("advice", []))
-
     def _repr_html_(self) -> str:
         rows = "".join(f"<tr><td>{html.escape(name)}</td><td>{sigma:.2g}</td><td>{unit}</td></tr>"
                        for name, sigma, unit in zip(self.names, self.sigmas, self.units))
@@ -214,39 +220,9 @@ class Plan(_Columns):
 class Cloud(_Answer):
     """What `risley.cloud` wrote."""
 
-    @property
-    def points(self) -> int:
-        """Number of points."""
-        return int(self._dict["points"])
-
-    @property
-    def output(self) -> str:
-        """Path of the file."""
-        return str(self._dict["output"])
-
-    @property
-    def format(self) -> str:
-        """Name of its format."""
-        return str(self._dict["format"])
-
 
 class Simulation(_Answer):
     """What `risley.simulate` wrote."""
-
-    @property
-    def observations(self) -> int:
-        """Number of observations, including those without a return."""
-        return int(self._dict["observations"])
-
-    @property
-    def files(self) -> List[str]:
-        """All files that were written, the recording first."""
-        return list(self._dict["files"])
-
-    @property
-    def truth(self) -> Dict[str, float]:
-        """The true parameters in the units of their names."""
-        return dict(self._dict["truth"])
 
 
 class Identification(_Answer):
@@ -267,16 +243,6 @@ class Identification(_Answer):
         """Stable code, what was found, and what follows from it."""
         return Verdict(**self._dict["verdict"])
 
-    @property
-    def hypotheses(self) -> List[Dict[str, Any]]:
-        """Trains that may have made the scan, best first, as in ``--json``."""
-        return list(self._dict["hypotheses"])
-
 
 class Pattern(_Answer):
     """What `risley.pattern` wrote."""
-
-    @property
-    def rows(self) -> int:
-        """Number of shots."""
-        return int(self._dict["rows"])

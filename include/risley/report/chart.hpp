@@ -86,6 +86,7 @@ struct Chart {
 /// significant digits, and more where numbers differ little beside their size, as the speeds of a
 /// steady rotor do.
 json::Json chart_json(const Chart& chart);
+/// The same of several.
 json::Json charts_json(const std::vector<Chart>& charts);
 
 /// A diagram of chart_json() as a figure element, which page.js fills.

@@ -90,6 +90,7 @@ class Figures {
 /// Diagrams side by side, as far as the page is wide.
 /// @param first  how many stand elsewhere already
 std::string charts_html(const std::vector<Chart>& charts, Figures& figures, std::size_t first = 0);
+/// The same of diagrams in a report.
 std::string charts_html(const json::Json& charts, Figures& figures, std::size_t first = 0);
 
 /// A number that a page says before its tables.
@@ -101,6 +102,7 @@ struct KeyNumber {
 /// What stands under the verdict: a few numbers beside the first of some diagrams, if there is one.
 std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vector<Chart>& charts,
                           Figures& figures);
+/// The same of diagrams in a report.
 std::string overview_html(const std::vector<KeyNumber>& numbers, const json::Json& charts,
                           Figures& figures);
 

@@ -21,9 +21,11 @@ struct Report {
   std::string path = "report.json";  ///< for errors
 };
 
-/// Of a job's result. @throws InvalidArgument when it was not asked for details
+/// Of an estimate. @throws InvalidArgument when it was not asked for details
 Report report_of(const jobs::EstimatedRecording& found);
+/// Of a calibration on walls. @throws InvalidArgument as above
 Report report_of(const jobs::CalibratedRecordings& found);
+/// Of a calibration in flight. @throws InvalidArgument as above
 Report report_of(const jobs::CalibratedFlight& found);
 
 /// The text of report.json; numbers that are not finite are null, and diagrams keep the digits that
