@@ -3,11 +3,17 @@
 """Results of jobs as plain data: columns, dictionaries, a sensor. All of it can be pickled."""
 import html
 import os
-from typing import Any, Dict, List, NamedTuple, Optional, Tuple, Union
+from typing import TYPE_CHECKING, Any, Dict, List, NamedTuple, Optional, Tuple, Union
 
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._units import Path
+
+if TYPE_CHECKING:
+    from risley import _answers
+else:  # what attributes results have is known from their JSON alone
+    class _answers:
+        Estimate = Calibration = FlightCalibration = Cloud = Simulation = Identification = Pattern = object
 
 Found = Union[_risley.EstimatedRecording, _risley.CalibratedRecordings, _risley.CalibratedFlight]
 Planned = Union[_risley.PlannedCalibration, _risley.PlannedFlight]
@@ -37,12 +43,12 @@ class Fields(Dict[str, Any]):
     def __getattr__(self, name: str) -> Any:
         if name not in self:
             raise AttributeError(f"no {name}, only {', '.join(self)}")
-        return _with_attributes(self[name])
+        return self[name]
 
 
 def _with_attributes(value: Any) -> Any:
     if isinstance(value, dict):
-        return Fields(value)
+        return Fields({key: _with_attributes(one) for key, one in value.items()})
     return [_with_attributes(one) for one in value] if isinstance(value, list) else value
 
 
@@ -57,7 +63,7 @@ class _Answer:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # while it is unpickled, there is no _dict
             raise AttributeError(name)
-        return getattr(Fields(self._dict), name)
+        return _with_attributes(getattr(Fields(self._dict), name))
 
     def __dir__(self) -> List[str]:
         return [*super().__dir__(), *self._dict]
@@ -168,7 +174,7 @@ class Solution(_Columns):
                 f"{self.verdict.code}>")
 
 
-class Estimate(Solution):
+class Estimate(Solution, _answers.Estimate):
     """What `risley.estimate` found: parameters, mean speeds, first rotation angles."""
 
     def __init__(self, found: _risley.EstimatedRecording) -> None:
@@ -196,11 +202,11 @@ class Estimate(Solution):
         return super().__getstate__()
 
 
-class Calibration(Solution):
+class Calibration(Solution, _answers.Calibration):
     """What `risley.calibrate` found on walls: parameters and the offset of ranges."""
 
 
-class FlightCalibration(Solution):
+class FlightCalibration(Solution, _answers.FlightCalibration):
     """What `risley.calibrate` found in flight: boresight, lever arm, clock, ranges, parameters."""
 
 
@@ -217,15 +223,15 @@ class Plan(_Columns):
                 f"{rows}</table>")
 
 
-class Cloud(_Answer):
+class Cloud(_Answer, _answers.Cloud):
     """What `risley.cloud` wrote."""
 
 
-class Simulation(_Answer):
+class Simulation(_Answer, _answers.Simulation):
     """What `risley.simulate` wrote."""
 
 
-class Identification(_Answer):
+class Identification(_Answer, _answers.Identification):
     """What `risley.identify` found.
 
     Attributes
@@ -244,5 +250,5 @@ class Identification(_Answer):
         return Verdict(**self._dict["verdict"])
 
 
-class Pattern(_Answer):
+class Pattern(_Answer, _answers.Pattern):
     """What `risley.pattern` wrote."""
