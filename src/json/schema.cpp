@@ -35,6 +35,13 @@ const Json& file_of(const std::string& name) {
   return files.at(name);
 }
 
+/// A word of a schema, or null.
+const Json& word(const Json& words, const char* name) {
+  static const Json none;
+  const auto found = words.find(name);
+  return found == words.end() ? none : *found;
+}
+
 /// @param reference  "FILE#/POINTER", or "#/POINTER" within the same file
 Schema resolved(const std::string& reference, const std::string& file) {
   const std::size_t mark = std::min(reference.find('#'), reference.size());
@@ -70,14 +77,14 @@ Problem problem(const std::string& place, std::string_view expected, const Json&
 
 Problem problem_of_object(const Json& value, const Schema& schema, const std::string& place) {
   const Json& words = schema.words;
-  for (const Json& name : words.value("required", Json::array())) {
+  for (const Json& name : word(words, "required")) {
     if (!value.contains(name.get_ref<const std::string&>())) {
       return named(place, name.get<std::string>()) + " is missing";
     }
   }
-  const Json names = words.value("propertyNames", Json::object());
-  const Json known = words.value("properties", Json::object());
-  const Json rest = words.value("additionalProperties", Json(true));
+  const Json& names = word(words, "propertyNames");
+  const Json& known = word(words, "properties");
+  const Json& rest = word(words, "additionalProperties");
   for (const auto& [name, one] : value.items()) {
     if (names.contains("pattern") && !matches(name, names["pattern"].get<std::string>())) {
       return fmt::format("{}: '{}' is no name that is known there", place,
@@ -116,7 +123,7 @@ Problem problem_of_parts(const Json& value, const Schema& schema, const std::str
     const Schema other = resolved(words["$ref"].get<std::string>(), schema.file);
     if (Problem found = problem_of(value, other, place)) return found;
   }
-  for (const Json& part : words.value("allOf", Json::array())) {
+  for (const Json& part : word(words, "allOf")) {
     if (Problem found = of(part)) return found;
   }
   if (words.contains("anyOf")) {
@@ -137,8 +144,10 @@ Problem problem_of_parts(const Json& value, const Schema& schema, const std::str
 Problem problem_of(const Json& value, const Schema& schema, const std::string& place) {
   const Json& words = schema.words;
   if (words.contains("type")) {
-    const Json types = words["type"].is_array() ? words["type"] : Json::array({words["type"]});
-    const auto fits = [&](const Json& type) { return is_of_type(value, type.get<std::string>()); };
+    const auto fits = [&](const Json& type) {
+      return is_of_type(value, type.get_ref<const std::string&>());
+    };
+    const Json& types = words["type"];  // one, or a list
     if (std::none_of(types.begin(), types.end(), fits)) {
       std::string expected;
       for (const Json& type : types) {

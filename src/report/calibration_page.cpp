@@ -34,12 +34,15 @@ double boresight_sigma(const View& r) {
 }
 
 const char* datum_text(const View& r) {
+  using calibration::DatumKind;
   const std::string& kind = r["datum"]["kind"].text();
-  if (kind == "planes") return "the known normals of walls fix the sensor's frame";
-  if (kind == "stations") {
+  if (kind == to_string(DatumKind::planes)) {
+    return "the known normals of walls fix the sensor's frame";
+  }
+  if (kind == to_string(DatumKind::stations)) {
     return "the known rotations of the sensor between recordings fix its frame";
   }
-  if (kind == "both") {
+  if (kind == to_string(DatumKind::both)) {
     return "known normals of walls and known rotations between recordings fix the sensor's frame";
   }
   return "no outside reference fixes the sensor's frame, only the shape of the bundle that its "

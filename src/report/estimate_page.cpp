@@ -73,9 +73,10 @@ std::vector<KeyNumber> estimate_numbers(const View& r) {
 std::string estimate_subject(const View& r) {
   const View recording = r["page"]["recordings"].list().front();
   std::string text = fmt::format(
-      "{} ({}), {} observations over {:.4g} s, {} shots used. Sensor {} with {} prisms",
+      "{} ({}), {} observations over {} s, {} shots used. Sensor {} with {} prisms",
       recording["name"].text(), recording["format"].text(),
-      count_text(recording["observations"].count()), recording["duration_s"].number(),
+      count_text(recording["observations"].count()),
+      finite_text("{:.4g}", recording["duration_s"].number()),
       count_text(r["observations_used"].count()), r["preset"].text(), shape_of(r).prisms);
   if (r.has("combination")) {
     text += r["combination"].count() == 1 ? "; speed combination 1, the slow rotor first"

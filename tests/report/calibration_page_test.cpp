@@ -637,16 +637,19 @@ void collect(const json::Json& value, const std::string& place, std::vector<std:
 }
 
 TEST(ReportFile, NothingThatIsMissingOrOfAnotherKindIsAFault) {
-  Page page;
+  Page page(50);
   page.truth = example_truth();
-  const json::Json sound = page.report().json;
+  json::Json sound = page.report().json;
+  for (json::Json& charts : sound["charts"]) {
+    if (charts.size() > 1) charts = json::Json::array({charts.front()});
+  }
   std::vector<std::string> places;
   collect(sound, "", places);
   EXPECT_GT(places.size(), 200u);
   for (const std::string& place : places) {
     const json::Json::json_pointer pointer(place);
-    for (const json::Json& value : {json::Json(), json::Json("x"), json::Json(1e300),
-                                    json::Json::array({1, "x"}), json::Json{{"x", 1}}}) {
+    for (const json::Json& value :
+         {json::Json(), json::Json("x"), json::Json(1e300), json::Json::array({1, "x"})}) {
       json::Json damaged = sound;
       damaged[pointer] = value;
       error_of(damaged.dump());
