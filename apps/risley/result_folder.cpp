@@ -74,7 +74,9 @@ std::vector<jobs::NamedText> report_texts(report::Report report) {
   for (Json* text : {&json["reason"], &json["verdict"]["words"], &json["verdict"]["to_do"]}) {
     *text = with_flags(text->get<std::string>());
   }
-  for (Json& text : json["warnings"]) text = with_flags(text.get<std::string>());
+  for (Json* texts : {&json["warnings"], &json["sensor_choice"]["warnings"]}) {
+    for (Json& text : *texts) text = with_flags(text.get<std::string>());
+  }
   return {{"report.json", report::report_text(report)}, {"report.html", page_of(report)}};
 }
 

@@ -55,6 +55,7 @@ Report finished_report(const char* verb, const Json& result, const Json& page, c
                        const jobs::Provenance& provenance) {
   Json report = {{"format", kFormat}, {"format_version", kFormatVersion}, {"verb", verb}};
   report.update(result);
+  report.erase("seconds");  // of the run, which has not ended
   report["page"] = page;
   report["charts"] = charts;
   report["provenance"] = provenance;
