@@ -14,8 +14,6 @@
 #include "risley/jobs/inputs.hpp"
 #include "risley/jobs/plan_calibration.hpp"
 #include "risley/jobs/plan_flight.hpp"
-#include "risley/report/calibration_report.hpp"
-#include "risley/report/flight_report.hpp"
 
 #include "calibration_text.hpp"
 #include "command.hpp"
@@ -123,7 +121,7 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   job.files = result_files(options.folder, options.states, common);
   if (job.details) {
     job.texts = [](const CalibratedRecordings& outcome) {
-      return report_texts(report::calibration_report(outcome));
+      return report_texts(report::report_of(outcome));
     };
   }
   return job;
@@ -229,7 +227,7 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
   job.files = result_files(options.folder, "none", common);
   if (job.details) {
     job.texts = [](const jobs::CalibratedFlight& outcome) {
-      return report_texts(report::flight_report(outcome));
+      return report_texts(report::report_of(outcome));
     };
   }
   return job;

@@ -12,7 +12,6 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/jobs/estimate_recording.hpp"
-#include "risley/report/estimate_report.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
@@ -73,7 +72,7 @@ jobs::EstimateRecordingOptions job_of(const EstimateCommandOptions& options,
   job.files = result_files(options.folder, options.states, common);
   if (job.details) {
     job.texts = [](const EstimatedRecording& outcome) {
-      return report_texts(report::estimate_report(outcome));
+      return report_texts(report::report_of(outcome));
     };
   }
   return job;

@@ -70,16 +70,13 @@ void write_page_file(const std::string& path, const std::string& html) {
 }
 
 std::vector<jobs::NamedText> report_texts(report::Report report) {
-  std::visit(
-      [](auto& one) {
-        put_flags(one.warnings);
-        one.reason = with_flags(one.reason);
-        if (one.verdict) {
-          one.verdict->words = with_flags(one.verdict->words);
-          one.verdict->to_do = with_flags(one.verdict->to_do);
-        }
-      },
-      report);
+  Json& json = report.json;
+  for (Json* text : {&json["reason"], &json["verdict"]["words"], &json["verdict"]["to_do"]}) {
+    *text = with_flags(text->get<std::string>());
+  }
+  for (Json* texts : {&json["warnings"], &json["sensor_choice"]["warnings"]}) {
+    for (Json& text : *texts) text = with_flags(text.get<std::string>());
+  }
   return {{"report.json", report::report_text(report)}, {"report.html", page_of(report)}};
 }
 

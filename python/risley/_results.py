@@ -3,11 +3,17 @@
 """Results of jobs as plain data: columns, dictionaries, a sensor. All of it can be pickled."""
 import html
 import os
-from typing import Any, Dict, List, NamedTuple, Optional, Tuple, Union
+from typing import TYPE_CHECKING, Any, Dict, List, NamedTuple, Optional, Tuple, Union
 
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._units import Path
+
+if TYPE_CHECKING:
+    from risley import _answers
+else:  # what attributes results have is known from their JSON alone
+    class _answers:
+        Estimate = Calibration = FlightCalibration = Cloud = Simulation = Identification = Pattern = object
 
 Found = Union[_risley.EstimatedRecording, _risley.CalibratedRecordings, _risley.CalibratedFlight]
 Planned = Union[_risley.PlannedCalibration, _risley.PlannedFlight]
@@ -31,11 +37,36 @@ class Verdict(NamedTuple):
     to_do: str
 
 
+class Fields(Dict[str, Any]):
+    """A part of a result whose keys are attributes, too."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self:
+            raise AttributeError(f"no {name}, only {', '.join(self)}")
+        return self[name]
+
+
+def _with_attributes(value: Any) -> Any:
+    if isinstance(value, dict):
+        return Fields({key: _with_attributes(one) for key, one in value.items()})
+    return [_with_attributes(one) for one in value] if isinstance(value, list) else value
+
+
 class _Answer:
-    """Result of a job, with the keys of the command's ``--json``."""
+    """Result of a job. The keys of the command's ``--json`` are its attributes, in the same units:
+    ``found.pointing_error.total_deg.value``; angles are in degrees there, as the names say.
+    """
 
     def __init__(self, found: Dict[str, Any]) -> None:
         self._dict = found
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):  # while it is unpickled, there is no _dict
+            raise AttributeError(name)
+        return _with_attributes(getattr(Fields(self._dict), name))
+
+    def __dir__(self) -> List[str]:
+        return [*super().__dir__(), *self._dict]
 
     def to_dict(self) -> Dict[str, Any]:
         """The same as the command prints with ``--json``, without ``command`` and ``inputs``.
@@ -96,10 +127,6 @@ class Solution(_Columns):
         self.values = table.values
         #: One standard deviation each if held parameters are exact; shape (n,).
         self.sigmas_given_held = table.sigmas_given_held
-        #: Whether the numbers can be used.
-        self.converged = bool(self._dict["converged"])
-        #: Why they cannot be used; empty otherwise.
-        self.reason = str(self._dict["reason"])
         #: Stable code, what was found, and what follows from it.
         self.verdict = Verdict(**self._dict["verdict"])
         #: The sensor as it was found, with its covariance.
@@ -147,7 +174,7 @@ class Solution(_Columns):
                 f"{self.verdict.code}>")
 
 
-class Estimate(Solution):
+class Estimate(Solution, _answers.Estimate):
     """What `risley.estimate` found: parameters, mean speeds, first rotation angles."""
 
     def __init__(self, found: _risley.EstimatedRecording) -> None:
@@ -175,21 +202,11 @@ class Estimate(Solution):
         return super().__getstate__()
 
 
-class Calibration(Solution):
+class Calibration(Solution, _answers.Calibration):
     """What `risley.calibrate` found on walls: parameters and the offset of ranges."""
 
-    @property
-    def planes(self) -> List[Dict[str, Any]]:
-        """The walls, as in ``--json``."""
-        return list(self._dict["planes"])
 
-    @property
-    def pointing_error(self) -> Dict[str, Any]:
-        """Errors of the reported directions, with sigmas, in degrees."""
-        return dict(self._dict["pointing_error"])
-
-
-class FlightCalibration(Solution):
+class FlightCalibration(Solution, _answers.FlightCalibration):
     """What `risley.calibrate` found in flight: boresight, lever arm, clock, ranges, parameters."""
 
 
@@ -199,11 +216,6 @@ class Plan(_Columns):
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned.to_dict(), planned.table)
 
-    @property
-    def advice(self) -> List[str]:
-        """What would improve it; for walls only."""
-        return list(self._dict.get("advice", []))
-
     def _repr_html_(self) -> str:
         rows = "".join(f"<tr><td>{html.escape(name)}</td><td>{sigma:.2g}</td><td>{unit}</td></tr>"
                        for name, sigma, unit in zip(self.names, self.sigmas, self.units))
@@ -211,45 +223,15 @@ class Plan(_Columns):
                 f"{rows}</table>")
 
 
-class Cloud(_Answer):
+class Cloud(_Answer, _answers.Cloud):
     """What `risley.cloud` wrote."""
 
-    @property
-    def points(self) -> int:
-        """Number of points."""
-        return int(self._dict["points"])
 
-    @property
-    def output(self) -> str:
-        """Path of the file."""
-        return str(self._dict["output"])
-
-    @property
-    def format(self) -> str:
-        """Name of its format."""
-        return str(self._dict["format"])
-
-
-class Simulation(_Answer):
+class Simulation(_Answer, _answers.Simulation):
     """What `risley.simulate` wrote."""
 
-    @property
-    def observations(self) -> int:
-        """Number of observations, including those without a return."""
-        return int(self._dict["observations"])
 
-    @property
-    def files(self) -> List[str]:
-        """All files that were written, the recording first."""
-        return list(self._dict["files"])
-
-    @property
-    def truth(self) -> Dict[str, float]:
-        """The true parameters in the units of their names."""
-        return dict(self._dict["truth"])
-
-
-class Identification(_Answer):
+class Identification(_Answer, _answers.Identification):
     """What `risley.identify` found.
 
     Attributes
@@ -267,16 +249,6 @@ class Identification(_Answer):
         """Stable code, what was found, and what follows from it."""
         return Verdict(**self._dict["verdict"])
 
-    @property
-    def hypotheses(self) -> List[Dict[str, Any]]:
-        """Trains that may have made the scan, best first, as in ``--json``."""
-        return list(self._dict["hypotheses"])
 
-
-class Pattern(_Answer):
+class Pattern(_Answer, _answers.Pattern):
     """What `risley.pattern` wrote."""
-
-    @property
-    def rows(self) -> int:
-        """Number of shots."""
-        return int(self._dict["rows"])

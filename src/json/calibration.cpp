@@ -17,10 +17,9 @@ using calibration::CalibrationForecast;
 using calibration::FormalDatum;
 
 Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
-  return {{"kind", calibration::to_string(kind)},      {"sigma_roll_deg", deg(datum.sigma_roll)},
-          {"sigma_pitch_deg", deg(datum.sigma_pitch)}, {"sigma_yaw_deg", deg(datum.sigma_yaw)},
-          {"sigma_gauge_deg", deg(datum.gauge)},       {"sigma_shape_deg", deg(datum.shape)},
-          {"sigma_total_deg", deg(datum.total)}};
+  Json object = {{"kind", calibration::to_string(kind)}};
+  object.update(of(datum));
+  return object;
 }
 
 Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
@@ -59,6 +58,12 @@ Json sizes_json(const Calibration& c) {
 }
 
 }  // namespace
+
+Json of(const FormalDatum& datum) {
+  return {{"sigma_roll_deg", deg(datum.sigma_roll)}, {"sigma_pitch_deg", deg(datum.sigma_pitch)},
+          {"sigma_yaw_deg", deg(datum.sigma_yaw)},   {"sigma_gauge_deg", deg(datum.gauge)},
+          {"sigma_shape_deg", deg(datum.shape)},     {"sigma_total_deg", deg(datum.total)}};
+}
 
 Json of(const jobs::CalibratedRecordings& found) {
   const Calibration& c = found.calibration;

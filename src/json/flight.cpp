@@ -27,9 +27,9 @@ Json unknown_json(const FlightUnknown& unknown, TrainShape shape) {
   Json json = value_and_sigma(unknown, shape);
   json["before"] = calibration::in_file_unit(unknown, unknown.start, shape);
   json["held"] = unknown.held;
-  if (unknown.held) return json;
   json["prior_sigma"] =
       number_or_null(calibration::in_file_unit(unknown, unknown.prior_sigma, shape));
+  if (unknown.held) return json;
   json["prior_share"] = unknown.prior_share;
   json["twin"] = unknown.twin;
   json["twin_correlation"] = unknown.twin_correlation;
@@ -49,12 +49,19 @@ Json pair_json(const StripPair& pair) {
 Json strips_json(const CalibratedFlight& found) {
   const FlightCalibration& c = found.calibration;
   Json pairs = Json::array();
-  for (const StripPair& after : c.pairs_after) {
-    Json pair = {{"first", after.first + 1}, {"second", after.second + 1}};
-    const StripPair* before = find_pair(c.pairs_before, after);
-    pair["before"] = before == nullptr ? Json(nullptr) : pair_json(*before);
-    pair["after"] = pair_json(after);
-    pairs.push_back(std::move(pair));
+  const auto add = [&](const StripPair& pair) {
+    const auto end = [&](const std::vector<StripPair>& all) {
+      const StripPair* own = find_pair(all, pair);
+      return own == nullptr ? Json(nullptr) : pair_json(*own);
+    };
+    pairs.push_back({{"first", pair.first + 1},
+                     {"second", pair.second + 1},
+                     {"before", end(c.pairs_before)},
+                     {"after", end(c.pairs_after)}});
+  };
+  for (const StripPair& pair : c.pairs_after) add(pair);
+  for (const StripPair& pair : c.pairs_before) {
+    if (find_pair(c.pairs_after, pair) == nullptr) add(pair);
   }
   Json shots = Json::array();
   for (const std::size_t rows : found.strip_rows) shots.push_back(rows);

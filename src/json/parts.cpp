@@ -68,6 +68,17 @@ std::vector<std::string> all_warnings(const std::vector<std::string>& of_job,
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
+namespace {
+
+/// That all beams share.
+Json rotation_json(const calibration::DirectionErrors& errors) {
+  return {{"roll", deg(errors.rotation.x)},
+          {"pitch", deg(errors.rotation.y)},
+          {"yaw", deg(errors.rotation.z)}};
+}
+
+}  // namespace
+
 Json pointing_json(const calibration::PointingError& pointing) {
   const calibration::DirectionErrors& errors = pointing.errors;
   const auto known = [](double value, double sigma) {
@@ -77,10 +88,7 @@ Json pointing_json(const calibration::PointingError& pointing) {
           {"shared_deg", known(errors.gauge, pointing.gauge_sigma)},
           {"shape_deg", known(errors.shape, pointing.shape_sigma)},
           {"worst_deg", known(pointing.worst_shape, pointing.worst_shape_sigma)},
-          {"rotation_deg",
-           {{"roll", deg(errors.rotation.x)},
-            {"pitch", deg(errors.rotation.y)},
-            {"yaw", deg(errors.rotation.z)}}}};
+          {"rotation_deg", rotation_json(errors)}};
 }
 
 Json tolerance_json(double tolerance) { return tolerance > 0 ? Json(deg(tolerance)) : Json(); }
@@ -92,7 +100,8 @@ Json errors_json(const calibration::DirectionErrors& e) {
           {"zenith_bias_deg", deg(e.zenith_bias)},
           {"total_deg", deg(e.total)},
           {"gauge_deg", deg(e.gauge)},
-          {"shape_deg", deg(e.shape)}};
+          {"shape_deg", deg(e.shape)},
+          {"rotation_deg", rotation_json(e)}};
 }
 
 Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings) {

@@ -69,48 +69,57 @@ Json excerpt_json(const recordings::Excerpt& excerpt) {
           {"does_not_hold", contents.lacks}};
 }
 
+/// What a reader tells of a recording, and how sound its times are.
+Json audit_json(const recordings::RecordingHeader& header, const TimeAuditResult& audit,
+                std::optional<double> time_uncertainty = {}) {
+  const auto if_times = [&header](auto value) { return header.has_times ? Json(value) : Json(); };
+  return {{"observations", audit.observations},
+          {"shots", audit.shots},
+          {"no_return", audit.no_return},
+          {"has_times", header.has_times},
+          {"duration_s", if_times(audit.duration_s)},
+          {"rate_hz", if_times(audit.rate_hz)},
+          {"has_range", header.has_range},
+          {"has_intensity", header.has_intensity},
+          {"cartesian", header.cartesian},
+          {"time_reference", to_string(header.time_reference)},
+          {"first_time_ns", if_times(audit.first_time_ns)},
+          {"last_time_ns", if_times(audit.last_time_ns)},
+          {"gaps", audit.gaps.count},
+          {"gaps_total_s", if_times(audit.gaps.total_s)},
+          {"largest_gap_s", if_times(audit.gaps.largest_s)},
+          {"largest_gap_after_ns", if_times(audit.gaps.largest_after_ns)},
+          {"time_resets", audit.time_resets},
+          {"time_uncertainty_s", time_uncertainty ? if_times(*time_uncertainty) : Json()},
+          {"non_monotonic_packets", audit.non_monotonic_packets},
+          {"pps_wraps", audit.pps_wraps},
+          {"azimuth_deg", range_json(audit.azimuth, kDegreesPerRadian)},
+          {"zenith_deg", range_json(audit.zenith, kDegreesPerRadian)},
+          {"range_m", range_json(audit.range, 1.0)},
+          {"returns", counts_json(audit.rows_by_return_number)},
+          {"packets_by_data_type", counts_json(audit.packets_by_data_type)},
+          {"imu_samples", audit.imu},
+          {"devices", devices_json(header, audit)}};
+}
+
 }  // namespace
 
 Json of(const jobs::InspectedRecording& found) {
-  const recordings::RecordingHeader& header = found.header;
-  const TimeAuditResult& audit = found.audit;
-  const auto if_times = [&header](auto value) { return header.has_times ? Json(value) : Json(); };
-  Json object = {
-      {"format", header.format},
-      {"sensor", found.choice ? jobs::sensor_name(*found.choice) : jobs::sensor_name(header)},
-      {"observations", audit.observations},
-      {"shots", audit.shots},
-      {"no_return", audit.no_return},
-      {"has_times", header.has_times},
-      {"duration_s", if_times(audit.duration_s)},
-      {"rate_hz", if_times(audit.rate_hz)},
-      {"has_range", header.has_range},
-      {"has_intensity", header.has_intensity},
-      {"cartesian", header.cartesian},
-      {"time_reference", to_string(header.time_reference)},
-      {"first_time_ns", if_times(audit.first_time_ns)},
-      {"last_time_ns", if_times(audit.last_time_ns)},
-      {"gaps", audit.gaps.count},
-      {"gaps_total_s", if_times(audit.gaps.total_s)},
-      {"largest_gap_s", if_times(audit.gaps.largest_s)},
-      {"largest_gap_after_ns", if_times(audit.gaps.largest_after_ns)},
-      {"time_resets", audit.time_resets},
-      {"time_uncertainty_s", if_times(found.time_uncertainty)},
-      {"non_monotonic_packets", audit.non_monotonic_packets},
-      {"pps_wraps", audit.pps_wraps},
-      {"azimuth_deg", range_json(audit.azimuth, kDegreesPerRadian)},
-      {"zenith_deg", range_json(audit.zenith, kDegreesPerRadian)},
-      {"range_m", range_json(audit.range, 1.0)},
-      {"returns", counts_json(audit.rows_by_return_number)},
-      {"packets_by_data_type", counts_json(audit.packets_by_data_type)},
-      {"imu_samples", audit.imu},
-      {"devices", devices_json(header, audit)},
-      {"frame", nullptr},
-      {"slips", nullptr},
-      {"warnings", warnings_json(found.warnings)}};
+  Json object = {{"format", found.header.format},
+                 {"sensor", found.choice ? jobs::sensor_name(*found.choice)
+                                         : jobs::sensor_name(found.header)}};
+  object.update(audit_json(found.header, found.audit, found.time_uncertainty));
+  object.update(
+      {{"frame", nullptr}, {"slips", nullptr}, {"warnings", warnings_json(found.warnings)}});
   if (found.choice) object.update(choice_json(*found.choice));
   if (found.excerpt) object["excerpt"] = excerpt_json(*found.excerpt);
   if (found.damage) object.update(of(*found.damage));
+  return object;
+}
+
+Json of(const jobs::ReadRecording& recording) {
+  Json object = {{"format", recording.header.format}};
+  object.update(audit_json(recording.header, recording.audit));
   return object;
 }
 

@@ -23,6 +23,8 @@
 #include "risley/jobs/inspect_trajectory.hpp"
 #include "risley/jobs/observability.hpp"
 #include "risley/jobs/pattern_details.hpp"
+#include "risley/jobs/plan_calibration.hpp"
+#include "risley/jobs/plan_flight.hpp"
 #include "risley/jobs/simulation_settings.hpp"
 #include "risley/jobs/write_pattern.hpp"
 #include "risley/report/report_file.hpp"
@@ -45,23 +47,33 @@ using jobs::NamedText;
 
 template <class Found>
 const auto& solution_of(const Found& found) {
-  if constexpr (std::is_same_v<Found, EstimatedRecording>) {
+  if constexpr (requires { found.estimate; }) {
     return found.estimate;
+  } else if constexpr (requires { found.forecast; }) {
+    return found.forecast;
   } else {
     return found.calibration;
   }
 }
 
-report::Report report_of(const EstimatedRecording& found) { return report::estimate_report(found); }
-report::Report report_of(const CalibratedRecordings& found) {
-  return report::calibration_report(found);
+/// Columns with the covariance, which JSON does not have.
+template <class Found>
+ValueTable table_with_covariance(const Found& found) {
+  const auto& solution = solution_of(found);
+  ValueTable table = table_of(json::of(found));
+  table.covariance = solution.covariance;
+  if constexpr (requires { solution.free; }) {
+    for (const auto& free : solution.free) table.covariance_names.push_back(si_name(free.name));
+  } else {
+    table.covariance_names = table.names;
+  }
+  return table;
 }
-report::Report report_of(const CalibratedFlight& found) { return report::flight_report(found); }
 
 /// The page of a result and the numbers behind it, as `-o DIR` of the command writes them.
 template <class Found>
 std::vector<NamedText> texts_of(const Found& found) {
-  const report::Report report = report_of(found);
+  const report::Report report = report::report_of(found);
   return {{"report.json", report::report_text(report)},
           {"report.html", report::report_page(report)}};
 }
@@ -86,17 +98,14 @@ py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const 
   py::class_<Found, std::shared_ptr<Found>> type(module, name);
   type.def_property_readonly("sensor",
                              [](const Found& found) { return solution_of(found).sensor; });
-  type.def_property_readonly("table", [](const Found& found) { return table_of(found); });
-  type.def_property_readonly("html", [](const Found& found) {
-    const auto& solution = solution_of(found);
-    return html_of(to_string(solution.verdict.code), solution.verdict.words, table_of(found));
-  });
+  type.def_property_readonly("table", &table_with_covariance<Found>);
+  type.def_property_readonly("html", [](const Found& found) { return html_of(json::of(found)); });
   type.def("to_dict", [](const Found& found) { return dict_of(json::of(found)); });
   type.def(
       "report_text",
       [](Found& found, const py::object& tell) {
         make_details(found, tell);
-        return unlocked([&] { return report::report_text(report_of(found)); });
+        return unlocked([&] { return report::report_text(report::report_of(found)); });
       },
       py::arg("tell"));
   return type;
@@ -269,7 +278,7 @@ std::shared_ptr<jobs::PlannedFlightResult> plan_flight(const py::dict& values,
 template <class Planned>
 void bind_planned(py::module_& module, const char* name) {
   py::class_<Planned, std::shared_ptr<Planned>>(module, name)
-      .def_property_readonly("table", [](const Planned& planned) { return table_of(planned); })
+      .def_property_readonly("table", &table_with_covariance<Planned>)
       .def("to_dict", [](const Planned& planned) { return dict_of(json::of(planned)); });
 }
 

@@ -47,6 +47,13 @@ NamedParameter parameter_of_any_train(const std::string& name) {
   return find_by_either_name(name, find_parameter_of_any_train);
 }
 
+std::string unit_of(const std::string& file_name) {
+  if (file_name.ends_with("_deg_per_s")) return "deg/s";
+  if (file_name.ends_with("_deg")) return "deg";
+  if (file_name.ends_with("_m")) return "m";
+  return file_name.ends_with("_s") ? "s" : "1";
+}
+
 std::string si_unit(const std::string& file_unit) {
   if (file_unit == "deg") return "rad";
   return file_unit == "deg/s" ? "rad/s" : file_unit;

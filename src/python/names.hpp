@@ -23,6 +23,9 @@ NamedParameter named_parameter(const std::string& name, TrainShape shape);
 /// The same where the train is not known yet; without info for a name that no train has.
 NamedParameter parameter_of_any_train(const std::string& name);
 
+/// The unit that a name in files ends with: deg, deg/s, m, s or 1.
+std::string unit_of(const std::string& file_name);
+
 /// The SI unit of what files have in a unit: "rad" for "deg", "rad/s" for "deg/s", others as they
 /// are.
 std::string si_unit(const std::string& file_unit);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
@@ -12,94 +13,47 @@
 #include "python/names.hpp"
 
 namespace risley::python {
+
+using json::Json;
+
 namespace {
 
-void add(ValueTable& table, const std::string& file_name, const std::string& unit, double value,
-         double sigma, double sigma_given_held) {
-  table.names.push_back(si_name(file_name));
-  table.file_names.push_back(file_name);
-  table.units.push_back(unit);
-  table.values.push_back(value);
-  table.sigmas.push_back(sigma);
-  table.sigmas_given_held.push_back(sigma_given_held);
-}
-
-/// Free parameters with their covariance; values where they are known.
-template <class Found>
-void add_free(ValueTable& table, const Found& found, TrainShape shape) {
-  table.covariance = found.covariance;
-  for (std::size_t j = 0; j < found.free.size(); ++j) {
-    table.covariance_names.push_back(si_name(found.free[j].name));
-    const auto at = static_cast<Eigen::Index>(j);
-    const double given_held = std::sqrt(found.covariance(at, at));
-    const std::string unit = si_unit(find_parameter(found.free[j].name, shape).unit);
-    if constexpr (requires { found.total_sigma(j); }) {
-      add(table, found.free[j].name, unit, found.parameters[at], found.total_sigma(j), given_held);
-    } else {
-      add(table, found.free[j].name, unit, std::nan(""), given_held, given_held);
-    }
-  }
-}
-
-void add_unknowns(ValueTable& table, const calibration::FlightJudgement& judgement,
-                  TrainShape shape) {
-  table.covariance = judgement.covariance;
-  for (const calibration::FlightUnknown& unknown : judgement.unknowns) {
-    add(table, unknown.name, si_unit(calibration::file_unit(unknown, shape)), unknown.value,
-        unknown.sigma, unknown.sigma);
-    table.covariance_names.push_back(table.names.back());
-  }
+double number_of(const Json& object, const char* key) {
+  return object.contains(key) && object[key].is_number() ? object[key].get<double>() : std::nan("");
 }
 
 }  // namespace
 
-ValueTable table_of(const jobs::EstimatedRecording& found) {
-  const estimation::Estimate& e = found.estimate;
+ValueTable table_of(const Json& result) {
   ValueTable table;
-  for (const estimation::EstimatedValue& value : e.values) {
-    add(table, value.name, si_unit(find_parameter(value.name, e.sensor.shape()).unit), value.value,
-        value.sigma, value.sigma_given_held);
+  const auto add = [&](const std::string& file_name, const Json& one) {
+    const std::string unit = si_unit(unit_of(file_name));
+    const double si = file_unit(unit).si_per_unit, sigma = si * number_of(one, "sigma");
+    table.names.push_back(si_name(file_name));
+    table.file_names.push_back(file_name);
+    table.units.push_back(unit);
+    table.values.push_back(si * number_of(one, "value"));
+    table.sigmas.push_back(sigma);
+    table.sigmas_given_held.push_back(
+        one.contains("sigma_given_held") ? si * number_of(one, "sigma_given_held") : sigma);
+  };
+  const char* const values = result.contains("unknowns") ? "unknowns" : "parameters";
+  for (const auto& [name, one] : result.at(values).items()) add(name, one);
+  for (const auto& [name, one] : result.value("ranges", Json::object()).items()) {
+    add(name == "constant_m" ? "range_offset_m" : "range_" + name, one);
   }
-  table.covariance = e.covariance;
-  for (const auto& free : e.free) table.covariance_names.push_back(si_name(free.name));
+  for (const auto& [name, one] : result.value("sizes", Json::object()).items()) add(name, one);
   return table;
 }
 
-ValueTable table_of(const jobs::CalibratedRecordings& found) {
-  ValueTable table;
-  const calibration::Calibration& c = found.calibration;
-  add_free(table, c, c.sensor.shape());
-  for (const calibration::CalibratedNumber& number : c.numbers) {
-    add(table, number.name, number.name == "range_incidence" ? "1" : "m", number.value,
-        number.total_sigma, number.sigma);
-  }
-  return table;
-}
-
-ValueTable table_of(const jobs::PlannedCalibration& planned) {
-  ValueTable table;
-  add_free(table, planned.forecast, planned.shape);
-  return table;
-}
-
-ValueTable table_of(const jobs::CalibratedFlight& found) {
-  ValueTable table;
-  add_unknowns(table, found.calibration, found.calibration.sensor.shape());
-  return table;
-}
-
-ValueTable table_of(const jobs::PlannedFlightResult& planned) {
-  ValueTable table;
-  add_unknowns(table, planned.forecast, planned.sensor.shape());
-  for (double& value : table.values) value = std::nan("");
-  return table;
-}
-
-std::string html_of(const std::string& code, const std::string& words, const ValueTable& table) {
+std::string html_of(const Json& result) {
+  const Json& verdict = result.at("verdict");
+  const ValueTable table = table_of(result);
   std::string html = fmt::format(
       "<p><b>{}</b>: {}</p><table><tr><th>parameter</th><th>value</th><th>&plusmn; sigma</th>"
       "<th>unit</th></tr>",
-      code, report::escape_html(words));
+      verdict.at("code").get<std::string>(),
+      report::escape_html(verdict.at("words").get<std::string>()));
   for (std::size_t i = 0; i < table.names.size(); ++i) {
     const FileUnit unit = file_unit(table.units[i]);
     const NumberText text =

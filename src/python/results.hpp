@@ -7,11 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "risley/jobs/calibrate_flight.hpp"
-#include "risley/jobs/calibrate_recordings.hpp"
-#include "risley/jobs/estimate_recording.hpp"
-#include "risley/jobs/plan_calibration.hpp"
-#include "risley/jobs/plan_flight.hpp"
+#include "risley/json/results.hpp"
 
 #include "python/bind.hpp"
 
@@ -27,14 +23,10 @@ struct ValueTable {
   Eigen::MatrixXd covariance;
 };
 
-ValueTable table_of(const jobs::EstimatedRecording& found);
-ValueTable table_of(const jobs::CalibratedRecordings& found);
-ValueTable table_of(const jobs::CalibratedFlight& found);
-/// Without values: a plan knows sigmas alone.
-ValueTable table_of(const jobs::PlannedCalibration& planned);
-ValueTable table_of(const jobs::PlannedFlightResult& planned);
+/// Of what json::of() gives, without a covariance; NaN where it has no number, as values of a plan.
+ValueTable table_of(const json::Json& result);
 
 /// The verdict and a table of what was found, in the units of files.
-std::string html_of(const std::string& code, const std::string& words, const ValueTable& table);
+std::string html_of(const json::Json& result);
 
 }  // namespace risley::python

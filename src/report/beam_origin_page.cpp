@@ -68,7 +68,7 @@ std::string millimetres_text(const sensors::Sensor& sensor, bool thickness) {
 }  // namespace
 
 std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& sensor,
-                             const Provenance& provenance) {
+                             const jobs::Provenance& provenance) {
   Figures figures;
   const std::string head = fmt::format(
       "<p>Prisms {} mm thick with perpendicular faces {} mm apart shift the beam sideways. {} "

@@ -1,7 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/calibration_page.hpp"
-
 #include <cmath>
 #include <string_view>
 
@@ -11,68 +9,53 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
-#include "risley/report/page_parts.hpp"
+
+#include "report/pages.hpp"
 
 namespace risley::report {
 namespace {
 
-using calibration::CalibratedPlane;
-using calibration::DatumKind;
-using calibration::DirectionErrors;
-using calibration::FormalDatum;
-using calibration::PriorTest;
-using calibration::SurfaceStep;
+using json::Json;
 
 constexpr const char* kNothingToDraw = "<p>There are no points to draw.</p>\n";
 
-std::string degrees(double radians) { return finite_text("{:.3g}", degrees_from_radians(radians)); }
+std::string degrees_cell(const View& angle) {
+  return fmt::format("<td>{}</td>", finite_text("{:.3g}", angle.number()));
+}
 
 /// A sigma that was never computed is zero.
-std::string sigma_degrees(double sigma) {
-  const double in_degrees = degrees_from_radians(sigma);
-  return is_sigma(sigma) ? number_text(in_degrees, in_degrees).sigma : "–";
-}
-
-std::string recording_name(const CalibrationReport& r, std::size_t recording) {
-  if (recording < r.recordings.size()) return r.recordings[recording].name;
-  return fmt::format("recording {}", recording + 1);
-}
-
-std::string plane_name(const CalibrationReport& r, std::size_t plane) {
-  return plane < r.planes.size() ? r.planes[plane].name : fmt::format("plane {}", plane + 1);
+std::string sigma_text(double sigma) {
+  return is_sigma(sigma) ? number_text(sigma, sigma).sigma : "–";
 }
 
 /// Pitch and yaw together: what moves where the sensor looks.
-double boresight_sigma(const FormalDatum& datum) {
-  return std::hypot(datum.sigma_pitch, datum.sigma_yaw);
+double boresight_sigma(const View& r) {
+  return std::hypot(r["datum"]["sigma_pitch_deg"].number(), r["datum"]["sigma_yaw_deg"].number());
 }
 
-bool has_poor_datum(const CalibrationReport& r) {
-  return !(boresight_sigma(r.datum) <= calibration::kPoorDatum);
-}
-
-const char* datum_text(DatumKind kind) {
-  switch (kind) {
-    case DatumKind::planes:
-      return "the known normals of walls fix the sensor's frame";
-    case DatumKind::stations:
-      return "the known rotations of the sensor between recordings fix its frame";
-    case DatumKind::both:
-      return "known normals of walls and known rotations between recordings fix the sensor's frame";
-    case DatumKind::none:
-      break;
+const char* datum_text(const View& r) {
+  using calibration::DatumKind;
+  const std::string& kind = r["datum"]["kind"].text();
+  if (kind == to_string(DatumKind::planes)) {
+    return "the known normals of walls fix the sensor's frame";
+  }
+  if (kind == to_string(DatumKind::stations)) {
+    return "the known rotations of the sensor between recordings fix its frame";
+  }
+  if (kind == to_string(DatumKind::both)) {
+    return "known normals of walls and known rotations between recordings fix the sensor's frame";
   }
   return "no outside reference fixes the sensor's frame, only the shape of the bundle that its "
          "beams form";
 }
 
-std::string boresight_advice_html(const CalibrationReport& r) {
+std::string boresight_advice_html(const View& r) {
   return fmt::format(
       "<p><b>The absolute boresight from these walls must not be trusted:</b> pitch and yaw, "
       "which all beams share, have a combined standard uncertainty of {}°, and more than {:.2g}° "
       "is poor. The shape of the bundle, and with it the flatness of point clouds, is not "
       "affected. Set-ups that help:</p>{}",
-      sigma_degrees(boresight_sigma(r.datum)), degrees_from_radians(calibration::kPoorDatum),
+      sigma_text(boresight_sigma(r)), degrees_from_radians(calibration::kPoorDatum),
       list_html({"a wall that is steeply tilted against the axis of view, 50 to 65 degrees, and "
                  "fills the whole field of view",
                  "a longer range to the walls",
@@ -81,67 +64,57 @@ std::string boresight_advice_html(const CalibrationReport& r) {
                  "walls whose normals are known in the sensor's frame, given with option planes"}));
 }
 
-Verdict verdict_of(const CalibrationReport& r) {
-  Verdict verdict;
-  verdict.converged = r.converged;
-  verdict.reason = r.reason;
-  verdict.result = r.verdict.value_or(ReportedVerdict{});
-  verdict.warnings = r.warnings;
+std::string thickness_text(const View& r, const char* when) {
+  return millimetres(r[when]["plane_rms_m"].number());
+}
+
+Verdict calibration_verdict(const View& r) {
+  Verdict verdict = verdict_of(r);
+  const std::size_t planes = r["planes"].size();
+  const auto sigma = [&](const char* key) { return sigma_text(r["datum"][key].number()); };
   verdict.facts =
-      r.planes.empty()
+      planes == 0
           ? "No wall was used."
           : fmt::format(
                 "The walls are {} mm thick before and {} mm after the calibration (root mean "
                 "square distance "
                 "of {} points from {} plane{}); {}; the standard uncertainty of roll is {}°, of "
                 "pitch {}° and of yaw {}°.",
-                millimetres(r.rms_before), millimetres(r.rms_after), count_text(r.points),
-                r.planes.size(), r.planes.size() == 1 ? "" : "s", datum_text(r.datum_kind),
-                sigma_degrees(r.datum.sigma_roll), sigma_degrees(r.datum.sigma_pitch),
-                sigma_degrees(r.datum.sigma_yaw));
+                thickness_text(r, "before"), thickness_text(r, "after"),
+                count_text(r["points"].count()), planes, planes == 1 ? "" : "s", datum_text(r),
+                sigma("sigma_roll_deg"), sigma("sigma_pitch_deg"), sigma("sigma_yaw_deg"));
   verdict.mend =
       "check in the views below that what was taken for walls really is walls; record more walls "
       "that fill the field of view, near and far and steeply tilted; hold parameters that these "
       "walls do not determine (option fixed); and check known normals and stations, if any were "
       "given";
-  if (r.converged && has_poor_datum(r)) verdict.care_html = boresight_advice_html(r);
+  const bool poor = !(radians_from_degrees(boresight_sigma(r)) <= calibration::kPoorDatum);
+  if (verdict.converged && poor) verdict.care_html = boresight_advice_html(r);
   return verdict;
 }
 
-std::string subject_text(const CalibrationReport& r) {
-  std::string text;
-  for (const ReportedRecording& one : r.recordings) {
-    text += (text.empty() ? "" : ", ") + one.name;
-  }
-  text += fmt::format(
-      "{}{} observations, {} of them used. Sensor {}{} with {} prisms, from the preset {}",
-      text.empty() ? "" : ": ", count_text(r.observations), count_text(r.points), r.sensor,
-      r.serial.empty() ? "" : " " + r.serial, r.prisms, r.preset);
-  text += r.method == calibration::CalibrationMethod::paper
-              ? "; by the paper's unweighted distances from planes"
-              : "; by an adjustment of all recordings together";
-  return text + ".";
+std::string calibration_subject(const View& r) {
+  const std::string names = recording_names(r), serial = r.has("serial") ? r["serial"].text() : "";
+  return fmt::format(
+      "{}{}{} observations, {} of them used. Sensor {}{} with {} prisms, from the preset {}{}.",
+      names, names.empty() ? "" : ": ", count_text(observations_of(r)),
+      count_text(r["points"].count()), r["preset"].text(), serial.empty() ? "" : " " + serial,
+      shape_of(r).prisms, r["preset"].text(),
+      r["method"].text() == "paper" ? "; by the paper's unweighted distances from planes"
+                                    : "; by an adjustment of all recordings together");
 }
 
-std::vector<KeyNumber> key_numbers(const CalibrationReport& r) {
-  std::vector<KeyNumber> numbers;
-  if (r.pointing_error) {
-    const auto known = [](double value, double sigma) {
-      const NumberText text = number_text(degrees_from_radians(value), degrees_from_radians(sigma));
-      return fmt::format("{}° ± {}°", text.value, text.sigma);
-    };
-    const DirectionErrors& errors = r.pointing_error->errors;
-    numbers.push_back({known(errors.total, r.pointing_error->total_sigma),
-                       "error of the reported directions: " + offset_text(errors.total)});
-    numbers.push_back({known(errors.shape, r.pointing_error->shape_sigma),
-                       "of this is in the shape of the bundle of beams, which no alignment "
-                       "removes: " +
-                           offset_text(errors.shape)});
-  }
-  numbers.push_back({fmt::format("{} mm", millimetres(r.rms_after)),
-                     fmt::format("thickness of the walls after the calibration, {} mm before",
-                                 millimetres(r.rms_before))});
-  return numbers;
+std::vector<KeyNumber> calibration_numbers(const View& r) {
+  const View total = r["pointing_error"]["total_deg"], shape = r["pointing_error"]["shape_deg"];
+  return {{angle_text(total),
+           "error of the reported directions: " + offset_of(total["value"].number())},
+          {angle_text(shape),
+           "of this is in the shape of the bundle of beams, which no alignment "
+           "removes: " +
+               offset_of(shape["value"].number())},
+          {fmt::format("{} mm", thickness_text(r, "after")),
+           fmt::format("thickness of the walls after the calibration, {} mm before",
+                       thickness_text(r, "before"))}};
 }
 
 std::string to_place_of(double value, double sigma) {
@@ -152,37 +125,40 @@ std::string sigma_cell(double value, double sigma) {
   return fmt::format("<td>{}</td>", is_sigma(sigma) ? number_text(value, sigma).sigma : "–");
 }
 
-std::string parameter_row(const CalibrationReport& r, const ReportedParameter& row, bool any_held) {
-  const ParameterInfo& info = find_parameter(row.name, r.shape());
-  const double scale = 1.0 / info.si_per_unit;
-  const double value = scale * row.value, sigma = scale * row.sigma_given_held.value_or(row.sigma);
+std::string parameter_row(const View& r, const std::string& name, const View& parameter,
+                          bool any_held) {
+  const ParameterWords words = parameter_words(name, shape_of(r));
+  const View page = r["page"];
+  const double value = parameter["value"].number(), total = parameter["sigma"].number();
+  const double sigma = parameter["sigma_given_held"].number();
+  const double believed = number_of(page["believed"], name);
   std::string html = fmt::format(
-      "<tr>{}<td>{}</td>{}{}<td>{}</td><td>{}</td><td>{}</td><td>{}</td>", parameter_head(info),
-      to_place_of(value, sigma), sigma_cell(value, scale * row.sigma),
-      any_held ? sigma_cell(value, sigma) : "", escape_html(info.unit),
-      finite_text("{:.7g}", scale * row.nominal), to_place_of(scale * row.believed, sigma),
-      to_place_of(scale * (row.value - row.believed), sigma));
-  if (std::isfinite(row.truth)) {
-    html +=
-        fmt::format("<td>{}</td><td>{}</td><td{}>{}</td>", to_place_of(scale * row.truth, sigma),
-                    to_place_of(scale * row.error, sigma),
-                    std::abs(row.error_over_sigma) > kFarOff ? " class=\"far\"" : "",
-                    finite_text("{:.2f}", row.error_over_sigma));
+      "<tr>{}<td>{}</td>{}{}<td>{}</td><td>{}</td><td>{}</td><td>{}</td>", words.head_html,
+      to_place_of(value, sigma), sigma_cell(value, total), any_held ? sigma_cell(value, sigma) : "",
+      escape_html(words.unit), finite_text("{:.7g}", number_of(page["nominal"], name)),
+      to_place_of(believed, sigma), to_place_of(value - believed, sigma));
+  if (page.has("true")) {
+    const double truth = number_of(page["true"], name), error = value - truth;
+    const double ratio = total > 0 ? error / total : kUnknown;
+    html += fmt::format(
+        "<td>{}</td><td>{}</td><td{}>{}</td>", to_place_of(truth, sigma), to_place_of(error, sigma),
+        std::abs(ratio) > kFarOff ? " class=\"far\"" : "", finite_text("{:.2f}", ratio));
   }
   return html + "</tr>\n";
 }
 
-std::string parameters_html(const CalibrationReport& r) {
-  const bool truth = !r.parameters.empty() && std::isfinite(r.parameters.front().truth);
-  const bool any_held = any_held_parameter(r.parameters);
+std::string calibration_parameters_html(const View& r) {
+  const bool any_held = any_held_parameter(r["parameters"]);
   std::string html =
       "<div class=\"wide\"><table><thead><tr><th>parameter</th><th>value</th>"
       "<th>σ</th>";
   if (any_held) html += "<th>σ given held</th>";
   html += "<th>unit</th><th>nominal</th><th>believed</th><th>difference</th>";
-  if (truth) html += "<th>truth</th><th>error</th><th>error / σ</th>";
+  if (r["page"].has("true")) html += "<th>truth</th><th>error</th><th>error / σ</th>";
   html += "</tr></thead><tbody>\n";
-  for (const ReportedParameter& row : r.parameters) html += parameter_row(r, row, any_held);
+  for (const auto& [name, one] : r["parameters"].entries()) {
+    html += parameter_row(r, name, one, any_held);
+  }
   return html +
          "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation, everything "
          "included" +
@@ -196,12 +172,11 @@ std::string parameters_html(const CalibrationReport& r) {
 
 /// What a row of the table of range errors and sizes says, for readers.
 std::string number_words(const std::string& name) {
-  if (name == "range_offset_m") return "every range is longer by";
-  if (name == "range_near_m") return "at 1 m from the sensor, ranges are longer by";
-  if (name == "range_incidence")
-    return "part of a tilted footprint's depth that ranges are longer by";
-  if (name == "range_per_decade_m") return "ranges are longer for each tenth of the intensity by";
-  constexpr std::string_view kEmitter = "range_emitter_", kThickness = "prism_thickness_",
+  if (name == "constant_m") return "every range is longer by";
+  if (name == "near_m") return "at 1 m from the sensor, ranges are longer by";
+  if (name == "incidence") return "part of a tilted footprint's depth that ranges are longer by";
+  if (name == "per_decade_m") return "ranges are longer for each tenth of the intensity by";
+  constexpr std::string_view kEmitter = "emitter_", kThickness = "prism_thickness_",
                              kSpacing = "prism_spacing_";
   const auto part = [&](std::string_view prefix) {
     return name.substr(prefix.size(), name.size() - prefix.size() - 2);
@@ -213,20 +188,24 @@ std::string number_words(const std::string& name) {
 }
 
 /// Range errors and sizes of the prisms.
-std::string numbers_html(const CalibrationReport& r) {
-  if (!r.numbers || r.numbers->empty()) return "";
+std::string numbers_html(const View& r) {
+  std::string rows;
+  const auto add = [&](const std::string& name, const View& number) {
+    const bool length = name.ends_with("_m");
+    const double scale = length ? kMillimetres : 1.0;
+    const double value = scale * number["value"].number(), sigma = scale * number["sigma"].number();
+    rows += fmt::format(
+        "<tr><th scope=\"row\">{}</th><td>{}</td>{}<td>{}</td><td>{}</td></tr>\n",
+        escape_html(number_words(name)), to_place_of(value, sigma), sigma_cell(value, sigma),
+        finite_text("{:.2g}", scale * number["prior_sigma"].number()), length ? "mm" : "1");
+  };
+  for (const auto& [name, one] : r["ranges"].entries()) add(name, one);
+  for (const auto& [name, one] : r["sizes"].entries()) add(name, one);
+  if (rows.empty()) return "";
   std::string html =
       "<div class=\"wide\"><table><thead><tr><th>ranges and beam origin</th><th>value</th>"
-      "<th>σ</th><th>σ before</th><th>unit</th></tr></thead><tbody>\n";
-  for (const calibration::CalibratedNumber& number : *r.numbers) {
-    const bool length = number.name.ends_with("_m");
-    const double scale = length ? kMillimetres : 1.0;
-    const double value = scale * number.value, sigma = scale * number.total_sigma;
-    html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td>{}<td>{}</td><td>{}</td></tr>\n",
-                        escape_html(number_words(number.name)), to_place_of(value, sigma),
-                        sigma_cell(value, sigma), finite_text("{:.2g}", scale * number.prior_sigma),
-                        length ? "mm" : "1");
-  }
+      "<th>σ</th><th>σ before</th><th>unit</th></tr></thead><tbody>\n" +
+      rows;
   return html +
          "</tbody></table></div>\n<p class=\"note\">σ before: what was assumed. A σ that hardly "
          "changed means that these walls do not determine the value: boards of one material and "
@@ -234,75 +213,78 @@ std::string numbers_html(const CalibrationReport& r) {
          "on intensity.</p>\n";
 }
 
-std::string formal_datum_row(const char* name, const FormalDatum& datum) {
+std::string formal_datum_row(const char* name, const View& datum) {
   std::string html = fmt::format("<tr><th scope=\"row\">{}</th>", name);
-  for (const double sigma : {datum.shape, datum.gauge, datum.total, datum.sigma_roll,
-                             datum.sigma_pitch, datum.sigma_yaw}) {
-    html += fmt::format("<td>{}</td>", sigma_degrees(sigma));
+  for (const char* key : {"sigma_shape_deg", "sigma_gauge_deg", "sigma_total_deg", "sigma_roll_deg",
+                          "sigma_pitch_deg", "sigma_yaw_deg"}) {
+    html += fmt::format("<td>{}</td>", sigma_text(datum[key].number()));
   }
   return html + "</tr>\n";
 }
 
-std::string direction_errors_row(const char* name, const DirectionErrors& errors) {
+std::string direction_errors_row(const char* name, const View& errors) {
   std::string html = fmt::format("<tr><th scope=\"row\">{}</th>", name);
-  for (const double error : {errors.shape, errors.gauge, errors.total, errors.rotation.x,
-                             errors.rotation.y, errors.rotation.z, errors.azimuth_rmse,
-                             errors.zenith_rmse, errors.azimuth_bias, errors.zenith_bias}) {
-    html += fmt::format("<td>{}</td>", degrees(error));
+  for (const char* key : {"shape_deg", "gauge_deg", "total_deg"}) html += degrees_cell(errors[key]);
+  for (const char* axis : {"roll", "pitch", "yaw"}) {
+    html += degrees_cell(errors["rotation_deg"][axis]);
+  }
+  for (const char* key :
+       {"azimuth_rmse_deg", "zenith_rmse_deg", "azimuth_bias_deg", "zenith_bias_deg"}) {
+    html += degrees_cell(errors[key]);
   }
   return html + "</tr>\n";
 }
 
 /// What reported directions are off by, and what of it all beams share.
-std::string pointing_html(const CalibrationReport& r) {
-  if (!r.pointing_error) return "";
-  const DirectionErrors& errors = r.pointing_error->errors;
+std::string pointing_html(const View& r) {
+  const View pointing = r["pointing_error"];
   std::string html = fmt::format(
       "<div class=\"wide\"><table><thead><tr><th>error of reported "
       "directions</th><th>deg</th><th>σ</th><th>mm at {:.0f} m</th></tr></thead><tbody>\n",
       kStatedDistance);
-  const auto add = [&](const char* name, double error, double sigma) {
+  const auto add = [&](const char* name, const View& error) {
+    const double value = error["value"].number(), sigma = error["sigma"].number();
     html += fmt::format("<tr><th scope=\"row\">{}</th><td>{}</td>{}<td>{}</td></tr>\n", name,
-                        to_place_of(degrees_from_radians(error), degrees_from_radians(sigma)),
-                        sigma_cell(degrees_from_radians(error), degrees_from_radians(sigma)),
-                        millimetres(offset_at(error)));
+                        to_place_of(value, sigma), sigma_cell(value, sigma),
+                        millimetres(offset_at(radians_from_degrees(value))));
   };
-  add("total", errors.total, r.pointing_error->total_sigma);
-  add("shared: a rotation of all beams together", errors.gauge, r.pointing_error->gauge_sigma);
-  add("shape: the rest", errors.shape, r.pointing_error->shape_sigma);
-  add("shape of the worst beam", r.pointing_error->worst_shape,
-      r.pointing_error->worst_shape_sigma);
+  add("total", pointing["total_deg"]);
+  add("shared: a rotation of all beams together", pointing["shared_deg"]);
+  add("shape: the rest", pointing["shape_deg"]);
+  add("shape of the worst beam", pointing["worst_deg"]);
+  const auto turn = [&](const char* axis) {
+    return to_place_of(pointing["rotation_deg"][axis].number(),
+                       r["datum"][fmt::format("sigma_{}_deg", axis)].number());
+  };
   return html +
          fmt::format(
              "</tbody></table></div>\n<p class=\"note\">Root mean squares over the beams of the "
              "recordings: reported directions against those of this calibration, σ from the "
              "calibration's covariance. The shared rotation is roll {}°, pitch {}° and yaw {}°; "
              "aligning the mount by its point clouds removes it, but not the shape.</p>\n",
-             to_place_of(degrees_from_radians(errors.rotation.x),
-                         degrees_from_radians(r.datum.sigma_roll)),
-             to_place_of(degrees_from_radians(errors.rotation.y),
-                         degrees_from_radians(r.datum.sigma_pitch)),
-             to_place_of(degrees_from_radians(errors.rotation.z),
-                         degrees_from_radians(r.datum.sigma_yaw)));
+             turn("roll"), turn("pitch"), turn("yaw"));
 }
 
-std::string prior_tests_html(const std::vector<PriorTest>& tests) {
+std::string prior_tests_html(const View& r) {
+  const std::vector<View> tests = r["prior_tests"].list();
   if (tests.empty()) return "";
   std::string html =
       "<h3>Prior knowledge against the data</h3>\n<div "
       "class=\"wide\"><table><thead><tr><th>name</th><th>kind</th><th>misfit, "
       "deg</th><th>χ²</th><th>degrees of freedom</th><th>critical "
       "χ²</th><th>verdict</th></tr></thead><tbody>\n";
-  for (const PriorTest& test : tests) {
+  for (const View& test : tests) {
     // Without a degree of freedom the data say nothing of it.
-    const bool tested = test.degrees_of_freedom > 0 && std::isfinite(test.chi2 + test.critical);
-    const bool fits = test.chi2 <= test.critical;
+    const double chi2 = test["chi2"].number(), critical = test["critical"].number();
+    const std::uint64_t freedom = test["degrees_of_freedom"].count();
+    const bool tested = freedom > 0 && std::isfinite(chi2 + critical), fits = chi2 <= critical;
     html += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+        "<tr><th scope=\"row\">{}</th><td>{}</td>{}<td>{}</td><td>{}</td>"
         "<td>{}</td><td{}>{}</td></tr>\n",
-        escape_html(test.name), test.station ? "station" : "known normal", degrees(test.misfit),
-        finite_text("{:.3g}", test.chi2), test.degrees_of_freedom,
-        finite_text("{:.3g}", test.critical), tested && !fits ? " class=\"far\"" : "",
+        escape_html(test["name"].text()),
+        test["kind"].text() == "station" ? "station" : "known normal",
+        degrees_cell(test["misfit_deg"]), finite_text("{:.3g}", chi2), freedom,
+        finite_text("{:.3g}", critical), tested && !fits ? " class=\"far\"" : "",
         !tested ? "not tested"
         : fits  ? "fits"
                 : "contradicts the data");
@@ -313,71 +295,67 @@ std::string prior_tests_html(const std::vector<PriorTest>& tests) {
          "once in 10,000 times. Not tested: the data do not determine it.</p>\n";
 }
 
-std::string unobservable_html(const CalibrationReport& r) {
-  if (r.unobservable.empty()) return "";
-  std::vector<std::string> items;
-  for (const estimation::WeakDirection& weak : r.unobservable) {
-    items.push_back(fmt::format("{}: its sigma remains {}", direction_text(weak),
-                                finite_text("{:.2g}", weak.sigma)));
-  }
+std::string calibration_unobservable_html(const View& r) {
+  if (r["unobservable"].size() == 0) return "";
   return "<h3>What remains unobservable</h3>\n<p>The walls do not determine these combinations of "
          "parameters (in units of 1 degree, or 0.01 of an index).</p>\n" +
-         list_html(items) + "\n";
+         list_html(weak_directions(r["unobservable"])) + "\n";
 }
 
-std::string datum_html(const CalibrationReport& r) {
+std::string datum_html(const View& r) {
   std::string html = fmt::format(
       "<p>In this calibration {}.</p>\n"
       "<div class=\"wide\"><table><thead><tr><th>standard uncertainty of the beams, "
       "deg</th><th>shape</th><th>gauge</th><th>total</th><th>roll</th><th>pitch</th><th>yaw</th></"
       "tr></thead><tbody>\n",
-      datum_text(r.datum_kind));
-  html += formal_datum_row("everything included", r.datum);
-  html +=
-      formal_datum_row("without the common errors of the rotation angles", r.datum_without_common);
+      datum_text(r));
+  html += formal_datum_row("everything included", r["datum"]);
+  html += formal_datum_row("without the common errors of the rotation angles",
+                           r["page"]["datum_without_common"]);
   html +=
       "</tbody></table></div>\n<p class=\"note\">Shape: distortion of the bundle of beams, which "
       "walls reveal. Gauge: the rotation that all beams share, roll, pitch and yaw about X, Y and "
       "Z, which only an outside reference, or the bundle's shape, determines. Both are root mean "
       "squares over the beams.</p>\n";
-  if (r.truth) {
+  if (r.has("truth")) {
     html +=
         "<h3>Against the truth</h3>\n<div class=\"wide\"><table><thead><tr>"
         "<th>error of the beams, deg</th><th>shape</th><th>gauge</th><th>total</th><th>roll</th>"
         "<th>pitch</th><th>yaw</th><th>azimuth<br>RMSE</th><th>zenith<br>RMSE</th>"
         "<th>azimuth<br>bias</th><th>zenith<br>bias</th></tr></thead><tbody>\n";
-    html += direction_errors_row("before", r.truth->before);
-    html += direction_errors_row("after", r.truth->after);
+    html += direction_errors_row("before", r["truth"]["before"]);
+    html += direction_errors_row("after", r["truth"]["after"]);
     html +=
         "</tbody></table></div>\n<p class=\"note\">RMSE: root mean square error. Bias: mean error. "
         "Roll, pitch and yaw: the shared rotation that explains most of the errors.</p>\n";
   }
-  return html + unobservable_html(r) + prior_tests_html(r.prior_tests);
+  return html + calibration_unobservable_html(r) + prior_tests_html(r);
 }
 
-/// A floor or a ceiling, whose normal has no azimuth to speak of.
-bool is_level(const CalibratedPlane& plane) {
-  constexpr double kSteep = 0.999;  // cosine of 2.6 degrees
-  return std::abs(plane.normal.z) > kSteep;
-}
+/// A floor or a ceiling has no azimuth to speak of: the cosine of 2.6 degrees.
+constexpr double kSteep = 0.999;
 
-std::string planes_html(const CalibrationReport& r) {
-  if (r.planes.empty()) return "<p>There are none.</p>\n";
+std::string planes_html(const View& r) {
+  if (r["planes"].size() == 0) return "<p>There are none.</p>\n";
   std::string html =
       "<div class=\"wide\"><table><thead><tr><th>plane</th><th>recording</th>"
       "<th>normal azimuth,<br>deg</th><th>zenith,<br>deg</th><th>distance,<br>m</th><th>points</th>"
       "<th>outliers</th><th>RMS before,<br>mm</th><th>after,<br>mm</th><th>range σ,<br>mm</th></tr>"
       "</thead><tbody>\n";
-  for (const CalibratedPlane& plane : r.planes) {
-    const SphericalAngles<double> normal = angles_from_direction(plane.normal);
+  for (const View& plane : r["planes"].list()) {
+    const std::vector<double> n = plane["normal"].numbers();
+    const SphericalAngles<double> normal =
+        angles_from_direction(Vector3<double>{n.at(0), n.at(1), n.at(2)});
+    const bool level = std::abs(n.at(2)) > kSteep;
     html += fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-        escape_html(plane.name), escape_html(recording_name(r, plane.recording)),
-        is_level(plane) ? "–" : finite_text("{:.2f}", degrees_from_radians(normal.azimuth)),
+        escape_html(plane["name"].text()), escape_html(file_name(plane["recording"].text())),
+        level ? "–" : finite_text("{:.2f}", degrees_from_radians(normal.azimuth)),
         finite_text("{:.2f}", degrees_from_radians(normal.zenith)),
-        finite_text("{:.3f}", plane.distance), count_text(plane.points), count_text(plane.outliers),
-        millimetres(plane.rms_before), millimetres(plane.rms), millimetres(plane.range_sigma));
+        finite_text("{:.3f}", plane["offset_m"].number()), count_text(plane["points"].count()),
+        count_text(plane["outliers"].count()), millimetres(plane["before_rms_m"].number()),
+        millimetres(plane["rms_m"].number()), millimetres(plane["range_sigma_m"].number()));
   }
   html +=
       "</tbody></table></div>\n<p class=\"note\">Normals and distances are seen from the sensor "
@@ -387,30 +365,31 @@ std::string planes_html(const CalibrationReport& r) {
   html += fmt::format(
       "<p>The residuals scatter {} times as much as the stated range noise "
       "predicts.</p>\n",
-      finite_text("{:.3g}", r.sigma0));
-  if (r.wall_shape && r.wall_shape->sigma > 0) {
+      finite_text("{:.3g}", r["sigma0"].number()));
+  const View shape = r["shape"];
+  if (shape["sigma_m"].number() > 0) {
     html += fmt::format(
         "<p>The walls wave by {} mm (one standard deviation) over {} m. Every sigma on this page "
         "includes what this may do to the result.</p>\n",
-        finite_text("{:.2g}", kMillimetres * r.wall_shape->sigma),
-        finite_text("{:.2g}", r.wall_shape->length));
+        finite_text("{:.2g}", kMillimetres * shape["sigma_m"].number()),
+        finite_text("{:.2g}", shape["length_m"].number()));
   }
   return html;
 }
 
-std::string steps_html(const CalibrationReport& r) {
-  if (r.planes.empty()) return "";
-  if (r.steps.empty()) return "<p>No step was found on a wall.</p>\n";
+std::string steps_html(const View& r) {
+  if (r["planes"].size() == 0) return "";
+  if (r["steps"].size() == 0) return "<p>No step was found on a wall.</p>\n";
   std::vector<std::string> items;
-  for (const SurfaceStep& step : r.steps) {
+  for (const View& step : r["steps"].list()) {
+    const double height = step["height_m"].number();
+    const auto angle = [&](const char* key) { return finite_text("{:.1f}", step[key].number()); };
     items.push_back(fmt::format(
         "{} in {}: {} mm {} the sensor, about {}° wide, around azimuth {}° and zenith {}°, {} "
         "points",
-        plane_name(r, step.plane), recording_name(r, step.recording),
-        millimetres(std::abs(step.height)), step.height < 0 ? "towards" : "away from",
-        finite_text("{:.1f}", degrees_from_radians(step.size)),
-        finite_text("{:.1f}", degrees_from_radians(step.azimuth)),
-        finite_text("{:.1f}", degrees_from_radians(step.zenith)), step.points));
+        step["plane"].text(), file_name(step["recording"].text()), millimetres(std::abs(height)),
+        height < 0 ? "towards" : "away from", angle("size_deg"), angle("azimuth_deg"),
+        angle("zenith_deg"), step["points"].count()));
   }
   return "<h3>Steps on the walls</h3>\n<p>These regions stand off their wall, as a door frame or "
          "a picture does; their shots were left out of the adjustment.</p>\n" +
@@ -419,31 +398,28 @@ std::string steps_html(const CalibrationReport& r) {
 
 }  // namespace
 
-std::string calibration_page(const CalibrationReport& r) {
+std::string calibration_page(const View& r) {
   Figures figures;
-  const std::vector<Chart>& first = r.pointing_charts ? *r.pointing_charts : r.thickness_charts;
-  const std::string head =
-      verdict_html(verdict_of(r)) + overview_html(key_numbers(r), first, figures);
+  const View charts = r["charts"];
+  const auto drawn = [&](const char* name) -> const Json& { return charts[name].json(); };
+  const auto or_none = [&](const char* name) {
+    return drawn(name).empty() ? kNothingToDraw : charts_html(drawn(name), figures);
+  };
+  const std::string head = verdict_html(calibration_verdict(r)) +
+                           overview_html(calibration_numbers(r), drawn("pointing"), figures);
   Sections sections;
-  std::string pointing = pointing_html(r);
-  if (r.pointing_charts) pointing += charts_html(*r.pointing_charts, figures, 1);
-  sections.add("Where the sensor points", pointing, Sections::Shown::unfolded);
-  sections.add("Parameters", parameters_html(r) + numbers_html(r), Sections::Shown::unfolded);
-  sections.add("Datum", datum_html(r) + charts_html(r.truth_charts, figures));
-  sections.add("Walls", planes_html(r) + steps_html(r) + charts_html(r.wall_charts, figures));
-  sections.add("Thickness of the walls",
-               r.thickness_charts.empty()
-                   ? kNothingToDraw
-                   : charts_html(r.thickness_charts, figures, r.pointing_charts ? 0 : 1));
-  sections.add("What was taken for a wall",
-               r.view_charts.empty() ? kNothingToDraw : charts_html(r.view_charts, figures));
-  sections.add(kCorrelations, correlation_html(r.free, r.covariance, r.shape()));
-  sections.add(kTimes, time_audit_html(r.recordings));
-  sections.add(kHowToRepeat, provenance_html(r.provenance));
-  std::string title = "risley calibrate";
-  if (!r.recordings.empty()) title += ": " + r.recordings.front().name;
-  if (r.recordings.size() > 1) title += fmt::format(" and {} more", r.recordings.size() - 1);
-  return page_html(title, subject_text(r), head, sections, figures);
+  sections.add("Where the sensor points",
+               pointing_html(r) + charts_html(drawn("pointing"), figures, 1),
+               Sections::Shown::unfolded);
+  sections.add("Parameters", calibration_parameters_html(r) + numbers_html(r),
+               Sections::Shown::unfolded);
+  sections.add("Datum", datum_html(r) + charts_html(drawn("truth"), figures));
+  sections.add("Walls", planes_html(r) + steps_html(r) + charts_html(drawn("walls"), figures));
+  sections.add("Thickness of the walls", or_none("thickness"));
+  sections.add("What was taken for a wall", or_none("views"));
+  add_end(sections, r);
+  return page_html("risley calibrate" + title_of(r), calibration_subject(r), head, sections,
+                   figures);
 }
 
 }  // namespace risley::report

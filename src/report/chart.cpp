@@ -4,15 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/report/html.hpp"
 
-#include "report/chart_fields.hpp"
-
 namespace risley::report {
+
+using json::Json;
+
 namespace {
 
 constexpr std::size_t kLineBins = 600;
@@ -23,25 +25,98 @@ std::size_t stride_for(std::size_t rows, std::size_t most) {
   return rows <= most ? 1 : (rows + most - 1) / most;
 }
 
+constexpr const char* kSeriesKinds[] = {"points", "line", "steps", "cells"};
+constexpr const char* kChartKinds[] = {"plain", "full_turn", "two_turns", "map", "ground", "space"};
+constexpr const char* kPalettes[] = {"sequential", "diverging"};
+
+int digits_of(const std::vector<double>& values) {
+  constexpr int kDigits = 7, kMostDigits = 15;
+  double least = std::numeric_limits<double>::infinity(), greatest = -least;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    least = std::min(least, value);
+    greatest = std::max(greatest, value);
+  }
+  const double size = std::max(std::abs(least), std::abs(greatest)), spread = greatest - least;
+  if (!(spread > 0) || !(size > spread)) return kDigits;
+  return std::min(kDigits + static_cast<int>(std::ceil(std::log10(size / spread))), kMostDigits);
+}
+
+Json column_json(const std::vector<double>& values) {
+  const int digits = digits_of(values);
+  Json column = Json::array();
+  for (const double value : values) {
+    column.push_back(std::isfinite(value)
+                         ? Json(std::strtod(fmt::format("{:.{}g}", value, digits).c_str(), nullptr))
+                         : Json());
+  }
+  return column;
+}
+
+Json series_json(const Series& series) {
+  return {{"label", series.label},
+          {"colour", series.colour},
+          {"kind", kSeriesKinds[static_cast<std::size_t>(series.kind)]},
+          {"x", column_json(series.x)},
+          {"y", column_json(series.y)},
+          {"z", column_json(series.z)},
+          {"value", column_json(series.value)},
+          {"cell_width", series.cell_width},
+          {"cell_height", series.cell_height}};
+}
+
+template <class Value>
+Json if_any(const std::optional<Value>& value) {
+  return value ? Json(*value) : Json();
+}
+
 }  // namespace
 
-std::string figure_html(const Chart& chart, std::size_t number) {
-  const std::string title = escape_html(chart.title);
+Json chart_json(const Chart& chart) {
+  Json object = {{"title", chart.title},
+                 {"kind", kChartKinds[static_cast<std::size_t>(chart.kind)]},
+                 {"x_label", chart.x_label},
+                 {"y_label", chart.y_label},
+                 {"z_label", chart.z_label},
+                 {"value_label", chart.value_label},
+                 {"palette", kPalettes[static_cast<std::size_t>(chart.palette)]},
+                 {"value_range", if_any(chart.value_range)},
+                 {"grows_for", if_any(chart.grows_for)},
+                 {"colourings", nullptr},
+                 {"note", chart.note},
+                 {"series", Json::array()}};
+  if (chart.colourings) {
+    object["colourings"] = Json::array();
+    for (const Colouring& one : *chart.colourings) {
+      object["colourings"].push_back({{"label", one.label},
+                                      {"value", column_json(one.value)},
+                                      {"value_range", if_any(one.value_range)}});
+    }
+  }
+  for (const Series& series : chart.series) object["series"].push_back(series_json(series));
+  return object;
+}
+
+Json charts_json(const std::vector<Chart>& charts) {
+  Json list = Json::array();
+  for (const Chart& chart : charts) list.push_back(chart_json(chart));
+  return list;
+}
+
+std::string figure_html(const Json& chart, std::size_t number) {
+  const auto text = [&](const char* key) { return escape_html(chart.value(key, "")); };
   std::string html = fmt::format(
-      "<figure class=\"{}\"><figcaption>{}</figcaption>\n<div class=\"plot\" id=\"chart-{}\" "
-      "role=\"img\" tabindex=\"0\" aria-label=\"{}: {} over {}\"></div>",
-      enum_names(chart.kind)[static_cast<std::size_t>(chart.kind)], title, number, title,
-      escape_html(chart.y_label), escape_html(chart.x_label));
-  if (!chart.note.empty())
-    html += fmt::format("\n<p class=\"note\">{}</p>", escape_html(chart.note));
+      "<figure class=\"{0}\"><figcaption>{1}</figcaption>\n<div class=\"plot\" id=\"chart-{2}\" "
+      "role=\"img\" tabindex=\"0\" aria-label=\"{1}: {3} over {4}\"></div>",
+      text("kind"), text("title"), number, text("y_label"), text("x_label"));
+  if (!text("note").empty()) html += fmt::format("\n<p class=\"note\">{}</p>", text("note"));
   return html + "</figure>\n";
 }
 
-std::string chart_json(const Chart& chart, std::size_t number) {
-  Json object = to_json(chart);
-  object["id"] = fmt::format("chart-{}", number);
+std::string script_text(Json chart, std::size_t number) {
+  chart["id"] = fmt::format("chart-{}", number);
   std::string safe;
-  for (const char c : object.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+  for (const char c : chart.dump(-1, ' ', false, Json::error_handler_t::replace)) {
     if (c == '<') {  // only texts hold it, and "</script>" must not end the element
       safe += "\\u003c";
     } else {

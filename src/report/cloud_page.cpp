@@ -162,7 +162,7 @@ std::vector<KeyNumber> key_numbers(const CloudSummary& cloud) {
 }  // namespace
 
 std::string cloud_page(const CloudSummary& cloud, const std::string& recording,
-                       const Provenance& provenance) {
+                       const jobs::Provenance& provenance) {
   if (!cloud.sample || cloud.sample->size() == 0) {
     throw InvalidArgument("a page of a cloud needs a sample of its points, and there is none");
   }

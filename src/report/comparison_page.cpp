@@ -6,16 +6,16 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <variant>
 
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
-#include "risley/report/page_parts.hpp"
 #include "risley/sensors/prism_sizes.hpp"
 #include "risley/sensors/range_values.hpp"
+
+#include "report/pages.hpp"
 
 namespace risley::report {
 namespace {
@@ -33,33 +33,13 @@ std::vector<KeyNumber> key_numbers(const PointingError& beams) {
            "of that is the beams against each other: their shape"}};
 }
 
-std::string facts_of(const EstimateReport& report) { return "Of " + report.recording.name + "."; }
-
-/// @tparam Kind  of report that is of several recordings
-template <class Kind>
-std::string facts_of(const Kind& report) {
-  std::string names;
-  for (const ReportedRecording& recording : report.recordings) {
-    names += (names.empty() ? "" : ", ") + recording.name;
-  }
-  return "Of " + names + ".";
-}
-
 /// Results of one converged run look alike on every page.
 std::string verdict_of(const ComparedResult& one) {
-  const std::string html = std::visit(
-      [](const auto& report) {
-        Verdict verdict;
-        verdict.converged = report.converged;
-        verdict.reason = report.reason;
-        verdict.result = report.verdict.value_or(ReportedVerdict{});
-        verdict.warnings = report.warnings;
-        verdict.facts = facts_of(report);
-        return verdict_html(verdict);
-      },
-      one.report);
+  const View report(one.report);
+  Verdict verdict = verdict_of(report);
+  verdict.facts = "Of " + recording_names(report) + ".";
   return fmt::format("<div><h3>{} ({})</h3>{}</div>\n", escape_html(one.name), verb_of(one.report),
-                     html);
+                     verdict_html(verdict));
 }
 
 struct InUnits {
@@ -184,7 +164,8 @@ std::string subject_text(const ResultComparison& c) {
 }  // namespace
 
 std::string comparison_page(const ComparedResult& a, const ComparedResult& b,
-                            const ResultComparison& comparison, const Provenance& provenance) {
+                            const ResultComparison& comparison,
+                            const jobs::Provenance& provenance) {
   Figures figures;
   const std::string head =
       "<div class=\"charts\">\n" + verdict_of(a) + verdict_of(b) + "</div>\n" +

@@ -155,7 +155,7 @@ std::string swaths_html(const PointDistributionSummary& d) {
 }  // namespace
 
 std::string distribution_page(const PointDistributionSummary& distribution,
-                              const std::string& flight, const Provenance& provenance) {
+                              const std::string& flight, const jobs::Provenance& provenance) {
   Figures figures;
   const std::vector<Chart> charts{map_of(distribution), strips_of(distribution),
                                   profile_of(distribution)};

@@ -1,7 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/flight_page.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,19 +13,17 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
-#include "risley/report/page_parts.hpp"
 
 #include "report/flight_unknowns.hpp"
+#include "report/pages.hpp"
 
 namespace risley::report {
 namespace {
 
-using calibration::DirectionErrors;
-using calibration::FlightDatum;
-using calibration::FlightUnknown;
-using calibration::NotTold;
-using calibration::StripPair;
+using json::Json;
 
+/// Pairs of strips in the table, those with the most ground in common.
+constexpr std::size_t kMostPairs = 200;
 /// A pair of strips keeps this sigma of a shift that its ground does not tell, m.
 constexpr double kUntoldShift = 0.99;
 /// Component of a sensor's axis along the vertical from which on it counts as vertical.
@@ -36,8 +32,7 @@ constexpr double kUpright = 0.8;
 constexpr double kTied = 0.1;
 
 /// Three significant digits at most, never as a power of ten.
-std::string angle_text(double radians) {
-  const double angle = degrees_from_radians(radians);
+std::string angle_text(double angle) {
   if (!is_sigma(std::abs(angle))) return finite_text("{:.0f}", angle);
   constexpr double kThirdDigit = 0.1;  // of two
   std::string text = text_to_place_of(angle, kThirdDigit * std::abs(angle));
@@ -47,48 +42,44 @@ std::string angle_text(double radians) {
   return text;
 }
 
-/// "0.0039° (5.4 mm at 80 m)", at the height flown
-std::string angle_on_ground(double radians, double height) {
-  return fmt::format("{}° ({})", angle_text(radians), offset_text(radians, height));
-}
+double datum_of(const View& r, const char* key) { return r["datum"][key].number(); }
 
-const FlightUnknown* find_unknown(const FlightReport& r, std::string_view name) {
-  const auto found = std::find_if(r.unknowns.begin(), r.unknowns.end(),
-                                  [&](const FlightUnknown& one) { return one.name == name; });
-  return found == r.unknowns.end() ? nullptr : &*found;
+/// What directions are known to, at the height flown.
+std::string total_on_ground(const View& r) {
+  return offset_text(radians_from_degrees(datum_of(r, "sigma_total_deg")), datum_of(r, "height_m"));
 }
 
 /// "6.0021° ± 0.0020°"
-std::string boresight_text(const FlightReport& r, std::string_view name) {
-  const FlightUnknown* unknown = find_unknown(r, name);
-  if (unknown == nullptr || !std::isfinite(unknown->value)) return "–";
-  const NumberText text =
-      number_text(degrees_from_radians(unknown->value), degrees_from_radians(unknown->sigma));
-  if (unknown->held || text.sigma.empty()) return text.value + "° (held)";
+std::string boresight_text(const View& r, const std::string& name) {
+  if (!r["unknowns"].has(name)) return "–";
+  const View unknown = r["unknowns"][name];
+  const double value = unknown["value"].number();
+  if (!std::isfinite(value)) return "–";
+  const NumberText text = number_text(value, unknown["sigma"].number());
+  if (unknown["held"].flag() || text.sigma.empty()) return text.value + "° (held)";
   return fmt::format("{}° ± {}°", text.value, text.sigma);
 }
 
-std::string poor_rotation_html(const FlightReport& r) {
+double rms_of(const View& r, const char* when) { return r["strips"][when]["rms_m"].number(); }
+
+std::string poor_rotation_html(const View& r) {
   return fmt::format(
       "<p><b>The directions of the beams are poorly known:</b> the rotation that all beams share "
       "has a sigma of {}°, {}° and {}° about the sensor's X, Y and Z, and more than {:.2g}° "
       "together is poor. Flights that help:</p>{}",
-      angle_text(r.datum.sigma_x), angle_text(r.datum.sigma_y), angle_text(r.datum.sigma_z),
-      degrees_from_radians(calibration::kPoorDatum),
+      angle_text(datum_of(r, "sigma_x_deg")), angle_text(datum_of(r, "sigma_y_deg")),
+      angle_text(datum_of(r, "sigma_z_deg")), degrees_from_radians(calibration::kPoorDatum),
       list_html({"strips that cross, and strips in opposite directions over the same ground",
                  "ground with roofs, embankments or other slopes in several directions",
                  "a better trajectory, above all in heading",
                  "an aircraft that sways a little: damped mounts reveal less"}));
 }
 
-Verdict verdict_of(const FlightReport& r) {
-  Verdict verdict;
-  verdict.converged = r.converged;
-  verdict.reason = r.reason;
-  verdict.result = r.verdict.value_or(ReportedVerdict{});
-  verdict.warnings = r.warnings;
+Verdict flight_verdict(const View& r) {
+  Verdict verdict = verdict_of(r);
+  const std::size_t pairs = r["strips"]["pairs"].size();
   verdict.facts =
-      r.unknowns.empty()
+      r["unknowns"].size() == 0
           ? "Nothing was adjusted."
           : fmt::format(
                 "The strips, straight stretches of the flight, lie {} mm apart before and {} mm "
@@ -97,19 +88,21 @@ Verdict verdict_of(const FlightReport& r) {
                 "designed, is X {}, Y {}, Z {} about the sensor's axes. Boresight and prisms "
                 "together give the directions of the beams to {}, root mean square over the field "
                 "of view.",
-                millimetres(r.rms_before), millimetres(r.rms_after),
-                r.pair_count == 1 ? "one pair" : fmt::format("{} pairs", r.pair_count),
+                millimetres(rms_of(r, "before")), millimetres(rms_of(r, "after")),
+                pairs == 1 ? "one pair" : fmt::format("{} pairs", pairs),
                 boresight_text(r, "boresight_x_deg"), boresight_text(r, "boresight_y_deg"),
                 boresight_text(r, "boresight_z_deg"),
-                angle_on_ground(r.datum.total, r.datum.height));
+                fmt::format("{}° ({})", angle_text(datum_of(r, "sigma_total_deg")),
+                            total_on_ground(r)));
   verdict.mend =
       "check in the differences between strips below that overlapping strips are of one flight; "
       "check the axes of the mount, and that recording and trajectory use the same time; give "
       "larger sigmas to what the mount states too precisely; and hold parameters that this flight "
       "does not determine (option fixed)";
-  if (!r.converged) return verdict;
-  if (!(r.datum.rotation <= calibration::kPoorDatum)) verdict.care_html = poor_rotation_html(r);
-  if (!(r.rms_after < r.rms_before)) {
+  if (!verdict.converged) return verdict;
+  const double rotation = radians_from_degrees(datum_of(r, "sigma_rotation_deg"));
+  if (!(rotation <= calibration::kPoorDatum)) verdict.care_html = poor_rotation_html(r);
+  if (!(rms_of(r, "after") < rms_of(r, "before"))) {
     verdict.care_html +=
         "<p><b>The strips fit no better than before.</b> What was given may be as good as what "
         "was found.</p>";
@@ -117,77 +110,81 @@ Verdict verdict_of(const FlightReport& r) {
   return verdict;
 }
 
-std::string subject_of(const FlightReport& r) {
-  std::string text;
-  for (const ReportedRecording& one : r.recordings) {
-    text += (text.empty() ? "" : ", ") + one.name;
-  }
-  text += fmt::format(
-      "{}{} strips, {} shots with a range, {} of them used. Sensor {}{} with {} prisms, from the "
+std::string flight_subject(const View& r) {
+  const std::string names = recording_names(r), serial = r.has("serial") ? r["serial"].text() : "";
+  std::string text = fmt::format(
+      "{}{}{} strips, {} shots with a range, {} of them used. Sensor {}{} with {} prisms, from the "
       "preset {}",
-      text.empty() ? "" : ": ", r.strip_count, count_text(r.shots), count_text(r.used), r.sensor,
-      r.serial.empty() ? "" : " " + r.serial, r.prisms, r.preset);
-  if (!r.mount.empty()) text += fmt::format(", on {}", r.mount);
+      names, names.empty() ? "" : ": ", r["strips"]["count"].count(),
+      count_text(r["shots"]["on_strips"].count()), count_text(r["shots"]["used"].count()),
+      r["preset"].text(), serial.empty() ? "" : " " + serial, shape_of(r).prisms,
+      r["preset"].text());
+  const std::string& mount = r["page"]["mount"]["name"].text();
+  if (!mount.empty()) text += fmt::format(", on {}", mount);
   return text + "; by an adjustment of all strips, the mount and the trajectory together.";
 }
 
-std::vector<KeyNumber> key_numbers(const FlightReport& r) {
-  if (r.unknowns.empty()) return {};
-  return {{fmt::format("{} mm", millimetres(r.rms_after)),
+std::vector<KeyNumber> flight_numbers(const View& r) {
+  if (r["unknowns"].size() == 0) return {};
+  return {{fmt::format("{} mm", millimetres(rms_of(r, "after"))),
            fmt::format("between strips after the calibration, {} mm before",
-                       millimetres(r.rms_before))},
-          {fmt::format("{}°", angle_text(r.datum.total)),
-           "standard uncertainty of the directions of the beams: " +
-               offset_text(r.datum.total, r.datum.height)},
-          {fmt::format("{} mm", millimetres(r.range_sigma)), "noise of one range"}};
+                       millimetres(rms_of(r, "before")))},
+          {fmt::format("{}°", angle_text(datum_of(r, "sigma_total_deg"))),
+           "standard uncertainty of the directions of the beams: " + total_on_ground(r)},
+          {fmt::format("{} mm", millimetres(r["range_sigma_m"].number())), "noise of one range"}};
 }
 
 std::string to_place(double value, double sigma) {
   return std::isfinite(value) ? text_to_place_of(value, sigma) : "–";
 }
 
-std::string unknown_row(const FlightReport& r, std::size_t i, bool prisms) {
-  const FlightUnknown& unknown = r.unknowns[i];
-  const UnknownInfo info = unknown_info(unknown.name, r.shape());
-  const double scale = 1.0 / info.si_per_unit;
-  const double sigma = scale * unknown.sigma;
-  const auto in_unit = [&](double value) { return to_place(scale * value, sigma); };
+std::string unknown_row(const View& r, const std::string& name, const View& unknown, bool prisms) {
+  const View page = r["page"];
+  const UnknownInfo info = unknown_info(name, shape_of(r));
+  const double value = unknown["value"].number(), before = unknown["before"].number();
+  const double sigma = info.scale * unknown["sigma"].number();
+  const double prior_sigma = unknown["prior_sigma"].number();
+  const bool held = unknown["held"].flag();
+  const auto in_unit = [&](double number) { return to_place(info.scale * number, sigma); };
   std::string html =
-      fmt::format("<tr>{}<td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
-                  parameter_head(info.long_name, info.symbol, unknown.name), in_unit(unknown.value),
-                  is_sigma(sigma) ? number_text(scale * unknown.value, sigma).sigma : "–",
-                  escape_html(info.unit), in_unit(unknown.start));
-  html += fmt::format("<td>{}</td>", in_unit(unknown.value - unknown.start));
-  if (prisms) html += fmt::format("<td>{}</td>", finite_text("{:.7g}", scale * r.nominal[i]));
-  html += fmt::format("<td>{}</td>", is_sigma(unknown.prior_sigma)
-                                         ? finite_text("{:.3g}", scale * unknown.prior_sigma)
-                                         : "–");
-  if (unknown.held) {
+      fmt::format("<tr>{}<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
+                  parameter_head(info.long_name, info.symbol, name), in_unit(value),
+                  is_sigma(sigma) ? number_text(info.scale * value, sigma).sigma : "–",
+                  escape_html(info.unit), in_unit(before), in_unit(value - before));
+  if (prisms) {
+    html += fmt::format("<td>{}</td>",
+                        finite_text("{:.7g}", info.scale * number_of(page["nominal"], name)));
+  }
+  html += fmt::format(
+      "<td>{}</td>", is_sigma(prior_sigma) ? finite_text("{:.3g}", info.scale * prior_sigma) : "–");
+  if (held) {
     html += fmt::format("<td class=\"text\" colspan=\"2\">{}</td>",
-                        is_sigma(unknown.sigma) ? "held, but uncertain" : "held");
+                        is_sigma(sigma) ? "held, but uncertain" : "held");
   } else {
-    html += fmt::format("<td>{}</td>", finite_text("{:.0f} %", 100 * unknown.prior_share));
-    html += unknown.twin.empty() || !(std::abs(unknown.twin_correlation) >= kTied)
+    const std::string& twin = unknown["twin"].text();
+    const double correlation = unknown["twin_correlation"].number();
+    html +=
+        fmt::format("<td>{}</td>", finite_text("{:.0f} %", 100 * unknown["prior_share"].number()));
+    html += twin.empty() || !(std::abs(correlation) >= kTied)
                 ? "<td class=\"text\">–</td>"
                 : fmt::format("<td class=\"text\">{} ({})</td>",
-                              symbol_html(unknown_info(unknown.twin, r.shape()).symbol),
-                              finite_text("{:.2f}", unknown.twin_correlation));
+                              symbol_html(unknown_info(twin, shape_of(r)).symbol),
+                              finite_text("{:.2f}", correlation));
   }
-  if (r.truth) {
-    const double error = unknown.value - r.truth->values[i];
-    const double ratio =
-        unknown.held || !is_sigma(unknown.sigma) ? kUnknown : error / unknown.sigma;
-    html += fmt::format("<td>{}</td><td>{}</td><td{}>{}</td>", in_unit(r.truth->values[i]),
-                        in_unit(error), std::abs(ratio) > kFarOff ? " class=\"far\"" : "",
+  if (page.has("true")) {
+    const double truth = number_of(page["true"], name), error = value - truth;
+    const double ratio = held || !is_sigma(sigma) ? kUnknown : info.scale * error / sigma;
+    html += fmt::format("<td>{}</td><td>{}</td><td{}>{}</td>", in_unit(truth), in_unit(error),
+                        std::abs(ratio) > kFarOff ? " class=\"far\"" : "",
                         finite_text("{:.2f}", ratio));
   }
   return html + "</tr>\n";
 }
 
-std::string unknowns_table(const FlightReport& r, bool prisms) {
+std::string unknowns_table(const View& r, bool prisms) {
   std::string rows;
-  for (std::size_t i = 0; i < r.unknowns.size(); ++i) {
-    if (is_of_train(r.unknowns[i].name) == prisms) rows += unknown_row(r, i, prisms);
+  for (const auto& [name, one] : r["unknowns"].entries()) {
+    if (is_of_train(name) == prisms) rows += unknown_row(r, name, one, prisms);
   }
   if (rows.empty()) return "<p>There are none.</p>\n";
   return fmt::format(
@@ -197,31 +194,43 @@ std::string unknowns_table(const FlightReport& r, bool prisms) {
       "before</th><th>share of<br>σ before</th><th class=\"text\">most correlated "
       "with</th>{}</tr></thead><tbody>\n{}</tbody></table></div>\n",
       prisms ? "<th>nominal</th>" : "",
-      r.truth ? "<th>truth</th><th>error</th><th>error / σ</th>" : "", rows);
+      r["page"].has("true") ? "<th>truth</th><th>error</th><th>error / σ</th>" : "", rows);
+}
+
+/// [axis of the body, axis of the sensor]
+using Axes = std::array<std::array<double, 3>, 3>;
+
+Axes body_from_sensor(const View& r) {
+  Axes axes{};
+  const std::vector<View> rows = r["page"]["mount"]["body_from_sensor"].list();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::vector<double> row = rows.at(i).numbers();
+    for (std::size_t k = 0; k < 3; ++k) axes[i][k] = row.at(k);
+  }
+  return axes;
 }
 
 /// "forward", "to the right" or "down" of the body, or the numbers.
-std::string axis_text(const Eigen::MatrixXd& body_from_sensor, Eigen::Index axis) {
+std::string axis_text(const Axes& axes, std::size_t axis) {
   static constexpr std::array<std::pair<const char*, const char*>, 3> kWays = {
       {{"forward", "backward"}, {"to the right", "to the left"}, {"down", "up"}}};
   constexpr double kAlong = 1 - 1e-9;
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    const auto& [with, against] = kWays[static_cast<std::size_t>(k)];
-    if (body_from_sensor(k, axis) > kAlong) return with;
-    if (body_from_sensor(k, axis) < -kAlong) return against;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (axes[k][axis] > kAlong) return kWays[k].first;
+    if (axes[k][axis] < -kAlong) return kWays[k].second;
   }
-  return fmt::format("along ({:.4f}, {:.4f}, {:.4f})", body_from_sensor(0, axis),
-                     body_from_sensor(1, axis), body_from_sensor(2, axis));
+  return fmt::format("along ({:.4f}, {:.4f}, {:.4f})", axes[0][axis], axes[1][axis], axes[2][axis]);
 }
 
-std::string mount_html(const FlightReport& r) {
+std::string mount_html(const View& r) {
   std::string html;
-  const Eigen::MatrixXd& m = r.body_from_sensor;
+  const Axes m = body_from_sensor(r);
+  const std::string& reference = r["page"]["mount"]["reference_point"].text();
   html += fmt::format(
       "<p>As designed, the sensor's X, its optical axis, points {}, its Y {} and its Z {}. "
       "Reference point of the trajectory: {}.</p>\n",
       axis_text(m, 0), axis_text(m, 1), axis_text(m, 2),
-      r.reference_point.empty() ? "not named by the mount" : escape_html(r.reference_point));
+      reference.empty() ? "not named by the mount" : escape_html(reference));
   html += unknowns_table(r, false);
   return html +
          "<p class=\"note\">σ is one standard deviation, everything included. Before: what was "
@@ -232,7 +241,7 @@ std::string mount_html(const FlightReport& r) {
          "the body's axes.</p>\n";
 }
 
-std::string prisms_html(const FlightReport& r) {
+std::string prisms_html(const View& r) {
   return unknowns_table(r, true) +
          "<p class=\"note\">Nominal: the preset. A pitch or yaw that all beams share can hardly "
          "be told from the boresight, so single angles may be known less well than the directions "
@@ -245,40 +254,46 @@ std::string datum_row(const char* name, double height, double total, double rota
   for (const double value : {total, rotation, shape, axes[0], axes[1], axes[2]}) {
     html += fmt::format("<td>{}</td>", angle_text(value));
   }
-  return html + fmt::format("<td>{}</td><td>{}</td></tr>\n", millimetres(offset_at(total, height)),
-                            millimetres(offset_at(shape, height)));
+  for (const double value : {total, shape}) {
+    html += fmt::format("<td>{}</td>", millimetres(offset_at(radians_from_degrees(value), height)));
+  }
+  return html + "</tr>\n";
 }
 
-std::string directions_html(const FlightReport& r) {
-  const FlightDatum& d = r.datum;
+std::string directions_html(const View& r) {
+  const double height = datum_of(r, "height_m");
   std::string html = fmt::format(
       "<div class=\"wide\"><table><thead><tr><th>directions "
       "of the beams, deg</th><th>total</th><th>rotation</th><th>shape</th><th>about X</th>"
       "<th>about Y</th><th>about Z</th><th>total at {0} m,<br>mm</th><th>shape at {0} m,<br>mm</th>"
       "</tr></thead><tbody>\n",
-      finite_text("{:.0f}", d.height));
-  html += datum_row("σ after this flight", d.height, d.total, d.rotation, d.shape,
-                    {d.sigma_x, d.sigma_y, d.sigma_z});
-  if (r.truth) {
-    const auto row = [&](const char* name, const DirectionErrors& e) {
-      return datum_row(name, d.height, std::hypot(e.gauge, e.shape), e.gauge, e.shape,
-                       {e.rotation.x, e.rotation.y, e.rotation.z});
+      finite_text("{:.0f}", height));
+  html += datum_row(
+      "σ after this flight", height, datum_of(r, "sigma_total_deg"),
+      datum_of(r, "sigma_rotation_deg"), datum_of(r, "sigma_shape_deg"),
+      {datum_of(r, "sigma_x_deg"), datum_of(r, "sigma_y_deg"), datum_of(r, "sigma_z_deg")});
+  if (r.has("truth")) {
+    const auto row = [&](const char* name, const View& e) {
+      const double rotation = e["gauge_deg"].number(), shape = e["shape_deg"].number();
+      const View turn = e["rotation_deg"];
+      return datum_row(name, height, std::hypot(rotation, shape), rotation, shape,
+                       {turn["roll"].number(), turn["pitch"].number(), turn["yaw"].number()});
     };
-    html += row("error before, against the truth", r.truth->before);
-    html += row("error after, against the truth", r.truth->after);
+    html += row("error before, against the truth", r["truth"]["before"]);
+    html += row("error after, against the truth", r["truth"]["after"]);
   }
   return html + fmt::format(
                     "</tbody></table></div>\n<p class=\"note\">Boresight and prisms together, root "
                     "mean square over the field of view: the rotation that all beams share, about "
                     "the sensor's axes, and the shape, which no rotation explains. {} m is the "
                     "median range of the flight.</p>\n",
-                    finite_text("{:.0f}", d.height));
+                    finite_text("{:.0f}", height));
 }
 
 /// What a combination that is not told means to somebody who flies.
-std::string advice_of(const FlightReport& r, const NotTold& combination) {
+std::string advice_of(const Axes& axes, const std::string& combination) {
   const auto has = [&](std::string_view name) {
-    return combination.words.find(name) != std::string::npos;
+    return combination.find(name) != std::string::npos;
   };
   if (has("of the trajectory")) {
     return "Only their sum is known. Points of this flight are not affected; on another flight "
@@ -299,9 +314,9 @@ std::string advice_of(const FlightReport& r, const NotTold& combination) {
     return "Slopes in several directions, strips in several directions and a swaying aircraft "
            "determine it.";
   }
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!has(fmt::format("boresight_{}", "xyz"[axis]))) continue;
-    return std::abs(r.body_from_sensor(2, axis)) > kUpright
+    return std::abs(axes[2][axis]) > kUpright
                ? "Flat ground does not show a rotation about the vertical: fly over roofs or "
                  "other slopes."
                : "Strips in opposite or crossing directions determine it.";
@@ -309,77 +324,92 @@ std::string advice_of(const FlightReport& r, const NotTold& combination) {
   return "";
 }
 
-std::string not_told_html(const FlightReport& r) {
-  std::string html;
-  if (r.not_told.empty()) {
-    return html + (r.unknowns.empty() ? "<p>Nothing was adjusted.</p>\n"
-                                      : "<p>The flight adds to what was known of every free "
-                                        "unknown.</p>\n");
+std::string not_told_html(const View& r) {
+  if (r["not_told"].size() == 0) {
+    return r["unknowns"].size() == 0 ? "<p>Nothing was adjusted.</p>\n"
+                                     : "<p>The flight adds to what was known of every free "
+                                       "unknown.</p>\n";
   }
-  html +=
+  std::string html =
       "<p>The flight says less about these than was known before, so what was given decides "
       "(numbers are in units of the σ before).</p>\n<ul>";
-  for (const NotTold& one : r.not_told) {
+  for (const View& one : r["not_told"].list()) {
+    const std::string& combination = one["combination"].text();
     html += fmt::format("<li>{}: {} of the σ before remains. {}</li>",
-                        escape_html(words_of_unknowns(one.words, r.shape())),
-                        finite_text("{:.0f} %", 100 * one.sigma), escape_html(advice_of(r, one)));
+                        escape_html(words_of_unknowns(combination, shape_of(r))),
+                        finite_text("{:.0f} %", 100 * one["sigma_over_before"].number()),
+                        escape_html(advice_of(body_from_sensor(r), combination)));
   }
   return html + "</ul>\n";
 }
 
-std::string control_html(const FlightReport& r) {
-  if (r.control.empty()) return {};
+std::string control_html(const View& r) {
+  if (r["control"].size() == 0) return {};
   std::string html =
       "<div class=\"wide\"><table><thead><tr><th>name</th><th>shots</th>"
       "<th>seen above it, mm</th><th>stated σ, mm</th><th></th></tr></thead><tbody>\n";
-  for (const calibration::SeenControl& seen : r.control) {
+  for (const View& seen : r["control"].list()) {
+    const bool used = seen["used"].flag();
     html += fmt::format(
         "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-        escape_html(seen.name), count_text(seen.shots), seen.used ? millimetres(seen.off) : "–",
-        millimetres(seen.sigma),
-        !seen.used ? "left out" : (seen.significant ? "contradicts the flight" : ""));
+        escape_html(seen["name"].text()), count_text(seen["shots"].count()),
+        millimetres(seen["off_m"].number()), millimetres(seen["sigma_m"].number()),
+        !used ? "left out" : (seen["significant"].flag() ? "contradicts the flight" : ""));
   }
   return html +
          "</tbody></table></div>\n<p class=\"note\">Known points and planes on the ground, which "
          "the flight is tied to. Heights are along the ground's normal.</p>\n";
 }
 
-std::string shift_cell(const StripPair& pair, Eigen::Index axis) {
-  if (!(pair.sigma[axis] < kUntoldShift)) return "<td>–</td>";
-  const NumberText text =
-      number_text(kMillimetres * pair.shift[axis], kMillimetres * pair.sigma[axis]);
-  if (text.sigma.empty() || !std::isfinite(pair.shift[axis])) return "<td>–</td>";
+std::string shift_cell(const View& pair, const char* axis) {
+  const double shift = pair["shift_m"][axis].number(), sigma = pair["shift_sigma_m"][axis].number();
+  if (!(sigma < kUntoldShift)) return "<td>–</td>";
+  const NumberText text = number_text(kMillimetres * shift, kMillimetres * sigma);
+  if (text.sigma.empty() || !std::isfinite(shift)) return "<td>–</td>";
   return fmt::format("<td>{} ± {}</td>", text.value, text.sigma);
 }
 
-std::string pair_cells(const StripPair* pair) {
-  if (pair == nullptr) return "<td>–</td><td>–</td><td>–</td><td>–</td><td>–</td><td>–</td>";
-  std::string html = fmt::format("<td>{}</td><td>{}</td><td>{}</td>", count_text(pair->cells),
-                                 millimetres(pair->mean), millimetres(pair->rms));
-  for (Eigen::Index axis = 0; axis < 3; ++axis) html += shift_cell(*pair, axis);
+/// @param when  "before" or "after"
+std::string pair_cells(const View& pair, const char* when) {
+  if (!pair.has(when)) return "<td>–</td><td>–</td><td>–</td><td>–</td><td>–</td><td>–</td>";
+  const View own = pair[when];
+  std::string html =
+      fmt::format("<td>{}</td><td>{}</td><td>{}</td>", count_text(own["cells"].count()),
+                  millimetres(own["mean_m"].number()), millimetres(own["rms_m"].number()));
+  for (const char* axis : {"east", "north", "up"}) html += shift_cell(own, axis);
   return html;
 }
 
-std::string pairs_html(const FlightReport& r) {
-  std::map<std::pair<int, int>, std::pair<const StripPair*, const StripPair*>> rows;
-  for (const StripPair& pair : r.pairs_before) rows[{pair.first, pair.second}].first = &pair;
-  for (const StripPair& pair : r.pairs_after) rows[{pair.first, pair.second}].second = &pair;
-  if (rows.empty()) return "<p>No two strips saw the same ground.</p>\n";
+std::string pairs_html(const View& r) {
+  std::vector<View> pairs = r["strips"]["pairs"].list();
+  const std::size_t all = pairs.size();
+  if (all == 0) return "<p>No two strips saw the same ground.</p>\n";
+  const auto cells = [](const View& pair) {
+    return pair[pair.has("after") ? "after" : "before"]["cells"].count();
+  };
+  const auto strips = [](const View& pair) {
+    return std::pair(pair["first"].count(), pair["second"].count());
+  };
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [&](const View& a, const View& b) { return cells(a) > cells(b); });
+  if (all > kMostPairs) pairs.erase(pairs.begin() + kMostPairs, pairs.end());
+  std::sort(pairs.begin(), pairs.end(),
+            [&](const View& a, const View& b) { return strips(a) < strips(b); });
   std::string html =
       "<div class=\"wide\"><table><thead><tr><th>strips</th><th></th><th>cells</th><th>mean,<br>mm"
       "</th><th>RMS,<br>mm</th><th>shift east,<br>mm</th><th>north,<br>mm</th><th>up,<br>mm</th>"
       "</tr></thead><tbody>\n";
-  for (const auto& [strips, pair] : rows) {
+  for (const View& pair : pairs) {
     html += fmt::format(
         "<tr><th scope=\"row\">strip {} minus strip {}</th><td "
         "class=\"text\">before</td>{}</tr>\n<tr><th scope=\"row\"></th><td "
         "class=\"text\">after</td>{}</tr>\n",
-        strips.second + 1, strips.first + 1, pair_cells(pair.first), pair_cells(pair.second));
+        strips(pair).second, strips(pair).first, pair_cells(pair, "before"),
+        pair_cells(pair, "after"));
   }
   html += "</tbody></table></div>\n<p class=\"note\">";
-  if (rows.size() < r.pair_count) {
-    html += fmt::format("The {} pairs with the most ground in common, of {}. ", rows.size(),
-                        r.pair_count);
+  if (pairs.size() < all) {
+    html += fmt::format("The {} pairs with the most ground in common, of {}. ", pairs.size(), all);
   }
   return html +
          "Cells: squares of ground that both strips saw. Differences are along the ground's "
@@ -388,111 +418,97 @@ std::string pairs_html(const FlightReport& r) {
          "would determine it. After the calibration no mean or shift should stand out.</p>\n";
 }
 
-std::string strips_html(const FlightReport& r, Figures& figures) {
+std::string strips_html(const View& r, Figures& figures) {
   std::string html;
-  if (!r.strips.empty()) {
+  if (r["page"]["strips"].size() > 0) {
     html +=
         "<div class=\"wide\"><table><thead><tr><th>strip</th><th>begins, s</th><th>takes, s</th>"
         "<th>course, deg</th><th>speed, m/s</th><th>median range, m</th><th>sway, deg</th></tr>"
         "</thead><tbody>\n";
-    for (const FlightReport::Strip& one : r.strips) {
-      html += fmt::format(
-          "<tr><th scope=\"row\">strip {}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}"
-          "</td><td>{}</td></tr>\n",
-          one.strip + 1, finite_text("{:.1f}", one.begin), finite_text("{:.1f}", one.duration),
-          finite_text("{:.1f}", degrees_from_radians(one.course)), finite_text("{:.2f}", one.speed),
-          finite_text("{:.1f}", one.range), finite_text("{:.2f}", degrees_from_radians(one.sway)));
+    for (const View& one : r["page"]["strips"].list()) {
+      html += fmt::format("<tr><th scope=\"row\">strip {}</th>", one["strip"].count());
+      for (const auto& [format, key] :
+           {std::pair("{:.1f}", "begin_s"), std::pair("{:.1f}", "duration_s"),
+            std::pair("{:.1f}", "course_deg"), std::pair("{:.2f}", "speed_m_per_s"),
+            std::pair("{:.1f}", "range_m"), std::pair("{:.2f}", "sway_deg")}) {
+        html += fmt::format("<td>{}</td>", finite_text(format, one[key].number()));
+      }
+      html += "</tr>\n";
     }
     html +=
         "</tbody></table></div>\n<p class=\"note\">Strips are numbered from 1; they begin in "
         "seconds since the first shot, and their course is that over ground. Sway: how much roll "
         "and pitch vary together; an aircraft that sways reveals more.</p>\n";
   }
-  html += charts_html(r.strip_charts, figures);
+  html += charts_html(r["charts"]["strips"].json(), figures);
   return html;
 }
 
-std::string shots_html(const FlightReport& r) {
+std::string shots_html(const View& r) {
+  const View shots = r["shots"];
+  const std::uint64_t without_pose = shots["without_pose"].count();
   std::string html = fmt::format(
       "<p>{} of {} shots were used, on {} cells of ground. {} were left out because they lie "
       "beyond three sigmas of their cell{}; {} cells were too rough. The other shots hit such "
       "cells, or ground that only one strip saw.</p>\n",
-      count_text(r.used), count_text(r.shots), count_text(r.cells), count_text(r.outliers),
-      r.without_pose == 0 ? ""
-                          : fmt::format(", and {} because the trajectory has no pose for them",
-                                        count_text(r.without_pose)),
-      count_text(r.rough_cells));
+      count_text(shots["used"].count()), count_text(shots["on_strips"].count()),
+      count_text(r["cells"].count()), count_text(shots["outliers"].count()),
+      without_pose == 0 ? ""
+                        : fmt::format(", and {} because the trajectory has no pose for them",
+                                      count_text(without_pose)),
+      count_text(r["rough_cells"].count()));
   html += fmt::format(
       "<p>The residuals scatter {} times as much as the stated noise of the ranges predicts: the "
       "noise of one range is {} mm.</p>\n",
-      finite_text("{:.3g}", r.sigma0), millimetres(r.range_sigma));
-  if (r.roughness.value_or(0) > 0) {
+      finite_text("{:.3g}", r["sigma0"].number()), millimetres(r["range_sigma_m"].number()));
+  if (r["roughness_m"].number() > 0) {
     html += fmt::format(
         "<p>Of that, {} mm are the ground itself, which departs from a plane within each cell; all "
         "strips see the same, and the uncertainties account for it.</p>\n",
-        millimetres(*r.roughness));
+        millimetres(r["roughness_m"].number()));
   }
   return html;
 }
 
-std::string corrections_html(const FlightReport& r, Figures& figures) {
-  std::string delay;
-  if (r.attitude_delay && r.attitude_delay_sigma) {
-    const NumberText text =
-        number_text(1e3 * *r.attitude_delay, 1e3 * r.attitude_delay_sigma.value());
-    delay = fmt::format(
-        "<p>According to the strips, attitudes are late against positions by {} ± {} ms.</p>\n",
-        text.value, text.sigma);
-  }
+std::string corrections_html(const View& r, Figures& figures) {
+  const View late = r["attitude_delay_s"];
+  const NumberText text = number_text(1e3 * late["value"].number(), 1e3 * late["sigma"].number());
+  const std::string delay = fmt::format(
+      "<p>According to the strips, attitudes are late against positions by {} ± {} ms.</p>\n",
+      text.value, text.sigma);
   return fmt::format(
              "<p>Position and attitude are corrected at {} knots, points in time {} s apart, and "
              "linearly between. σ is their remaining uncertainty. Corrections should be about as "
              "large as the errors stated for the trajectory; where they jump or are larger, a "
              "warning says so, and the uncertainties account for it.</p>\n",
-             count_text(r.knots), finite_text("{:.3g}", r.knot_spacing)) +
-         delay + charts_html(r.correction_charts, figures);
-}
-
-std::string correlations_html(const FlightReport& r) {
-  std::vector<Eigen::Index> known;
-  std::vector<CorrelationHead> heads;
-  for (std::size_t i = 0; i < r.unknowns.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    if (!(r.covariance(row, row) > 0)) continue;
-    const UnknownInfo info = unknown_info(r.unknowns[i].name, r.shape());
-    known.push_back(row);
-    heads.push_back({parameter_head(info.long_name, info.symbol, r.unknowns[i].name),
-                     symbol_html(info.symbol)});
-  }
-  return correlation_html(heads, r.covariance(known, known));
+             count_text(r["knots"].count()),
+             finite_text("{:.3g}", r["page"]["knot_spacing_s"].number())) +
+         delay + charts_html(r["charts"]["corrections"].json(), figures);
 }
 
 }  // namespace
 
-std::string flight_page(const FlightReport& r) {
+std::string flight_page(const View& r) {
   Figures figures;
-  const std::string head =
-      verdict_html(verdict_of(r)) + overview_html(key_numbers(r), r.difference_charts, figures);
+  const auto drawn = [&](const char* name) -> const Json& { return r["charts"][name].json(); };
+  const std::string head = verdict_html(flight_verdict(r)) +
+                           overview_html(flight_numbers(r), drawn("differences"), figures);
   Sections sections;
   sections.add("How well the beams are known", directions_html(r), Sections::Shown::unfolded);
   sections.add("Mount, ranges and clock", mount_html(r), Sections::Shown::unfolded);
   sections.add("What this flight does not determine", not_told_html(r));
   sections.add("Known ground", control_html(r));
   sections.add("Strips before and after",
-               pairs_html(r) + charts_html(r.difference_charts, figures, 1));
+               pairs_html(r) + charts_html(drawn("differences"), figures, 1));
   sections.add("The flight", strips_html(r, figures));
-  sections.add("Ground", shots_html(r) + charts_html(r.ground_charts, figures));
-  sections.add("Residuals", r.residual_charts.empty() ? "<p>There are none to draw.</p>\n"
-                                                      : charts_html(r.residual_charts, figures));
+  sections.add("Ground", shots_html(r) + charts_html(drawn("ground"), figures));
+  sections.add("Residuals", drawn("residuals").empty() ? "<p>There are none to draw.</p>\n"
+                                                       : charts_html(drawn("residuals"), figures));
   sections.add("Corrections of the trajectory", corrections_html(r, figures));
   sections.add("Prisms", prisms_html(r));
-  sections.add(kCorrelations, correlations_html(r));
-  sections.add(kTimes, time_audit_html(r.recordings));
-  sections.add(kHowToRepeat, provenance_html(r.provenance));
-  std::string title = "risley calibrate, in flight";
-  if (!r.recordings.empty()) title += ": " + r.recordings.front().name;
-  if (r.recordings.size() > 1) title += fmt::format(" and {} more", r.recordings.size() - 1);
-  return page_html(title, subject_of(r), head, sections, figures);
+  add_end(sections, r);
+  return page_html("risley calibrate, in flight" + title_of(r), flight_subject(r), head, sections,
+                   figures);
 }
 
 }  // namespace risley::report

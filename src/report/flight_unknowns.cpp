@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 
-#include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 
 namespace risley::report {
@@ -13,18 +12,18 @@ namespace {
 
 struct NamedUnknown {
   const char *name, *long_name, *symbol, *unit;
-  double si_per_unit;
+  double scale;
 };
 
 constexpr std::array<NamedUnknown, 8> kMountUnknowns = {{
-    {"boresight_x_deg", "boresight about the sensor's X", "β_X", "deg", kRadiansPerDegree},
-    {"boresight_y_deg", "boresight about the sensor's Y", "β_Y", "deg", kRadiansPerDegree},
-    {"boresight_z_deg", "boresight about the sensor's Z", "β_Z", "deg", kRadiansPerDegree},
+    {"boresight_x_deg", "boresight about the sensor's X", "β_X", "deg", 1},
+    {"boresight_y_deg", "boresight about the sensor's Y", "β_Y", "deg", 1},
+    {"boresight_z_deg", "boresight about the sensor's Z", "β_Z", "deg", 1},
     {"lever_arm_x_m", "lever arm forward", "l_x", "m", 1},
     {"lever_arm_y_m", "lever arm to the right", "l_y", "m", 1},
     {"lever_arm_z_m", "lever arm down", "l_z", "m", 1},
-    {"range_offset_m", "range offset, which the sensor adds to every range", "c", "mm", 1e-3},
-    {"clock_offset_s", "clock offset, added to the recording's times", "τ", "ms", 1e-3},
+    {"range_offset_m", "range offset, which the sensor adds to every range", "c", "mm", 1e3},
+    {"clock_offset_s", "clock offset, added to the recording's times", "τ", "ms", 1e3},
 }};
 
 const NamedUnknown* find_named(std::string_view name) {
@@ -39,24 +38,23 @@ bool is_of_train(std::string_view name) { return find_named(name) == nullptr; }
 
 UnknownInfo unknown_info(const std::string& name, TrainShape shape) {
   if (const NamedUnknown* named = find_named(name)) {
-    return {named->long_name, named->symbol, named->unit, named->si_per_unit};
+    return {named->long_name, named->symbol, named->unit, named->scale};
   }
-  const ParameterInfo& info = find_parameter(name, shape);
-  return {info.long_name, info.symbol, info.unit, info.si_per_unit};
+  try {
+    const ParameterInfo& info = find_parameter(name, shape);
+    return {info.long_name, info.symbol, info.unit};
+  } catch (const InvalidArgument&) {
+    return {name, name, ""};
+  }
 }
 
 std::string words_of_unknowns(std::string_view text, TrainShape shape) {
   std::string result;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find(' '), text.size());
-    const std::string word(text.substr(0, end));
+    const std::string long_name = unknown_info(std::string(text.substr(0, end)), shape).long_name;
     if (!result.empty()) result += ' ';
-    try {
-      const std::string long_name = unknown_info(word, shape).long_name;
-      result += long_name.substr(0, long_name.find(','));
-    } catch (const InvalidArgument&) {
-      result += word;
-    }
+    result += long_name.substr(0, long_name.find(','));
     text.remove_prefix(std::min(end + 1, text.size()));
   }
   return result;

@@ -15,8 +15,12 @@
 #include "risley/report/html.hpp"
 
 #include "report/page_assets.hpp"
+#include "report/view.hpp"
 
 namespace risley::report {
+
+using json::Json;
+
 namespace {
 
 /// What stands largest on a page, and its colour.
@@ -88,12 +92,6 @@ std::string symbol_html(const std::string& symbol) {
                      escape_html(symbol.substr(underscore + 1)));
 }
 
-bool any_held_parameter(std::span<const ReportedParameter> parameters) {
-  return std::any_of(parameters.begin(), parameters.end(), [](const auto& row) {
-    return row.sigma > row.sigma_given_held.value_or(row.sigma);
-  });
-}
-
 std::string parameter_head(const std::string& long_name, const std::string& symbol,
                            const std::string& name) {
   return fmt::format("<th scope=\"row\">{}, {}<span class=\"name\">{}</span></th>",
@@ -119,7 +117,7 @@ std::string list_html(const std::vector<std::string>& items) {
 std::string verdict_html(const Verdict& verdict) {
   const auto found =
       std::find_if(std::begin(kHeadlines), std::end(kHeadlines),
-                   [&](const Headline& headline) { return headline.code == verdict.result.code; });
+                   [&](const Headline& headline) { return headline.code == verdict.code; });
   std::string kind = "ok", title = "Converged.", html;
   if (!verdict.converged) {
     kind = "bad";
@@ -129,20 +127,20 @@ std::string verdict_html(const Verdict& verdict) {
     if (found != std::end(kHeadlines)) {
       kind = found->kind;
       title = found->words;
-    } else if (!verdict.result.code.empty()) {  // undecided
+    } else if (!verdict.code.empty()) {  // undecided
       kind = "care";
       title = "Converged, but not to be trusted.";
     }
     if (!verdict.warnings.empty() || !verdict.care_html.empty()) {
       if (kind == "ok") kind = "care";
     }
-    if (!verdict.result.words.empty()) {
-      html = fmt::format("<p><b>Found:</b> {}.</p>", escape_html(verdict.result.words));
+    if (!verdict.words.empty()) {
+      html = fmt::format("<p><b>Found:</b> {}.</p>", escape_html(verdict.words));
     }
   }
   html += fmt::format("<p>{}</p>", escape_html(verdict.facts));
   std::vector<std::string> to_do;
-  if (!verdict.result.to_do.empty()) to_do.push_back(verdict.result.to_do);
+  if (!verdict.to_do.empty()) to_do.push_back(verdict.to_do);
   if (!verdict.converged && !verdict.mend.empty()) to_do.push_back(verdict.mend);
   if (!to_do.empty()) {
     html += fmt::format("<p><b>What to do:</b> {}.</p>",
@@ -150,25 +148,25 @@ std::string verdict_html(const Verdict& verdict) {
   }
   if (!verdict.warnings.empty()) html += "<p><b>With care:</b></p>" + list_html(verdict.warnings);
   if (verdict.converged) html += verdict.care_html;
-  const std::string code = verdict.result.code.empty()
-                               ? ""
-                               : fmt::format(" <code>{}</code>", escape_html(verdict.result.code));
+  const std::string code =
+      verdict.code.empty() ? "" : fmt::format(" <code>{}</code>", escape_html(verdict.code));
   return fmt::format("<section class=\"verdict {}\"><strong>{}</strong>{}{}</section>\n", kind,
                      escape_html(title), code, html);
 }
 
-std::string correlation_html(const std::vector<CorrelationHead>& heads,
-                             const Eigen::MatrixXd& covariance) {
+std::string correlation_html(const std::vector<CorrelationHead>& heads, const View& matrix) {
   if (heads.empty()) return "";
   std::string html = "<div class=\"wide\"><table class=\"heat\"><thead><tr><th></th>";
   for (const CorrelationHead& head : heads) {
     html += fmt::format("<th scope=\"col\">{}</th>", head.symbol_html);
   }
   html += "</tr></thead><tbody>\n";
-  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
-    html += fmt::format("<tr>{}", heads[static_cast<std::size_t>(i)].row_html);
-    for (Eigen::Index j = 0; j < covariance.cols(); ++j) {
-      double r = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
+  const std::vector<View> rows = matrix.list();
+  for (std::size_t i = 0; i < std::min(rows.size(), heads.size()); ++i) {
+    html += fmt::format("<tr>{}", heads[i].row_html);
+    std::vector<double> row = rows[i].numbers();
+    row.resize(heads.size(), kUnknown);
+    for (double r : row) {
       if (!std::isfinite(r)) {
         html += "<td>–</td>";
         continue;
@@ -184,35 +182,29 @@ std::string correlation_html(const std::vector<CorrelationHead>& heads,
          "when the other falls. Near ±1 only their sum or difference is well known.</p>\n";
 }
 
-std::string correlation_html(const std::vector<std::string>& free,
-                             const Eigen::MatrixXd& covariance, TrainShape shape) {
-  std::vector<CorrelationHead> heads;
-  for (const std::string& name : free) {
-    const ParameterInfo& info = find_parameter(name, shape);
-    heads.push_back({parameter_head(info), symbol_html(info.symbol)});
-  }
-  return correlation_html(heads, covariance);
-}
-
-std::string time_audit_html(const std::vector<ReportedRecording>& recordings) {
+std::string time_audit_html(const View& recordings) {
   std::string html =
       "<div class=\"wide\"><table><thead><tr><th>recording</th>"
       "<th>format</th><th>time from</th><th>shots</th><th>without return</th><th>duration, s</th>"
       "<th>rate, Hz</th><th>gaps</th><th>missing, s</th><th>longest, s</th><th>clock resets</th>"
       "<th>late packets</th><th>PPS seconds</th></tr></thead><tbody>\n";
-  for (const ReportedRecording& one : recordings) {
-    const recordings::TimeAuditResult& audit = one.audit;
-    const auto alarming = [](std::uint64_t count) { return count > 0 ? " class=\"far\"" : ""; };
-    html += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-        "<td>{}</td><td{}>{}</td><td>{}</td><td>{}</td><td{}>{}</td><td{}>{}</td><td>{}</td></"
-        "tr>\n",
-        escape_html(one.name), escape_html(one.format), escape_html(one.time_from),
-        count_text(audit.shots), count_text(audit.no_return),
-        finite_text("{:.6g}", audit.duration_s), finite_text("{:.6g}", audit.rate_hz),
-        alarming(audit.gaps.count), audit.gaps.count, finite_text("{:.4g}", audit.gaps.total_s),
-        finite_text("{:.4g}", audit.gaps.largest_s), alarming(audit.time_resets), audit.time_resets,
-        alarming(audit.non_monotonic_packets), audit.non_monotonic_packets, audit.pps_wraps);
+  for (const View& one : recordings.list()) {
+    const auto cell = [](const std::string& text, bool alarming = false) {
+      return fmt::format("<td{}>{}</td>", alarming ? " class=\"far\"" : "", text);
+    };
+    const auto count = [&](const char* key) { return one[key].count(); };
+    const auto alarm = [&](const char* key) {
+      return cell(std::to_string(count(key)), count(key) > 0);
+    };
+    html += fmt::format("<tr><th scope=\"row\">{}</th>", escape_html(one["name"].text()));
+    html += cell(escape_html(one["format"].text())) +
+            cell(escape_html(one["time_reference"].text())) + cell(count_text(count("shots"))) +
+            cell(count_text(count("no_return"))) +
+            cell(finite_text("{:.6g}", one["duration_s"].number())) +
+            cell(finite_text("{:.6g}", one["rate_hz"].number())) + alarm("gaps") +
+            cell(finite_text("{:.4g}", one["gaps_total_s"].number())) +
+            cell(finite_text("{:.4g}", one["largest_gap_s"].number())) + alarm("time_resets") +
+            alarm("non_monotonic_packets") + cell(std::to_string(count("pps_wraps"))) + "</tr>\n";
   }
   return html +
          "</tbody></table></div>\n<p class=\"note\">Gaps: steps longer than 1.8 times the usual "
@@ -220,7 +212,7 @@ std::string time_audit_html(const std::vector<ReportedRecording>& recordings) {
          "a prism turns by up to half a degree, so the estimate depends on sound times.</p>\n";
 }
 
-std::string provenance_html(const Provenance& provenance) {
+std::string provenance_html(const jobs::Provenance& provenance) {
   std::string html = "<dl>\n";
   for (const auto& [name, value] : provenance) {
     html += fmt::format("<dt>{}</dt><dd>{}</dd>\n", escape_html(name), escape_html(value));
@@ -228,17 +220,18 @@ std::string provenance_html(const Provenance& provenance) {
   return html + "</dl>\n";
 }
 
-std::string Figures::add(const Chart& chart) {
+std::string Figures::add(const Json& chart) {
   if (number_ > 0) data_ += ",\n";
-  data_ += chart_json(chart, number_);
-  has_space_ = has_space_ || chart.kind == ChartKind::space;
+  data_ += script_text(chart, number_);
+  has_space_ = has_space_ || chart["kind"] == "space";
   return figure_html(chart, number_++);
 }
 
-std::string charts_html(const std::vector<Chart>& charts, Figures& figures, std::size_t first) {
-  const auto is_square = [](const Chart& chart) {
-    return chart.kind == ChartKind::map || chart.kind == ChartKind::ground ||
-           chart.kind == ChartKind::two_turns;
+std::string Figures::add(const Chart& chart) { return add(chart_json(chart)); }
+
+std::string charts_html(const Json& charts, Figures& figures, std::size_t first) {
+  const auto is_square = [](const Json& chart) {
+    return chart["kind"] == "map" || chart["kind"] == "ground" || chart["kind"] == "two_turns";
   };
   std::string html;
   for (std::size_t last = first; first < charts.size(); first = last) {
@@ -253,7 +246,11 @@ std::string charts_html(const std::vector<Chart>& charts, Figures& figures, std:
   return html;
 }
 
-std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vector<Chart>& charts,
+std::string charts_html(const std::vector<Chart>& charts, Figures& figures, std::size_t first) {
+  return charts_html(charts_json(charts), figures, first);
+}
+
+std::string overview_html(const std::vector<KeyNumber>& numbers, const Json& charts,
                           Figures& figures) {
   std::string html = "<div class=\"overview\">\n<dl class=\"numbers\">\n";
   for (const KeyNumber& number : numbers) {
@@ -263,6 +260,11 @@ std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vect
   html += "</dl>\n";
   if (!charts.empty()) html += figures.add(charts.front());
   return html + "</div>\n";
+}
+
+std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vector<Chart>& charts,
+                          Figures& figures) {
+  return overview_html(numbers, charts_json(charts), figures);
 }
 
 void Sections::add(const std::string& title, const std::string& html, Shown shown) {

@@ -175,7 +175,7 @@ std::string prisms_html(const sensors::Sensor& sensor) {
 
 }  // namespace
 
-std::string pattern_page(const jobs::PatternDetails& details, const Provenance& provenance) {
+std::string pattern_page(const jobs::PatternDetails& details, const jobs::Provenance& provenance) {
   Figures figures;
   const sensors::PatternCoverage& coverage = details.coverage;
   const std::string head = overview_html(key_numbers(coverage), {rosette_chart(details)}, figures);

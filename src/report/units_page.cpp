@@ -278,16 +278,16 @@ std::string subject_of(const ComparedUnits& compared) {
 
 }  // namespace
 
-std::string units_page(const ComparedUnits& compared, const Provenance& provenance) {
+std::string units_page(const ComparedUnits& compared, const jobs::Provenance& provenance) {
   Figures figures;
   std::string words = change_words(compared);
   for (const ComparedFleet& fleet : compared.fleets) words += fleet_words(fleet, compared);
   std::vector<Chart> fleets;
   for (const ComparedFleet& fleet : compared.fleets) fleets.push_back(chart_of_fleet(fleet));
-  const std::string head =
-      fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(words)) +
-      (compared.is_one_series ? overview_html(numbers_of_series(compared), {}, figures)
-                              : charts_html(fleets, figures));
+  const std::string head = fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(words)) +
+                           (compared.is_one_series ? overview_html(numbers_of_series(compared),
+                                                                   std::vector<Chart>(), figures)
+                                                   : charts_html(fleets, figures));
   Sections sections;
   for (const ComparedFleet& fleet : compared.fleets) {
     const std::string& sensor = compared.units[fleet.units.front()].sensor;

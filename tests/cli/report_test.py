@@ -3,7 +3,6 @@
 # SPDX-License-Identifier: MIT
 """The page of a result folder, drawn again."""
 import json
-import math
 import unittest
 
 from command import SOURCE, CommandTest
@@ -54,8 +53,8 @@ class ReportTest(CommandTest):
         self.assertTrue(found["same_unit"])
         # The estimate is what the sensor believes; the calibration says how wrong that is.
         bent = json.loads((self.folder / "calibrate/report.json").read_text())["pointing_error"]
-        for key, name in (("total_deg", "total"), ("shared_deg", "gauge"), ("shape_deg", "shape")):
-            said = math.degrees(bent["errors"][name])
+        for key in ("total_deg", "shared_deg", "shape_deg"):
+            said = bent[key]["value"]
             self.assertAlmostEqual(found["directions"][key]["value"], said, delta=0.03 * said)
         self.assertGreater(found["differences"]["incident_beam_vertical_deg"]["sigma"], 0)
         self.assertIn("calibrate/calibration.yaml", [one["path"] for one in found["inputs"]])
@@ -88,9 +87,9 @@ class ReportTest(CommandTest):
         self.assertIn("damaged/report.json", done.stderr)
         self.assertIn("byte", done.stderr)
         data = json.loads(text)
-        del data["covariance"]
+        del data["parameters"]
         (folder / "report.json").write_text(json.dumps(data))
-        self.assertIn("covariance is missing", self.expect(3, "report", "damaged").stderr)
+        self.assertIn("parameters is missing", self.expect(3, "report", "damaged").stderr)
         self.assertEqual((folder / "report.html").read_text(), "old")
 
     def test_what_did_not_converge_has_a_page_too(self):

@@ -111,7 +111,10 @@ def test_calibrate(calibration, hall, truth):
     assert strict.verdict.code == "bent"
     assert strict.to_dict()["tolerance_deg"] == pytest.approx(0.001)
     assert calibration.to_dict()["tolerance_deg"] == pytest.approx(0.1)
-    assert calibration.pointing_error["total_deg"]["value"] > 0.01
+    total = calibration.pointing_error.total_deg
+    assert total.value == total["value"] > 0.01 and "pointing_error" in dir(calibration)
+    with pytest.raises(AttributeError, match="no pointing, only"):
+        calibration.pointing
     assert calibration.names[-1] == "range_offset" and calibration.units[-1] == "m"
     assert calibration.covariance.shape == (len(calibration.free),) * 2
     held = risley.calibrate(hall, rate=2000, fixed=["refractive_index"], beam_origin=False,

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The stubs say what the module has, and the public face is typed and documented."""
 import inspect
+import os
 import pathlib
 import subprocess
 import sys
@@ -28,6 +29,11 @@ def test_stubs_are_those_of_the_module(tmp_path):
     allowed = tmp_path / "allowed"
     allowed.write_text(ALLOWED + "\n", encoding="utf-8")
     run("mypy.stubtest", "risley._risley", "--allowlist", str(allowed), folder=tmp_path)
+
+
+def test_types_of_results_are_those_of_the_schemas():
+    tool = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"]) / "tools" / "result_types.py"
+    subprocess.run([sys.executable, tool, "--check"], check=True, timeout=60)
 
 
 def test_the_public_face_is_typed(tmp_path):

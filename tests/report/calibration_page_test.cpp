@@ -1,12 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/calibration_page.hpp"
-
 #include <cmath>
 #include <limits>
 #include <regex>
 #include <set>
 #include <string>
+#include <tuple>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,7 +13,9 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
+#include "risley/core/error.hpp"
 #include "risley/core/random.hpp"
+#include "risley/report/report_file.hpp"
 #include "risley/sensors/preset.hpp"
 
 namespace risley::report::calibration_page_test {
@@ -142,6 +143,16 @@ Calibration example() {
   return c;
 }
 
+jobs::ReadRecording recording(const std::string& path, std::uint64_t observations) {
+  jobs::ReadRecording read;
+  read.path = path;
+  read.header.format = "lvx-1.1";
+  read.header.devices.emplace_back();
+  read.header.devices.front().serial = "1PQD&7";
+  read.audit.observations = observations;
+  return read;
+}
+
 /// What the page is made of, with everything that belongs to it.
 struct Page {
   sensors::Sensor nominal = sensors::load_sensor("mid-40");
@@ -152,21 +163,20 @@ struct Page {
 
   explicit Page(std::size_t points = 2000) : sample(sample_on(calibration.planes, 2, points)) {}
 
-  CalibrationReport report() const {
-    std::vector<ReportedRecording> recordings{{"room <1>.lvx", "lvx-1.1", "sensor", {}},
-                                              {"hall.lvx", "lvx-1.1", "sensor", {}}};
-    recordings[0].audit.observations = 60000;
-    recordings[1].audit.observations = 40000;
-    return calibration_report(
-        {calibration,
-         nominal,
-         jobs::calibration_details(calibration, recordings.size(), sample, truth),
-         truth,
-         recordings,
-         {{"command", "risley calibrate \"room <1>.lvx\" hall.lvx"}, {"version", "0.1.0"}},
-         warnings});
+  Report report() const {
+    jobs::CalibratedRecordings found;
+    found.recordings = {recording("folder/room <1>.lvx", 60000), recording("hall.lvx", 40000)};
+    found.choice.sensor = found.nominal = nominal;
+    found.choice.words = "the file says so";
+    found.calibration = calibration;
+    found.truth = truth;
+    found.details = jobs::calibration_details(calibration, found.recordings.size(), sample, truth);
+    found.provenance = {{"command", "risley calibrate \"room <1>.lvx\" hall.lvx"},
+                        {"version", "0.1.0"}};
+    found.warnings = warnings;
+    return report_of(found);
   }
-  std::string html() const { return calibration_page(report()); }
+  std::string html() const { return report_page(report()); }
 };
 
 jobs::BeamComparison example_truth() {
@@ -340,7 +350,7 @@ TEST(CalibrationPage, AnyWarningAsksForCare) {
   page.warnings = {"a gap of 2 s"};
   const std::string shown = visible(page.html());
   EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
-  EXPECT_THAT(shown, HasSubstr("<li>the walls are uneven</li><li>a gap of 2 s</li>"));
+  EXPECT_THAT(shown, HasSubstr("<li>a gap of 2 s</li><li>the walls are uneven</li>"));
 }
 
 TEST(CalibrationPage, APoorDatumSaysWhatHelps) {
@@ -369,7 +379,6 @@ TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   page.calibration.reason = "the walls do not determine pitch & yaw";
   page.calibration.warnings = {"a single wall"};
   page.calibration.rms_after = kNaN;
-  page.calibration.free = estimation::free_parameters(estimation::default_free_names({2}), {2});
   page.calibration.datum.sigma_pitch = std::numeric_limits<double>::infinity();
   page.calibration.unobservable = {
       {{{"prism_tilt_a_vertical_deg", 0.8}, {"incident_beam_vertical_deg", -0.6}}, 1e-9, 40}};
@@ -546,6 +555,108 @@ TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
   for (std::size_t i = 0; i < floor.at("x").size(); ++i) {
     const auto x = floor.at("x")[i].get<double>(), above = floor.at("y")[i].get<double>();
     EXPECT_NEAR(above, -(1.2 - std::sin(deg(2)) * x) / std::cos(deg(2)), 1e-5);
+  }
+}
+
+/// What reading a file of this text says; nothing where it is taken.
+std::string error_of(const std::string& text) {
+  try {
+    report_page(parse_report(text, "folder/report.json"));
+  } catch (const FileError& found) {
+    EXPECT_THAT(found.what(), HasSubstr("folder/report.json"));
+    return found.what();
+  }
+  return "";
+}
+
+TEST(ReportFile, AReportComesBackAsItWas) {
+  Page page;
+  page.truth = example_truth();
+  page.calibration.planes[1].rms = kNaN;
+  const Report report = page.report();
+  const Report again = parse_report(report_text(report), "report.json");
+  EXPECT_EQ(report_page(again), report_page(report));
+  EXPECT_EQ(report_text(again), report_text(report));
+  EXPECT_EQ(verb_of(again), "calibrate");
+  // What --json prints, in the same units.
+  EXPECT_NEAR(again.json["pointing_error"]["total_deg"]["value"].get<double>(), 0.3571, 1e-12);
+  EXPECT_TRUE(again.json["planes"][1]["rms_m"].is_null());
+}
+
+TEST(ReportFile, WhatIsNoReportIsRefused) {
+  const std::string text = report_text(Page().report());
+  EXPECT_THAT(error_of(text.substr(0, text.size() / 2)), HasSubstr("byte"));
+  EXPECT_THAT(error_of("[1, 2]"), HasSubstr("expected object, found array"));
+  EXPECT_THAT(error_of("{\"format\": \"a dog\"}"), HasSubstr("is missing"));
+  EXPECT_THAT(error_of("{\"format\": \"risley report\", \"format_version\": 1}"),
+              HasSubstr("run the command that made the result again"));
+  EXPECT_THAT(error_of("{\"format\": 1e999}"), HasSubstr("the JSON cannot be read"));
+}
+
+TEST(ReportFile, WhatIsMissingOrWrongIsNamed) {
+  Page page;
+  page.truth = example_truth();
+  const json::Json sound = page.report().json;
+  const json::Json cell_chart = sound["charts"]["pointing"][0];
+  ASSERT_EQ(cell_chart["series"][0]["kind"], "cells");
+  for (const auto& [place, value, words] :
+       std::vector<std::tuple<std::string, json::Json, std::string>>{
+           {"/verb", "dog", "verb: expected one of"},
+           {"/points", -17, "points: expected 0 or more, found -17"},
+           {"/points", 1.5, "points: expected integer, found 1.5"},
+           {"/points", "many", "points: expected integer, found string"},
+           {"/converged", false, "reason: expected"},
+           {"/page/prisms", 99, "page.prisms: expected 4 or less"},
+           {"/page/emitters", -1, "page.emitters"},
+           {"/page/recordings/0/format", 7, "page.recordings[0].format: expected string"},
+           {"/planes/0/normal", {1, 2}, "planes[0].normal: 2 values"},
+           {"/datum/sigma_yaw_deg", -1, "datum.sigma_yaw_deg"},
+           {"/provenance/0", {"command"}, "provenance[0]: 1 values"},
+           {"/charts/pointing/0/kind", "clouds", "charts.pointing[0].kind: expected one of"},
+           {"/charts/pointing/0/kind", "space", "series[0].z: 0 values"},
+           {"/charts/pointing/0/value_range", {1}, "value_range: 1 values"},
+           {"/charts/pointing/0/grows_for", -1, "grows_for: expected 0 or more"},
+           {"/charts/pointing/0/series/0/colour", "x", "series[0].colour: expected one of"},
+           {"/charts/pointing/0/series/0/y", {1}, "series[0].y: 1 values, expected"},
+           {"/charts/pointing/0/series/0/value", json::Json::array(), "series[0].value: 0 values"},
+           {"/charts/pointing/0/series/0/cell_width", -1, "cell_width"}}) {
+    json::Json damaged = sound;
+    damaged[json::Json::json_pointer(place)] = value;
+    EXPECT_THAT(error_of(damaged.dump()), HasSubstr(words)) << place;
+  }
+}
+
+/// Every key of objects that is not one of many names.
+void collect(const json::Json& value, const std::string& place, std::vector<std::string>& places) {
+  if (value.is_array() && !value.empty()) collect(value.front(), place + "/0", places);
+  if (!value.is_object()) return;
+  for (const auto& [name, one] : value.items()) {
+    places.push_back(place + "/" + name);
+    collect(one, places.back(), places);
+  }
+}
+
+TEST(ReportFile, NothingThatIsMissingOrOfAnotherKindIsAFault) {
+  Page page(50);
+  page.truth = example_truth();
+  json::Json sound = page.report().json;
+  for (json::Json& charts : sound["charts"]) {
+    if (charts.size() > 1) charts = json::Json::array({charts.front()});
+  }
+  std::vector<std::string> places;
+  collect(sound, "", places);
+  EXPECT_GT(places.size(), 200u);
+  for (const std::string& place : places) {
+    const json::Json::json_pointer pointer(place);
+    for (const json::Json& value :
+         {json::Json(), json::Json("x"), json::Json(1e300), json::Json::array({1, "x"})}) {
+      json::Json damaged = sound;
+      damaged[pointer] = value;
+      error_of(damaged.dump());
+    }
+    json::Json cut = sound;
+    cut[pointer.parent_pointer()].erase(pointer.back());
+    error_of(cut.dump());
   }
 }
 

@@ -3,6 +3,7 @@
 #include "risley/report/chart.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -57,6 +58,34 @@ TEST(Charts, AHistogramHasBinsForItsValues) {
   EXPECT_EQ(bins(30), 9u);
   EXPECT_EQ(bins(1001), 21u);
   EXPECT_EQ(bins(3000000), 61u);
+}
+
+json::Json drawn(std::vector<double> x) {
+  return chart_json(
+      {"a \"title\" </script>", "x", "y", {{"", "a", SeriesKind::line, std::move(x), {}}}, {}});
+}
+
+TEST(ChartJson, TextsCannotEndTheScriptElement) {
+  const std::string text = script_text(drawn({}), 3);
+  EXPECT_NE(text.find(R"("title":"a \"title\" \u003c/script>")"), std::string::npos) << text;
+  EXPECT_EQ(text.find('<'), std::string::npos);
+  EXPECT_EQ(json::Json::parse(text)["title"], "a \"title\" </script>");
+  EXPECT_EQ(json::Json::parse(text)["id"], "chart-3");
+}
+
+TEST(ChartJson, NumbersThatAreNotFiniteBecomeNull) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const std::string text =
+      drawn({1.5, std::numeric_limits<double>::quiet_NaN(), -2e-7, kInfinity, 0.25}).dump();
+  EXPECT_NE(text.find("\"x\":[1.5,null,-2e-07,null,0.25]"), std::string::npos) << text;
+  EXPECT_NE(text.find("\"y\":[]"), std::string::npos) << text;
+}
+
+TEST(ChartJson, NumbersThatDifferLittleKeepWhatTellsThemApart) {
+  const auto column = [](std::vector<double> x) { return drawn(std::move(x))["series"][0]["x"]; };
+  EXPECT_EQ(column({1.0 / 3.0, -1.0}), (json::Json{0.3333333, -1.0}));
+  EXPECT_EQ(column({-43789.81234567, -43789.81234568}),
+            (json::Json{-43789.81234567, -43789.81234568}));
 }
 
 }  // namespace risley::report::chart_test

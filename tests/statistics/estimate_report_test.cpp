@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 // What a report says of an estimation whose truth is known: pieces of the recording alone, maps of
 // residuals, and the page.
-#include "risley/report/estimate_report.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -13,7 +11,7 @@
 
 #include "risley/estimation/piecewise.hpp"
 #include "risley/estimation/residual_maps.hpp"
-#include "risley/report/estimate_page.hpp"
+#include "risley/report/report_file.hpp"
 
 #include "statistics/simulated.hpp"
 
@@ -162,25 +160,27 @@ TEST(ResidualMaps, RefuseWhatMakesNoSense) {
   EXPECT_THROW(estimation::residuals_over_angles(one.estimate, -1, 1, 0.1), InvalidArgument);
 }
 
-report::EstimateReport report_of(const Case& one, bool truth = true) {
-  std::optional<estimation::Evaluation> evaluation;
-  if (truth) evaluation = estimation::evaluate(one.estimate, one.settings.truth, one.data.truth);
-  const sensors::Sensor nominal = sensors::load_sensor("mid-40");
-  const report::ReportedRecording recording{"unit <1>.lvx", "lvx-1.1", "sensor", {}};
-  const report::Provenance provenance{{"command", "risley estimate"}, {"seed", "5"}};
-  return report::estimate_report(
-      {one.estimate,
-       nominal,
-       evaluation,
-       one.head,
-       jobs::estimate_details(one.estimate, nominal, one.head, evaluation),
-       recording,
-       provenance,
-       {"a gap"}});
+report::Report report_of(const Case& one, bool truth = true) {
+  jobs::EstimatedRecording found;
+  found.recording.path = "unit <1>.lvx";
+  found.recording.header.devices.emplace_back();
+  found.choice.sensor = found.nominal = sensors::load_sensor("mid-40");
+  found.choice.words = "the file says so";
+  found.estimate = one.estimate;
+  if (truth) {
+    found.evaluation = estimation::evaluate(one.estimate, one.settings.truth, one.data.truth);
+  }
+  found.head = one.head;
+  found.details = jobs::estimate_details(one.estimate, found.nominal, found.head, found.evaluation);
+  found.provenance = {{"command", "risley estimate"}, {"seed", "5"}};
+  found.warnings = {"a gap"};
+  return report::report_of(found);
 }
 
 TEST(EstimatePage, HasEverySectionInItsOrder) {
-  const std::string html = report::estimate_page(report_of(make_case(5)));
+  const report::Report report = report_of(make_case(5));
+  const std::string html = report::report_page(report);
+  EXPECT_EQ(report::report_page(report::parse_report(report::report_text(report), "f")), html);
   std::size_t last = 0;
   for (const char* text :
        {"class=\"verdict", "<h2>Parameters</h2>", "<h2>What this recording does not determine</h2>",
@@ -198,63 +198,59 @@ TEST(EstimatePage, HasEverySectionInItsOrder) {
 }
 
 TEST(EstimateReport, DrawsEveryDistributionOfThePaper) {
-  const report::EstimateReport r = report_of(make_case(5));
-  EXPECT_EQ(r.parameter_charts.size(), 8u);  // Fig. 7
-  EXPECT_EQ(r.rotor_charts.size(), 8u);      // Figs. 8, 9, 11
-  EXPECT_EQ(r.residual_charts.size(), 10u);  // Fig. 10 and over time, field and angles
-  EXPECT_EQ(r.pattern_charts.size(), 2u);    // Fig. 2
-  for (const auto* charts :
-       {&r.parameter_charts, &r.rotor_charts, &r.residual_charts, &r.pattern_charts}) {
-    for (const report::Chart& chart : *charts) {
-      for (const report::Series& series : chart.series) {
-        EXPECT_FALSE(series.x.empty()) << chart.title;
-        EXPECT_EQ(series.x.size(), series.y.size()) << chart.title;
-        if (!series.value.empty()) {
-          EXPECT_EQ(series.value.size(), series.x.size());
-        }
+  const json::Json charts = report_of(make_case(5)).json["charts"];
+  EXPECT_EQ(charts["parameters"].size(), 8u);  // Fig. 7
+  EXPECT_EQ(charts["rotors"].size(), 8u);      // Figs. 8, 9, 11
+  EXPECT_EQ(charts["residuals"].size(), 10u);  // Fig. 10 and over time, field and angles
+  EXPECT_EQ(charts["pattern"].size(), 2u);     // Fig. 2
+  for (const json::Json& some : charts) {
+    for (const json::Json& chart : some) {
+      for (const json::Json& series : chart["series"]) {
+        EXPECT_FALSE(series["x"].empty()) << chart["title"];
+        EXPECT_EQ(series["x"].size(), series["y"].size()) << chart["title"];
       }
     }
   }
   // Thinned to what a page can hold, and said so.
-  EXPECT_LE(r.residual_charts[0].series[0].x.size(), 4000u);
-  EXPECT_THAT(r.residual_charts[0].note, HasSubstr("One in 8 of the 30\u202f000 shots is drawn."));
+  const json::Json& first = charts["residuals"][0];
+  EXPECT_LE(first["series"][0]["x"].size(), 4000u);
+  EXPECT_THAT(first["note"].get<std::string>(),
+              HasSubstr("One in 8 of the 30\u202f000 shots is drawn."));
   // The density counts every shot of its half second.
-  const report::Series& density = r.pattern_charts[1].series[0];
+  const json::Json& density = charts["pattern"][1]["series"][0];
   double shots = 0;
-  for (const double value : density.value)
-    shots += value * density.cell_width * density.cell_height;
-  EXPECT_NEAR(shots, 501, 1e-6);
+  for (const json::Json& value : density["value"]) {
+    shots += value.get<double>() * density["cell_width"].get<double>() *
+             density["cell_height"].get<double>();
+  }
+  EXPECT_NEAR(shots, 501, 1e-3);
 }
 
 TEST(EstimateReport, SpeedsAreDrawnAboutTheirMean) {
-  const Case one = make_case(5);
-  const report::EstimateReport r = report_of(one);
-  const report::Chart& chart = r.rotor_charts[0];
-  EXPECT_THAT(chart.y_label, HasSubstr("angular velocity minus -437"));
-  for (const double change : chart.series[0].y) EXPECT_LT(std::abs(change), 6.0);  // sqrt(2) 2.2
-  const auto [least, greatest] =
-      std::minmax_element(chart.series[0].y.begin(), chart.series[0].y.end());
+  const json::Json chart = report_of(make_case(5)).json["charts"]["rotors"][0];
+  EXPECT_THAT(chart["y_label"].get<std::string>(), HasSubstr("angular velocity minus -437"));
+  const auto y = chart["series"][0]["y"].get<std::vector<double>>();
+  for (const double change : y) EXPECT_LT(std::abs(change), 6.0);  // sqrt(2) 2.2
+  const auto [least, greatest] = std::minmax_element(y.begin(), y.end());
   EXPECT_NEAR(*greatest - *least, 2 * std::sqrt(2.0) * 2.2, 0.8);
 }
 
 TEST(EstimateReport, WithoutTruthHasNoErrors) {
-  const Case one = make_case(5);
-  const report::EstimateReport r = report_of(one, false);
-  EXPECT_FALSE(r.truth);
-  EXPECT_EQ(r.rotor_charts.size(), 4u);
-  for (const report::ReportedParameter& row : r.parameters) EXPECT_TRUE(std::isnan(row.truth));
-  EXPECT_THAT(report::estimate_page(r), Not(HasSubstr("error / σ")));
+  const report::Report r = report_of(make_case(5), false);
+  EXPECT_FALSE(r.json.contains("truth"));
+  EXPECT_EQ(r.json["charts"]["rotors"].size(), 4u);
+  EXPECT_THAT(report::report_page(r), Not(HasSubstr("error / σ")));
 }
 
 TEST(EstimateReport, TheFiltersPageTellsTheSameThings) {
-  const report::EstimateReport r = report_of(make_case(5, Method::ekf));
-  EXPECT_EQ(r.method, "ekf");
-  ASSERT_TRUE(r.pieces);
-  EXPECT_EQ(r.pieces->failed, 0u);
-  EXPECT_LT(r.pieces->chi2, 1.5);
-  EXPECT_EQ(r.parameter_charts.size(), r.free.size());
-  EXPECT_FALSE(r.advice.empty());
-  EXPECT_THAT(report::estimate_page(r), HasSubstr("Are the parameters stable?"));
+  const report::Report r = report_of(make_case(5, Method::ekf));
+  EXPECT_EQ(r.json["method"], "ekf");
+  const json::Json& page = r.json["page"];
+  EXPECT_EQ(page["pieces"]["failed"], 0);
+  EXPECT_LT(page["pieces"]["chi2_per_degree_of_freedom"].get<double>(), 1.5);
+  EXPECT_EQ(r.json["charts"]["parameters"].size(), page["correlation"]["names"].size());
+  EXPECT_FALSE(page["advice"].empty());
+  EXPECT_THAT(report::report_page(r), HasSubstr("Are the parameters stable?"));
 }
 
 }  // namespace risley::estimate_report_test

@@ -12,10 +12,10 @@
 
 namespace risley::json {
 
-/// The columns of a table in which every row is one of many results. A result is an object of
-/// json::of() to which `input`, `status`, `message`, and further names of docs/files.md were added.
-/// Columns are those for which any result has a value, so the results are looked at twice: first
-/// note() for each, then cells().
+/// The columns of a table in which every row is one of many results, by docs/schemas/columns.json.
+/// A result is an object of json::of() to which `input`, `status`, `message`, and further names of
+/// docs/files.md were added. Columns are those for which any result has a value, so the results are
+/// looked at twice: first note() for each, then cells().
 class ResultColumns {
  public:
   ResultColumns();
@@ -35,7 +35,8 @@ class ResultColumns {
   };
   void note_parameters(const Json& result);
 
-  std::vector<Column> before_, parameters_, after_;
+  std::vector<Column> columns_;
+  std::size_t parameters_at_ = 0, parameters_ = 0;  ///< where those of parameters are; how many
 };
 
 }  // namespace risley::json

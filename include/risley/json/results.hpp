@@ -8,6 +8,9 @@
 
 namespace risley {
 class FileError;
+namespace calibration {
+struct FormalDatum;
+}
 namespace sensors {
 struct PatternCoverage;
 struct Sensor;
@@ -33,6 +36,7 @@ struct InspectedTrajectory;
 struct JudgedObservability;
 struct PlannedCalibration;
 struct PlannedFlightResult;
+struct ReadRecording;
 struct RecordedSensors;
 struct LiveRecording;
 struct RecordingCloud;
@@ -70,6 +74,10 @@ Json of(const jobs::IdentifiedRecording& found);
 Json of(const jobs::RecordingCloud& made);
 /// Of `risley info` about a recording.
 Json of(const jobs::InspectedRecording& found);
+/// What a reader told of a recording that a result is of, and how sound its times are.
+Json of(const jobs::ReadRecording& recording);
+/// How well a calibration on walls knows directions; without the `kind` of the datum.
+Json of(const calibration::FormalDatum& datum);
 /// Of `risley convert` with a recording.
 Json of(const jobs::ConvertedRecording& done);
 /// Of `risley info` about a trajectory.

@@ -4,8 +4,8 @@
 
 #include <string>
 
+#include "risley/jobs/provenance.hpp"
 #include "risley/optics/beam_origin_map.hpp"
-#include "risley/report/report_facts.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::report {
@@ -14,6 +14,6 @@ namespace risley::report {
 /// beam's origin over the field of view, and how far they lie apart.
 /// @param provenance  how to make it again: name and value pairs
 std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& sensor,
-                             const Provenance& provenance);
+                             const jobs::Provenance& provenance);
 
 }  // namespace risley::report

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,9 +12,15 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "risley/estimation/diagnostics.hpp"
+#include "risley/json/results.hpp"
 
 namespace risley::report {
+
+/// A value that is not known: a gap in a line.
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// How a series is drawn.
 enum class SeriesKind {
@@ -75,10 +82,17 @@ struct Chart {
   std::optional<std::vector<Colouring>> colourings = {};
 };
 
-/// A diagram as a figure element, which page.js fills.
-std::string figure_html(const Chart& chart, std::size_t number);
+/// Diagrams as pages and report.json have them; what is not finite is null. Columns keep seven
+/// significant digits, and more where numbers differ little beside their size, as the speeds of a
+/// steady rotor do.
+json::Json chart_json(const Chart& chart);
+/// The same of several.
+json::Json charts_json(const std::vector<Chart>& charts);
+
+/// A diagram of chart_json() as a figure element, which page.js fills.
+std::string figure_html(const json::Json& chart, std::size_t number);
 /// The data of figure_html()'s diagram for page.js: JSON that may stand inside a script element.
-std::string chart_json(const Chart& chart, std::size_t number);
+std::string script_text(json::Json chart, std::size_t number);
 
 /// Value of a row.
 using Column = std::function<double(std::size_t)>;

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "risley/cloud/make_cloud.hpp"
-#include "risley/report/report_facts.hpp"
+#include "risley/jobs/provenance.hpp"
 
 namespace risley::report {
 
@@ -20,6 +20,6 @@ inline constexpr std::size_t kCloudPagePoints = 40'000;
 /// @param provenance  how to make it again: name and value pairs
 /// @throws InvalidArgument for a cloud without a sample
 std::string cloud_page(const cloud::CloudSummary& cloud, const std::string& recording,
-                       const Provenance& provenance);
+                       const jobs::Provenance& provenance);
 
 }  // namespace risley::report

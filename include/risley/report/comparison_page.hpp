@@ -5,7 +5,7 @@
 #include <string>
 
 #include "risley/jobs/compare_results.hpp"
-#include "risley/report/report_facts.hpp"
+#include "risley/jobs/provenance.hpp"
 #include "risley/report/report_file.hpp"
 
 namespace risley::report {
@@ -20,6 +20,7 @@ struct ComparedResult {
 /// beams differ, and every parameter with its difference.
 /// @param provenance  how to make it again: name and value pairs
 std::string comparison_page(const ComparedResult& a, const ComparedResult& b,
-                            const jobs::ResultComparison& comparison, const Provenance& provenance);
+                            const jobs::ResultComparison& comparison,
+                            const jobs::Provenance& provenance);
 
 }  // namespace risley::report

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "risley/cloud/point_distribution.hpp"
-#include "risley/report/report_facts.hpp"
+#include "risley/jobs/provenance.hpp"
 
 namespace risley::report {
 
@@ -14,6 +14,6 @@ namespace risley::report {
 /// @param flight      what the points are of, text
 /// @param provenance  how to make it again: name and value pairs
 std::string distribution_page(const cloud::PointDistributionSummary& distribution,
-                              const std::string& flight, const Provenance& provenance);
+                              const std::string& flight, const jobs::Provenance& provenance);
 
 }  // namespace risley::report

@@ -3,18 +3,17 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <Eigen/Core>
-
+#include "risley/jobs/provenance.hpp"
 #include "risley/optics/parameters.hpp"
 #include "risley/report/chart.hpp"
-#include "risley/report/report_facts.hpp"
 
 namespace risley::report {
+
+class View;
 
 /// Errors beyond so many sigmas stand out.
 inline constexpr double kFarOff = 3.0;
@@ -28,9 +27,6 @@ std::string parameter_head(const std::string& long_name, const std::string& symb
 /// As above, of one parameter of a train.
 std::string parameter_head(const ParameterInfo& parameter);
 
-/// Whether held parameters make the sigma of some parameter larger.
-bool any_held_parameter(std::span<const ReportedParameter> parameters);
-
 /// "0.4034° ± 0.0007°"; without a sigma, three digits. @param value, sigma  rad
 std::string angle_with_sigma(double value, double sigma);
 
@@ -41,7 +37,7 @@ std::string list_html(const std::vector<std::string>& items);
 struct Verdict {
   bool converged = false;
   std::string reason;                 ///< why not converged
-  ReportedVerdict result;             ///< empty in files of older versions
+  std::string code, words, to_do;     ///< as results have them
   std::vector<std::string> warnings;  ///< any makes a converged result one to use with care
   std::string facts;
   std::string mend;  ///< what else to do when it did not converge; empty: nothing
@@ -64,27 +60,22 @@ inline constexpr const char* kTimes = "Times of the recording";
 inline constexpr const char* kHowToRepeat = "How to make it again";
 
 /// Correlations as a table in colours; nothing when there are none.
-/// @param covariance  [heads, heads]
-std::string correlation_html(const std::vector<CorrelationHead>& heads,
-                             const Eigen::MatrixXd& covariance);
-
-/// The same of the free parameters of a train.
-/// @param free        names
-/// @param covariance  [free, free]
-std::string correlation_html(const std::vector<std::string>& free,
-                             const Eigen::MatrixXd& covariance, TrainShape shape);
+/// @param matrix  [heads, heads]
+std::string correlation_html(const std::vector<CorrelationHead>& heads, const View& matrix);
 
 /// How sound the times of recordings are, as a table.
-std::string time_audit_html(const std::vector<ReportedRecording>& recordings);
+std::string time_audit_html(const View& recordings);
 
 /// How to make a result again: name and value pairs.
-std::string provenance_html(const Provenance& provenance);
+std::string provenance_html(const jobs::Provenance& provenance);
 
 /// The diagrams of one page in one numbering, and the data that they draw.
 class Figures {
  public:
   /// The figure element of a diagram, whose data are kept.
   std::string add(const Chart& chart);
+  /// The same of one in a report.
+  std::string add(const json::Json& chart);
   /// The data of all diagrams so far, a JSON array.
   std::string data() const { return "[" + data_ + "]"; }
   /// Whether any diagram has three axes.
@@ -99,6 +90,8 @@ class Figures {
 /// Diagrams side by side, as far as the page is wide.
 /// @param first  how many stand elsewhere already
 std::string charts_html(const std::vector<Chart>& charts, Figures& figures, std::size_t first = 0);
+/// The same of diagrams in a report.
+std::string charts_html(const json::Json& charts, Figures& figures, std::size_t first = 0);
 
 /// A number that a page says before its tables.
 struct KeyNumber {
@@ -108,6 +101,9 @@ struct KeyNumber {
 
 /// What stands under the verdict: a few numbers beside the first of some diagrams, if there is one.
 std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vector<Chart>& charts,
+                          Figures& figures);
+/// The same of diagrams in a report.
+std::string overview_html(const std::vector<KeyNumber>& numbers, const json::Json& charts,
                           Figures& figures);
 
 /// The sections of a page under their headings. Each unfolds, and a table of contents leads to it.

@@ -3,34 +3,46 @@
 #pragma once
 
 #include <string>
-#include <variant>
 
-#include "risley/report/calibration_report.hpp"
-#include "risley/report/estimate_report.hpp"
-#include "risley/report/flight_report.hpp"
+#include <nlohmann/json.hpp>
+
+#include "risley/jobs/calibrate_flight.hpp"
+#include "risley/jobs/calibrate_recordings.hpp"
+#include "risley/jobs/estimate_recording.hpp"
+#include "risley/json/results.hpp"
 
 namespace risley::report {
 
-/// A report of any kind.
-using Report = std::variant<EstimateReport, CalibrationReport, FlightReport>;
+/// What the page of a result says and draws: json::of() the result, its diagrams (`charts`), what
+/// only the page says (`page`) and how to make it again (`provenance`), as
+/// docs/schemas/report_file.json describes them. Diagrams are thinned and binned, and say so.
+struct Report {
+  json::Json json;
+  std::string path = "report.json";  ///< for errors
+};
 
-/// The text of report.json; numbers that are not finite are null.
+/// Of an estimate. @throws InvalidArgument when it was not asked for details
+Report report_of(const jobs::EstimatedRecording& found);
+/// Of a calibration on walls. @throws InvalidArgument as above
+Report report_of(const jobs::CalibratedRecordings& found);
+/// Of a calibration in flight. @throws InvalidArgument as above
+Report report_of(const jobs::CalibratedFlight& found);
+
+/// The text of report.json; numbers that are not finite are null, and diagrams keep the digits that
+/// can be seen.
 std::string report_text(const Report& report);
 
-/// Writes report.json: everything that the report's page says and draws (docs/files.md).
-/// Diagrams keep the digits that can be seen. @throws FileError
-void write_report(const std::string& path, const Report& report);
-
-/// Reads what write_report wrote. @throws FileError naming the byte where the text breaks off, or
-/// the field that is missing or of another kind
+/// @throws FileError naming the byte where the text breaks off, or the place that is missing or
+///         wrong; for files of versions that no page is drawn from any more
 Report read_report(const std::string& path);
 /// The same of a text. @param path  how errors name it
 Report parse_report(const std::string& text, const std::string& path);
 
-/// The page of a report of any kind.
+/// One self-contained HTML page (Apache ECharts included, no network), the verdict first. What is
+/// not finite shows as a dash. @throws FileError as parse_report()
 std::string report_page(const Report& report);
 
 /// "estimate" or "calibrate": the verb that made it.
-const char* verb_of(const Report& report);
+std::string verb_of(const Report& report);
 
 }  // namespace risley::report

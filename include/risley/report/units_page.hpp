@@ -5,13 +5,13 @@
 #include <string>
 
 #include "risley/jobs/compare_units.hpp"
-#include "risley/report/report_facts.hpp"
+#include "risley/jobs/provenance.hpp"
 
 namespace risley::report {
 
 /// One self-contained HTML page of units over time and against each other: whether any changed,
 /// which pairs say so, which units are not like the others, and every parameter over the results.
 /// @param provenance  how to make it again: name and value pairs
-std::string units_page(const jobs::ComparedUnits& compared, const Provenance& provenance);
+std::string units_page(const jobs::ComparedUnits& compared, const jobs::Provenance& provenance);
 
 }  // namespace risley::report

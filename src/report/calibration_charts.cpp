@@ -1,7 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/calibration_report.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,12 +16,16 @@
 #include "risley/report/chart.hpp"
 #include "risley/report/html.hpp"
 
+#include "report/pages.hpp"
+
 namespace risley::report {
 namespace {
 
 using calibration::Calibration;
 using calibration::ThicknessProfile;
+using jobs::CalibratedRecordings;
 using jobs::SamplePoint;
+using json::Json;
 
 constexpr std::size_t kMostWallPoints = 3000;   // per scatter diagram
 constexpr std::size_t kMostViewPoints = 8000;   // of all recordings in one kind of view
@@ -32,48 +34,25 @@ constexpr double kShownThickness = 0.03;        // of walls in three dimensions,
 constexpr std::array<const char*, 5> kPlaneColours = {"a", "b", "c", "d", "bad"};
 constexpr const char* kClutterColour = "ink";
 
-/// Value at a row of a vector that may be too short, as it is when nothing was adjusted.
-double at(const Eigen::VectorXd& values, std::size_t row) {
-  const auto i = static_cast<Eigen::Index>(row);
-  return i < values.size() ? values[i] : kUnknown;
-}
-
-/// Sigma of a row of the covariance; zero where there is none.
-double sigma_at(const Eigen::MatrixXd& covariance, std::size_t row) {
-  const auto i = static_cast<Eigen::Index>(row);
-  if (i >= covariance.rows() || !(covariance(i, i) > 0)) return 0;
-  return std::sqrt(covariance(i, i));
-}
-
-std::vector<ReportedParameter> parameters_of(const CalibrationReportInput& input) {
-  const Calibration& c = input.calibration;
-  std::vector<ReportedParameter> rows;
-  for (std::size_t i = 0; i < c.free.size(); ++i) {
-    ReportedParameter row;
-    row.name = c.free[i].name;
-    row.value = at(c.parameters, i);
-    row.sigma_given_held = sigma_at(c.covariance, i);
-    row.sigma = *row.sigma_given_held > 0 ? c.total_sigma(i) : 0.0;
-    row.nominal = input.nominal.get(row.name);
-    row.believed = c.believed.get(row.name);
-    if (input.truth) {
-      row.truth = input.truth->truth.get(row.name);
-      row.error = row.value - row.truth;
-      if (row.sigma > 0) row.error_over_sigma = row.error / row.sigma;
-    }
-    rows.push_back(row);
+/// Values of the free parameters by name, in the units of files.
+/// @param values  what has them: a sensor, a train
+template <class Values>
+Json values_json(const Calibration& c, const Values& values) {
+  Json object = Json::object();
+  for (const estimation::FreeParameter& free : c.free) {
+    object[free.name] = in_file_unit(free.name, values.get(free.name), c.sensor.shape());
   }
-  return rows;
+  return object;
 }
 
-std::string recording_name(const CalibrationReportInput& input, std::size_t recording) {
-  if (recording < input.recordings.size()) return input.recordings[recording].name;
+std::string recording_name(const CalibratedRecordings& input, std::size_t recording) {
+  if (recording < input.recordings.size()) return file_name(input.recordings[recording].path);
   return fmt::format("recording {}", recording + 1);
 }
 
-std::size_t recording_count(const CalibrationReportInput& input) {
+std::size_t recording_count(const CalibratedRecordings& input) {
   std::size_t count = input.recordings.size();
-  for (const SamplePoint& point : input.details.sample) {
+  for (const SamplePoint& point : input.details->sample) {
     count = std::max(count, point.recording + 1);
   }
   return count;
@@ -108,9 +87,9 @@ Chart map_of_cells(std::string title, std::string note, const jobs::FieldCells& 
 /// All diagrams of the page.
 class CalibrationCharts {
  public:
-  explicit CalibrationCharts(const CalibrationReportInput& input)
+  explicit CalibrationCharts(const CalibratedRecordings& input)
       : input_(input), c_(input.calibration) {
-    for (const SamplePoint& point : input_.details.sample) {
+    for (const SamplePoint& point : input_.details->sample) {
       if (point.plane >= 0) on_walls_.push_back(&point);
     }
   }
@@ -148,8 +127,8 @@ class CalibrationCharts {
 
   /// How wrong reported directions are over the field of view.
   std::vector<Chart> pointing() const {
-    if (!input_.details.pointing) return {};
-    const jobs::PointingField& field = *input_.details.pointing;
+    if (!input_.details->pointing) return {};
+    const jobs::PointingField& field = *input_.details->pointing;
     const auto chart = [&](std::string title, const std::vector<double>& errors,
                            const std::string& note) {
       Chart result = map_of_cells(
@@ -172,7 +151,7 @@ class CalibrationCharts {
   /// The walls in space, before and after, with their thickness enlarged.
   std::vector<Chart> walls() const {
     std::vector<Chart> charts;
-    for (const jobs::WallsInSpace& walls : input_.details.walls) {
+    for (const jobs::WallsInSpace& walls : input_.details->walls) {
       for (Chart& chart : walls_in_space(walls)) charts.push_back(std::move(chart));
     }
     return charts;
@@ -180,9 +159,9 @@ class CalibrationCharts {
 
   /// Errors of beams whose truth is known.                                          [B21 Fig. 12]
   std::vector<Chart> truth() const {
-    if (!input_.truth || !input_.details.beam_errors) return {};
+    if (!input_.truth || !input_.details->beam_errors) return {};
     const jobs::BeamComparison& t = *input_.truth;
-    const jobs::BeamErrorMoments& moments = *input_.details.beam_errors;
+    const jobs::BeamErrorMoments& moments = *input_.details->beam_errors;
     std::vector<Chart> charts;
     const auto degrees_text = [](double angle) {
       return finite_text("{:.3g}", degrees_from_radians(angle));
@@ -209,9 +188,9 @@ class CalibrationCharts {
   /// The sample points of one recording, thinned and split by plane.
   class View {
    public:
-    View(const CalibrationReportInput& input, std::size_t recording, std::size_t recordings) {
+    View(const CalibratedRecordings& input, std::size_t recording, std::size_t recordings) {
       std::vector<const SamplePoint*> points;
-      for (const SamplePoint& point : input.details.sample) {
+      for (const SamplePoint& point : input.details->sample) {
         if (point.recording == recording) points.push_back(&point);
       }
       const std::size_t most = std::max(kMostViewPoints / recordings, kFewestViewPoints);
@@ -324,7 +303,7 @@ class CalibrationCharts {
 
   std::string sample_note() const {
     return fmt::format("An evenly spread sample: {1} of the {0} used points. ",
-                       count_text(c_.points), count_text(input_.details.points_on_planes));
+                       count_text(c_.points), count_text(input_.details->points_on_planes));
   }
 
   Chart distances() const {
@@ -334,8 +313,8 @@ class CalibrationCharts {
       after.push_back(point->after);
     }
     // Both share their bins, or their heights could not be compared.
-    const estimation::Moments& moments_before = input_.details.distances_before;
-    const estimation::Moments& moments_after = input_.details.distances_after;
+    const estimation::Moments& moments_before = input_.details->distances_before;
+    const estimation::Moments& moments_after = input_.details->distances_after;
     estimation::Moments both;
     both.std = std::fmax(moments_before.rms, moments_after.rms);
     Chart chart{"Histogram of the distances from the planes",
@@ -372,8 +351,8 @@ class CalibrationCharts {
 
   /// Where in the field of view points lie beyond their planes, and where before them.
   std::vector<Chart> cell_means() const {
-    if (!input_.details.field) return {};
-    const jobs::WallField& field = *input_.details.field;
+    if (!input_.details->field) return {};
+    const jobs::WallField& field = *input_.details->field;
     const auto chart = [&](const char* when, const std::vector<double>& means, double rms) {
       Chart result = map_of_cells(
           fmt::format("Mean distance from the planes over the field of view, {}", when),
@@ -439,66 +418,30 @@ class CalibrationCharts {
     return {chart("before", &jobs::WallPatch::before), chart("after", &jobs::WallPatch::after)};
   }
 
-  const CalibrationReportInput& input_;
+  const CalibratedRecordings& input_;
   const Calibration& c_;
   std::vector<const SamplePoint*> on_walls_;
 };
 
 }  // namespace
 
-CalibrationReport calibration_report(const CalibrationReportInput& input) {
-  const Calibration& c = input.calibration;
-  CalibrationReport report;
-  report.recordings = input.recordings;
-  for (const ReportedRecording& one : input.recordings) {
-    report.observations += one.audit.observations;
-  }
-  report.sensor = c.sensor.name;
-  report.serial = c.sensor.serial;
-  report.preset = input.nominal.name;
-  report.prisms = c.sensor.prisms();
-  report.emitters = c.sensor.train.emitters();
-  report.method = c.method;
-  report.converged = c.converged;
-  report.reason = c.reason;
-  report.verdict = reported_verdict(c.verdict);
-  report.warnings = c.warnings;
-  report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
-  report.points = c.points;
-  report.parameters = parameters_of(input);
-  report.numbers = c.numbers;
-  for (const estimation::FreeParameter& free : c.free) report.free.push_back(free.name);
-  report.covariance = c.covariance;
-  report.unobservable = c.unobservable;
-  report.datum_kind = c.datum_kind;
-  report.datum = c.datum;
-  report.datum_without_common = c.datum_without_common;
-  report.pointing_error = c.pointing_error;
-  report.prior_tests = c.prior_tests;
-  report.planes = c.planes;
-  report.steps = c.steps;
-  report.rms_before = c.rms_before;
-  report.rms_after = c.rms_after;
-  report.sigma0 = c.sigma0;
-  report.wall_shape = c.shape;
-  if (input.truth) report.truth = {input.truth->before, input.truth->after};
-  report.provenance = input.provenance;
-  const CalibrationCharts charts(input);
-  report.truth_charts = charts.truth();
-  report.pointing_charts = charts.pointing();
-  report.thickness_charts = charts.thickness();
-  report.wall_charts = charts.walls();
-  report.view_charts = charts.views();
-  return report;
-}
-
-CalibrationReport calibration_report(const jobs::CalibratedRecordings& calibrated) {
-  if (!calibrated.details) throw InvalidArgument("a report needs a result with details");
-  std::vector<ReportedRecording> recordings;
-  for (const jobs::ReadRecording& one : calibrated.recordings) recordings.push_back(reported(one));
-  return calibration_report({calibrated.calibration, calibrated.nominal, *calibrated.details,
-                             calibrated.truth, recordings, calibrated.provenance,
-                             calibrated.warnings});
+Report report_of(const CalibratedRecordings& found) {
+  if (!found.details) throw InvalidArgument("a report needs a result with details");
+  const Calibration& c = found.calibration;
+  Json page = page_of(c.sensor.shape(), found.recordings);
+  page["nominal"] = values_json(c, found.nominal);
+  page["believed"] = values_json(c, c.believed);
+  page["true"] = found.truth ? values_json(c, found.truth->truth) : Json();
+  page["correlation"] = correlation_json(c.free, c.covariance);
+  page["datum_without_common"] = json::of(c.datum_without_common);
+  const CalibrationCharts charts(found);
+  return finished_report("calibrate", json::of(found), page,
+                         {{"truth", charts_json(charts.truth())},
+                          {"pointing", charts_json(charts.pointing())},
+                          {"thickness", charts_json(charts.thickness())},
+                          {"walls", charts_json(charts.walls())},
+                          {"views", charts_json(charts.views())}},
+                         found.provenance);
 }
 
 }  // namespace risley::report

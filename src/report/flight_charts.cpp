@@ -1,11 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/flight_report.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -18,19 +15,21 @@
 #include "risley/report/html.hpp"
 #include "risley/trajectories/error_process.hpp"
 
+#include "report/pages.hpp"
+
 namespace risley::report {
 namespace {
 
 using calibration::FlightCalibration;
 using calibration::FlightUnknowns;
-using calibration::StripPair;
 using calibration::TrajectoryKnots;
+using jobs::CalibratedFlight;
 using jobs::FlightDetails;
 using jobs::FlightGround;
 using jobs::FlightStrip;
 using jobs::StripDifferences;
+using json::Json;
 
-constexpr std::size_t kMostPairs = 200;
 constexpr std::size_t kMostTimes = 1200;  // of a line along time
 constexpr double kShownPart = 0.95;       // of the values of a map between the ends of its colours
 constexpr double kLeastShown = 1e-4;      // m
@@ -69,7 +68,7 @@ double nominal_of(const sensors::Sensor& nominal, const std::string& name, std::
 }
 
 /// What the unknown truly was; a boresight after the mount as it was given.
-double true_value(const FlightReportInput& input, const std::string& name, std::size_t unknown) {
+double true_value(const CalibratedFlight& input, const std::string& name, std::size_t unknown) {
   const jobs::FlightTruth& truth = *input.truth;
   const auto place = static_cast<int>(unknown);
   if (place >= FlightUnknowns::parameter(0)) return truth.sensor.get(name);
@@ -82,26 +81,6 @@ double true_value(const FlightReportInput& input, const std::string& name, std::
   const Eigen::AngleAxisd turn(
       Eigen::Matrix3d(input.mount.nominal.transpose() * body_from_sensor(truth.mount)));
   return turn.angle() * turn.axis()[place];
-}
-
-/// The pairs with the most cells, in the order of their strips.
-void take_pairs(const FlightCalibration& c, FlightReport& report) {
-  const auto key = [](const StripPair& pair) { return std::pair(pair.first, pair.second); };
-  std::vector<StripPair> largest = c.pairs_after.empty() ? c.pairs_before : c.pairs_after;
-  std::stable_sort(largest.begin(), largest.end(),
-                   [](const StripPair& a, const StripPair& b) { return a.cells > b.cells; });
-  largest.resize(std::min(largest.size(), kMostPairs));
-  std::set<std::pair<std::uint16_t, std::uint16_t>> kept, all;
-  for (const StripPair& pair : largest) kept.insert(key(pair));
-  const auto take = [&](const std::vector<StripPair>& from, std::vector<StripPair>& to) {
-    for (const StripPair& pair : from) {
-      all.insert(key(pair));
-      if (kept.contains(key(pair))) to.push_back(pair);
-    }
-  };
-  take(c.pairs_before, report.pairs_before);
-  take(c.pairs_after, report.pairs_after);
-  report.pair_count = all.size();
 }
 
 double seconds_between(std::int64_t begin_ns, std::int64_t end_ns) {
@@ -135,8 +114,8 @@ double shown_size(std::vector<double> values) {
 /// All diagrams of the page.
 class FlightCharts {
  public:
-  explicit FlightCharts(const FlightReportInput& input)
-      : c_(input.calibration), details_(input.details) {}
+  explicit FlightCharts(const CalibratedFlight& input)
+      : c_(input.calibration), details_(*input.details) {}
 
   std::vector<Chart> strips() const {
     if (details_.strips.empty()) return {};
@@ -363,78 +342,53 @@ class FlightCharts {
 
 }  // namespace
 
-FlightReport flight_report(const FlightReportInput& input) {
-  const FlightCalibration& c = input.calibration;
-  FlightReport report;
-  report.recordings = input.recordings;
-  for (const ReportedRecording& one : input.recordings) {
-    report.observations += one.audit.observations;
-  }
-  report.sensor = c.sensor.name;
-  report.serial = c.sensor.serial;
-  report.preset = input.nominal.name;
-  report.prisms = c.sensor.prisms();
-  report.emitters = c.sensor.train.emitters();
-  report.mount = input.mount.name;
-  report.reference_point = input.mount.reference_point;
-  report.body_from_sensor = input.mount.nominal;
-  report.converged = c.converged;
-  report.reason = c.reason;
-  report.verdict = reported_verdict(c.verdict);
-  report.warnings = c.warnings;
-  report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
-  report.shots = c.shots;
-  report.without_pose = c.without_pose;
-  report.used = c.used;
-  report.outliers = c.outliers;
-  report.cells = c.cells;
-  report.rough_cells = c.rough_cells;
-  report.unknowns = c.unknowns;
+Report report_of(const CalibratedFlight& found) {
+  if (!found.details) throw InvalidArgument("a report needs a result with details");
+  const FlightCalibration& c = found.calibration;
+  const TrainShape shape = c.sensor.shape();
+  Json page = page_of(shape, found.recordings);
+  Json nominal = Json::object(), truth = Json::object(), axes = Json::array();
+  std::vector<std::string> names;  // what has a sigma
+  std::vector<Eigen::Index> rows;
   for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
-    report.nominal.push_back(nominal_of(input.nominal, c.unknowns[i].name, i));
+    const calibration::FlightUnknown& own = c.unknowns[i];
+    const auto in_unit = [&](double value) { return in_file_unit(own, value, shape); };
+    nominal[own.name] = in_unit(nominal_of(found.nominal, own.name, i));
+    if (found.truth) truth[own.name] = in_unit(true_value(found, own.name, i));
+    const auto row = static_cast<Eigen::Index>(i);
+    if (!(c.covariance(row, row) > 0)) continue;
+    names.push_back(own.name);
+    rows.push_back(row);
   }
-  if (input.truth) {
-    report.truth = {input.truth->before, input.truth->after, {}};
-    for (std::size_t i = 0; i < c.unknowns.size(); ++i) {
-      report.truth->values.push_back(true_value(input, c.unknowns[i].name, i));
-    }
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d row = found.mount.nominal.row(axis);
+    axes.push_back({row.x(), row.y(), row.z()});
   }
-  report.covariance = c.covariance;
-  report.datum = c.datum;
-  report.not_told = c.not_told;
-  report.control = c.control;
-  take_pairs(c, report);
-  report.rms_before = c.rms_before;
-  report.rms_after = c.rms_after;
-  report.sigma0 = c.sigma0;
-  report.range_sigma = c.range_sigma;
-  report.roughness = c.roughness;
-  report.attitude_delay = c.attitude_delay.value;
-  report.attitude_delay_sigma = c.attitude_delay.sigma;
-  report.strip_count = input.details.strip_count;
-  for (const FlightStrip& strip : input.details.strips) {
-    report.strips.push_back({strip.strip, strip.begin, strip.duration, strip.course, strip.sway,
-                             strip.speed, strip.range});
+  page["mount"] = {{"name", found.mount.name},
+                   {"reference_point", found.mount.reference_point},
+                   {"body_from_sensor", axes}};
+  page["nominal"] = nominal;
+  page["true"] = found.truth ? truth : Json();
+  page["correlation"] = correlation_json(names, c.covariance(rows, rows));
+  page["knot_spacing_s"] = median_spacing(c.model.knots);
+  page["strips"] = Json::array();
+  for (const FlightStrip& strip : found.details->strips) {
+    page["strips"].push_back({{"strip", strip.strip + 1},
+                              {"begin_s", strip.begin},
+                              {"duration_s", strip.duration},
+                              {"course_deg", degrees_from_radians(strip.course)},
+                              {"speed_m_per_s", strip.speed},
+                              {"range_m", strip.range},
+                              {"sway_deg", degrees_from_radians(strip.sway)}});
   }
-  report.knots = c.model.knots.size();
-  report.knot_spacing = median_spacing(c.model.knots);
-  report.provenance = input.provenance;
-  const FlightCharts charts(input);
-  report.strip_charts = charts.strips();
-  report.difference_charts = charts.differences();
-  report.ground_charts = charts.ground();
-  report.residual_charts = charts.residuals();
-  report.correction_charts = charts.corrections();
-  return report;
-}
-
-FlightReport flight_report(const jobs::CalibratedFlight& calibrated) {
-  if (!calibrated.details) throw InvalidArgument("a report needs a result with details");
-  std::vector<ReportedRecording> recordings;
-  for (const jobs::ReadRecording& one : calibrated.recordings) recordings.push_back(reported(one));
-  return flight_report({calibrated.calibration, calibrated.nominal, calibrated.mount,
-                        *calibrated.details, calibrated.truth, recordings, calibrated.provenance,
-                        calibrated.warnings});
+  const FlightCharts charts(found);
+  return finished_report("calibrate", json::of(found), page,
+                         {{"strips", charts_json(charts.strips())},
+                          {"differences", charts_json(charts.differences())},
+                          {"ground", charts_json(charts.ground())},
+                          {"residuals", charts_json(charts.residuals())},
+                          {"corrections", charts_json(charts.corrections())}},
+                         found.provenance);
 }
 
 }  // namespace risley::report

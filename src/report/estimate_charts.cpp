@@ -1,7 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-#include "risley/report/estimate_report.hpp"
-
 #include <algorithm>
 #include <cmath>
 
@@ -12,12 +10,16 @@
 #include "risley/report/chart.hpp"
 #include "risley/report/html.hpp"
 
+#include "report/pages.hpp"
+
 namespace risley::report {
 namespace {
 
 using estimation::Estimate;
 using estimation::Moments;
 using estimation::RotorStates;
+using jobs::EstimatedRecording;
+using json::Json;
 
 constexpr std::size_t kMostShotPoints = 4000;  // per scatter diagram
 constexpr std::size_t kMostMapPoints = 9000;   // of the scan pattern
@@ -30,50 +32,34 @@ std::string colour_of(std::size_t rotor) {
   return std::string(1, prism_letter(static_cast<int>(rotor)));
 }
 
-/// The value an estimation started from, in the estimate's speed combination; none for angles.
-double nominal_value(const EstimateReportInput& input, const ParameterInfo& info) {
-  if (info.kind == ParameterKind::rotation_angle) return kUnknown;
-  const auto& combination = input.estimate.sensor.combination;
-  if (info.kind == ParameterKind::angular_velocity && combination && input.nominal.combination) {
-    return with_combination(input.nominal, *combination).get(info.name);
-  }
-  return input.nominal.get(info.name);
-}
-
-std::vector<ReportedParameter> parameters_of(const EstimateReportInput& input) {
-  const Estimate& e = input.estimate;
-  std::vector<ReportedParameter> rows;
+/// The values an estimation started from by name, in the estimate's speed combination and the units
+/// of files; none for angles.
+Json nominal_json(const EstimatedRecording& found) {
+  const Estimate& e = found.estimate;
+  Json values = Json::object();
   for (const estimation::EstimatedValue& value : e.values) {
-    ReportedParameter row;
-    row.name = value.name;
-    row.value = value.value;
-    row.sigma = value.sigma;
-    row.sigma_given_held = value.sigma_given_held;
-    row.nominal = nominal_value(input, find_parameter(value.name, e.sensor.shape()));
-    if (input.evaluation) {
-      const auto& all = input.evaluation->parameters;
-      const auto found = std::find_if(all.begin(), all.end(),
-                                      [&](const auto& one) { return one.name == value.name; });
-      if (found != all.end()) {
-        row.truth = found->truth;
-        row.error = found->error;
-        row.error_over_sigma = found->error_over_sigma;
-      }
-    }
-    rows.push_back(row);
+    const ParameterInfo& info = find_parameter(value.name, e.sensor.shape());
+    if (info.kind == ParameterKind::rotation_angle) continue;
+    const auto& combination = e.sensor.combination;
+    const bool turned =
+        info.kind == ParameterKind::angular_velocity && combination && found.nominal.combination;
+    values[info.name] =
+        (turned ? with_combination(found.nominal, *combination) : found.nominal).get(info.name) /
+        info.si_per_unit;
   }
-  return rows;
+  return values;
 }
 
 /// Makes all diagrams.
 class EstimateCharts {
  public:
-  explicit EstimateCharts(const EstimateReportInput& input)
+  explicit EstimateCharts(const EstimatedRecording& input)
       : input_(input), states_(input.estimate.states) {}
 
   /// Every parameter from pieces of the recording alone, about the estimate of all.
-  std::vector<Chart> pieces(const estimation::PiecewiseEstimate& pieces,
-                            const std::vector<ReportedParameter>& parameters) const {
+  std::vector<Chart> pieces() const {
+    if (!input_.details->pieces) return {};
+    const estimation::PiecewiseEstimate& pieces = *input_.details->pieces;
     const Estimate& e = input_.estimate;
     std::vector<Chart> charts;
     for (std::size_t k = 0; k < e.free.size() && pieces.size() > 0; ++k) {
@@ -96,7 +82,7 @@ class EstimateCharts {
                   fmt::format("difference from the estimate, {}", info.unit),
                   {whiskers, points, level("all shots", "ink", 0.0)},
                   {}};
-      for (const ReportedParameter& one : parameters) {
+      for (const estimation::TruthComparison& one : truths()) {
         if (one.name == info.name && std::isfinite(one.truth)) {
           chart.series.push_back(level("truth", "c", scale * (one.truth - all)));
         }
@@ -110,7 +96,7 @@ class EstimateCharts {
     std::vector<Chart> charts;
     std::vector<Chart> distributions;
     for (std::size_t rotor = 0; rotor < states_.angular_velocity.size(); ++rotor) {
-      const jobs::RotorSpeed& speed = input_.details.speeds[rotor];
+      const jobs::RotorSpeed& speed = input_.details->speeds[rotor];
       const std::string label =
           fmt::format("angular velocity minus {:.5f}, deg/s", degrees_from_radians(speed.mean));
       charts.push_back({fmt::format("Angular velocity of prism {}", capital(rotor)),
@@ -138,7 +124,7 @@ class EstimateCharts {
           distribution(fmt::format("Distribution of the error of the rotation angle of prism {}",
                                    capital(rotor)),
                        "estimate minus truth, deg", colour_of(rotor), errors[rotor],
-                       input_.details.rotation_angle_errors[rotor], "error"));
+                       input_.details->rotation_angle_errors[rotor], "error"));
     }
     return charts;
   }
@@ -152,7 +138,7 @@ class EstimateCharts {
         residual_histogram("Histogram of the azimuth residuals", all.azimuth, e.azimuth_moments,
                            "a"),
         residual_histogram("Histogram of the zenith residuals", all.zenith, e.zenith_moments, "b")};
-    for (Chart& chart : maps(input_.details.residuals_over_field, "the field of view",
+    for (Chart& chart : maps(input_.details->residuals_over_field, "the field of view",
                              "azimuth, deg", "zenith, deg")) {
       chart.kind = ChartKind::map;
       charts.push_back(std::move(chart));
@@ -160,7 +146,7 @@ class EstimateCharts {
     for (std::size_t rotor = 0; rotor < states_.rotation_angle.size(); ++rotor) {
       charts.push_back(over_angle(rotor));
     }
-    for (const jobs::PrismPairResiduals& pair : input_.details.residuals_over_angles) {
+    for (const jobs::PrismPairResiduals& pair : input_.details->residuals_over_angles) {
       const auto axis = [](int prism) {
         return fmt::format("rotation angle of prism {}, deg", prism_capital(prism));
       };
@@ -194,6 +180,11 @@ class EstimateCharts {
   }
 
  private:
+  std::vector<estimation::TruthComparison> truths() const {
+    return input_.evaluation ? input_.evaluation->parameters
+                             : std::vector<estimation::TruthComparison>();
+  }
+
   Series level(const std::string& label, const std::string& colour, double value) const {
     const double end = shot_time(input_.estimate.series.size() - 1);
     return {label, colour, SeriesKind::line, {0.0, end}, {value, value}};
@@ -342,7 +333,7 @@ class EstimateCharts {
 
   /// Shots per square degree.                                                      [B21 Fig. 2b]
   Chart density() const {
-    const jobs::ShotDensity& density = input_.details.density;
+    const jobs::ShotDensity& density = input_.details->density;
     const double cell = degrees_from_radians(density.cell);
     Series cells{"", "ink", SeriesKind::cells, {}, {}};
     cells.cell_width = cells.cell_height = cell;
@@ -365,71 +356,35 @@ class EstimateCharts {
     return chart;
   }
 
-  const EstimateReportInput& input_;
+  const EstimatedRecording& input_;
   const RotorStates& states_;
 };
 
 }  // namespace
 
-EstimateReport estimate_report(const EstimateReportInput& input) {
-  const Estimate& e = input.estimate;
-  EstimateReport report;
-  report.recording = input.recording;
-  report.sensor = e.sensor.name;
-  report.prisms = e.sensor.prisms();
-  report.emitters = e.sensor.train.emitters();
-  report.combination = e.sensor.combination.value_or(0);
-  report.mirrored = e.mirrored;
-  report.method = to_string(e.method);
-  report.converged = e.converged;
-  report.reason = e.reason;
-  report.verdict = reported_verdict(e.verdict);
-  report.warnings = e.warnings;
-  report.warnings.insert(report.warnings.end(), input.warnings.begin(), input.warnings.end());
-  report.shots = e.series.size();
-  report.outliers = e.outliers;
-  report.parameters = parameters_of(input);
-  for (const estimation::FreeParameter& free : e.free) report.free.push_back(free.name);
-  report.covariance = e.covariance;
-  report.unobservable = e.unobservable;
-  report.azimuth_residuals = e.azimuth_moments;
-  report.zenith_residuals = e.zenith_moments;
-  report.expected_residual = e.expected_residual;
-  report.noise = {e.noise_held,         e.noise.value.azimuth, e.noise.sigma.azimuth,
-                  e.noise.value.zenith, e.noise.sigma.zenith,  e.usual_noise};
-  if (e.frame_turn) {
-    const Eigen::Matrix2d& c = e.frame_turn->covariance;
-    report.frame = {e.frame_turn->turn.yaw, std::sqrt(c(0, 0)), e.frame_turn->turn.pitch,
-                    std::sqrt(c(1, 1))};
+Report report_of(const EstimatedRecording& found) {
+  if (!found.details) throw InvalidArgument("a report needs a result with details");
+  const Estimate& e = found.estimate;
+  Json page = page_of(e.sensor.shape(), {found.recording});
+  page["nominal"] = nominal_json(found);
+  page["correlation"] = correlation_json(e.free, e.covariance);
+  page["advice"] = found.details->advice;
+  page["usual_noise_deg"] = degrees_from_radians(e.usual_noise);
+  page["pieces"] = nullptr;
+  if (const auto& pieces = found.details->pieces) {
+    page["pieces"] = {{"count", pieces->size()},
+                      {"failed", pieces->failed},
+                      {"duration_s", pieces->duration},
+                      {"chi2_per_degree_of_freedom", pieces->chi2},
+                      {"degrees_of_freedom", pieces->degrees_of_freedom}};
   }
-  for (const estimation::AngleProfile& profile : e.residuals_over_angle) {
-    report.unevenness.push_back(profile.chi2_per_bin);
-  }
-  if (input.evaluation) {
-    report.truth = {input.evaluation->rotation_angle_rmse, input.evaluation->nees_parameters,
-                    input.evaluation->nees_rotation_angles};
-  }
-  report.provenance = input.provenance;
-  const EstimateCharts charts(input);
-  report.variance = {e.unit_variance, e.autocorrelation.factor, e.variance_factor};
-  report.advice = input.details.advice;
-  if (input.details.pieces) {
-    const estimation::PiecewiseEstimate& pieces = *input.details.pieces;
-    report.pieces = {pieces.size(), pieces.failed, pieces.duration, pieces.chi2,
-                     pieces.degrees_of_freedom};
-    report.parameter_charts = charts.pieces(pieces, report.parameters);
-  }
-  report.rotor_charts = charts.rotors();
-  report.residual_charts = charts.residuals();
-  report.pattern_charts = charts.pattern();
-  return report;
-}
-
-EstimateReport estimate_report(const jobs::EstimatedRecording& estimated) {
-  if (!estimated.details) throw InvalidArgument("a report needs a result with details");
-  return estimate_report({estimated.estimate, estimated.nominal, estimated.evaluation,
-                          estimated.head, *estimated.details, reported(estimated.recording),
-                          estimated.provenance, estimated.warnings});
+  const EstimateCharts charts(found);
+  return finished_report("estimate", json::of(found), page,
+                         {{"parameters", charts_json(charts.pieces())},
+                          {"rotors", charts_json(charts.rotors())},
+                          {"residuals", charts_json(charts.residuals())},
+                          {"pattern", charts_json(charts.pattern())}},
+                         found.provenance);
 }
 
 }  // namespace risley::report
