@@ -17,6 +17,7 @@
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/saturating.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/trajectories/clock.hpp"
 
@@ -815,10 +816,10 @@ void FlightWork::judge_held(HeldParameter held) {
   held.significant =
       std::abs(held.told - held.held) > kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
   if (held.significant) {
-    result_.warnings.push_back(fmt::format(
-        "the strips contradict what is held: {}; the results are off by more than their "
-        "sigmas. Estimate it as well (option additional)",
-        in_words(held, options_.sensor)));
+    result_.warnings.push_back(
+        fmt::format("the strips contradict what is held: {}; the results are off by more than "
+                    "their sigmas. Estimate it as well ({})",
+                    in_words(held, options_.sensor), name_of(setting::free)));
   }
   result_.held.push_back(std::move(held));
 }

@@ -11,6 +11,7 @@
 
 #include "risley/cloud/map_projection.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/hashes/sha256.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/provenance.hpp"
@@ -58,11 +59,13 @@ void require_same_type(const CloudOfRecordingOptions& options, const sensors::Se
 RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
                                   const Progress& progress) {
   cloud::CloudOptions settings = options.cloud;
-  if (settings.rate) check_positive(*settings.rate, "rate", "Hz");
-  if (settings.angle_noise) check_positive(*settings.angle_noise, "angle_noise", "rad");
-  check_positive(settings.writer.las_scale, "las_scale", "m");
+  if (settings.rate) require_positive(setting::rate, *settings.rate);
+  if (settings.angle_noise) require_positive(setting::noise_angle, *settings.angle_noise);
+  require_positive(setting::las_scale, settings.writer.las_scale);
   if (settings.loadings && !settings.pointing.covariance) {
-    throw InvalidArgument("option common_factors yes and option covariance no cannot be combined");
+    throw InvalidArgument(fmt::format("{} yes and {} no cannot be combined",
+                                      name_of(setting::common_factors),
+                                      name_of(setting::covariance)));
   }
   const sensors::Sensor calibration = load_result(options.calibration);
   cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read

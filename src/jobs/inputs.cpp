@@ -15,6 +15,7 @@
 #include <fnmatch.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/hashes/sha256.hpp"
 #include "risley/io/file_identity.hpp"
@@ -275,8 +276,8 @@ std::vector<Input> find_inputs(const InputNames& wanted, const Progress& progres
       finder.add(std::string(line), false);
     }
     if (is_empty) {
-      throw InvalidArgument(
-          fmt::format("option list: {} names no recording, expected one a line", wanted.list));
+      throw InvalidArgument(fmt::format("{}: {} names no recording, expected one a line",
+                                        name_of(setting::list), wanted.list));
     }
   }
   return std::move(finder).inputs();

@@ -3,6 +3,7 @@
 #include "risley/jobs/inspect_trajectory.hpp"
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 namespace risley::jobs {
@@ -22,7 +23,7 @@ InspectedTrajectory inspect_trajectory(const InspectTrajectoryOptions& options,
   };
   if (trajectories::trajectory_file_kind(options.trajectory) == TrajectoryFileKind::accuracies) {
     if (!options.accuracy.empty()) {
-      throw InvalidArgument("option accuracy: " + options.trajectory +
+      throw InvalidArgument(fmt::format("{}: ", name_of(setting::accuracy)) + options.trajectory +
                             " itself holds accuracies, expected a trajectory");
     }
     take_accuracies(options.trajectory);

@@ -3,6 +3,7 @@
 #include "risley/jobs/moving_platform.hpp"
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 namespace risley::jobs {
@@ -24,13 +25,14 @@ std::vector<std::string> paths_of(const PlatformFiles& files) {
 cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& progress) {
   if (files.trajectory.empty()) {
     throw InvalidArgument(
-        "option trajectory is missing: mount, accuracies, errors and crs are for a sensor that "
-        "moves");
+        fmt::format("{} is missing: mount, accuracies, errors and crs are for a sensor that moves",
+                    name_of(setting::trajectory)));
   }
   if (files.mount.empty()) {
     throw InvalidArgument(
-        "option mount is missing: a file that says how the sensor sits on the platform of the "
-        "trajectory (axes, lever arm, boresight, clock)");
+        fmt::format("{} is missing: a file that says how the sensor sits on the platform of the "
+                    "trajectory (axes, lever arm, boresight, clock)",
+                    name_of(setting::mount)));
   }
   cloud::MovingPlatform platform;
   platform.mount = trajectories::load_mount(files.mount);

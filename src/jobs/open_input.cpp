@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 namespace risley::jobs {
@@ -49,7 +50,8 @@ std::unique_ptr<recordings::Reader> open_input(const recordings::Source& source,
   try {
     return open_lidar(source, options, progress);
   } catch (const InvalidArgument& error) {  // several sensors
-    throw InvalidArgument(fmt::format("option extrinsics, {}: {}", source.name(), error.what()));
+    throw InvalidArgument(
+        fmt::format("{}, {}: {}", name_of(setting::extrinsics), source.name(), error.what()));
   }
 }
 

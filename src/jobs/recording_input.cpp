@@ -15,6 +15,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/estimation/shot_slips.hpp"
 #include "risley/estimation/stored_pose.hpp"
 #include "risley/jobs/sensor_choice.hpp"
@@ -437,10 +438,10 @@ void add_left_out_words(const estimation::SelectionCounts& counts,
         counts.out_of_order, counts.rows));
   }
   if (counts.equal_times > 0) {
-    words.push_back(fmt::format(
-        "{} of {} shots have the time of the shot before, so that nobody knows when they were "
-        "fired, and were left out: option shot_rate counts shots, where none is missing",
-        counts.equal_times, counts.rows));
+    words.push_back(
+        fmt::format("{} of {} shots have the time of the shot before, so that nobody knows when "
+                    "they were fired, and were left out: {} counts shots, where none is missing",
+                    counts.equal_times, counts.rows, name_of(setting::shot_rate)));
   }
 }
 

@@ -15,6 +15,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/recordings/plausibility.hpp"
@@ -150,8 +151,8 @@ void call_it_a_guess(SensorChoice& choice, const std::string& why) {
   choice.chosen_by = ChosenBy::guess;
   choice.words = why;
   choice.warnings.push_back(fmt::format(
-      "the file does not say which sensor recorded it: {} is a guess, {}; option sensor decides it",
-      choice.sensor.name, why));
+      "the file does not say which sensor recorded it: {} is a guess, {}; {} decides it",
+      choice.sensor.name, why, name_of(setting::sensor)));
 }
 
 /// Where the values of a calibration are from; empty for other presets.
@@ -199,10 +200,10 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
     if (choice.misfits.size() == 2) break;
   }
   choice.words = "no built-in preset describes the scan: " + comparison(choice.misfits);
-  choice.warnings.push_back(fmt::format(
-      "{}; {} is assumed. Option sensor names the sensor, by a preset or a calibration file; the "
-      "prisms of an unknown sensor can be found with identify",
-      choice.words, choice.sensor.name));
+  choice.warnings.push_back(
+      fmt::format("{}; {} is assumed. {} names the sensor, by a preset or a calibration file; the "
+                  "prisms of an unknown sensor can be found with identify",
+                  choice.words, choice.sensor.name, name_of(setting::sensor)));
 }
 
 std::string span_text(double from, double to) {
@@ -380,9 +381,10 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
     if (candidates[match.candidate].name != named.name) continue;
     choice.misfits.push_back({named.name, misfit_of(match)});
   }
-  choice.warnings.push_back(fmt::format(
-      "the file names a {}, but its scan is that of a {}: {}; option sensor decides which it was",
-      named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits)));
+  choice.warnings.push_back(
+      fmt::format("the file names a {}, but its scan is that of a {}: {}; {} decides which it was",
+                  named.model, candidates[found->matches.front().candidate].model,
+                  comparison(choice.misfits), name_of(setting::sensor)));
   return choice;
 }
 
@@ -410,10 +412,9 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
       if (sensor.device_type == device.type) named = &sensor;
     }
     if (named == nullptr) {
-      throw InvalidArgument(
-          fmt::format("there is no built-in preset for the recording's sensor ({}): name one with "
-                      "option sensor",
-                      recordings::device_type_name(device.type)));
+      throw InvalidArgument(fmt::format(
+          "there is no built-in preset for the recording's sensor ({}): name one with {}",
+          recordings::device_type_name(device.type), name_of(setting::sensor)));
     }
   }
   if (named != nullptr && (!has_times || !one_sensor)) {
@@ -563,11 +564,11 @@ void require_possible(const SensorChoice& choice, const std::string& recording) 
   if (!choice.impossible.empty()) throw FileError(recording, {}, choice.impossible);
   const int emitters = choice.sensor.train.emitters();
   if (choice.lines <= emitters) return;
-  throw InvalidArgument(fmt::format(
-      "{} names {} lines of emitters, but {} ({}) has {} emitter{}: option sensor names the sensor "
-      "that made it",
-      recording, choice.lines, choice.sensor.name, choice.words, emitters,
-      emitters == 1 ? "" : "s"));
+  throw InvalidArgument(
+      fmt::format("{} names {} lines of emitters, but {} ({}) has {} emitter{}: {} names the "
+                  "sensor that made it",
+                  recording, choice.lines, choice.sensor.name, choice.words, emitters,
+                  emitters == 1 ? "" : "s", name_of(setting::sensor)));
 }
 
 std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {
@@ -576,8 +577,8 @@ std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {
     const ParameterInfo& parameter = find_parameter(name, sensor.shape());
     if (value) {
       if (parameter.kind != ParameterKind::train) {
-        throw InvalidArgument(
-            fmt::format("option fixed {}: only parameters of the prisms can be held", name));
+        throw InvalidArgument(fmt::format("{} {}: only parameters of the prisms can be held",
+                                          name_of(setting::fix), name));
       }
       sensor.set(name, *value);
     }

@@ -10,6 +10,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
 
@@ -73,12 +74,15 @@ std::string boresight_advice_html(const CalibrationReport& r) {
       "is poor. The shape of the bundle, and with it the flatness of point clouds, is not "
       "affected. Set-ups that help:</p>{}",
       sigma_degrees(boresight_sigma(r.datum)), degrees_from_radians(calibration::kPoorDatum),
-      list_html({"a wall that is steeply tilted against the axis of view, 50 to 65 degrees, and "
-                 "fills the whole field of view",
-                 "a longer range to the walls",
-                 "the body turned upside down against a stop between two recordings, given with "
-                 "option stations",
-                 "walls whose normals are known in the sensor's frame, given with option planes"}));
+      list_html(
+          {"a wall that is steeply tilted against the axis of view, 50 to 65 degrees, and "
+           "fills the whole field of view",
+           "a longer range to the walls",
+           fmt::format(
+               "the body turned upside down against a stop between two recordings, given with {}",
+               name_of(setting::stations)),
+           fmt::format("walls whose normals are known in the sensor's frame, given with {}",
+                       name_of(setting::planes))}));
 }
 
 Verdict verdict_of(const CalibrationReport& r) {
@@ -99,11 +103,11 @@ Verdict verdict_of(const CalibrationReport& r) {
                 r.planes.size(), r.planes.size() == 1 ? "" : "s", datum_text(r.datum_kind),
                 sigma_degrees(r.datum.sigma_roll), sigma_degrees(r.datum.sigma_pitch),
                 sigma_degrees(r.datum.sigma_yaw));
-  verdict.mend =
+  verdict.mend = fmt::format(
       "check in the views below that what was taken for walls really is walls; record more walls "
       "that fill the field of view, near and far and steeply tilted; hold parameters that these "
-      "walls do not determine (option fixed); and check known normals and stations, if any were "
-      "given";
+      "walls do not determine ({}); and check known normals and stations, if any were given",
+      name_of(setting::fix));
   if (r.converged && has_poor_datum(r)) verdict.care_html = boresight_advice_html(r);
   return verdict;
 }

@@ -9,6 +9,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
 
@@ -48,10 +49,11 @@ Verdict verdict_of(const EstimateReport& r) {
       finite_text("{:.3g}", degrees_from_radians(r.azimuth_residuals.rms)),
       finite_text("{:.3g}", degrees_from_radians(r.zenith_residuals.rms)), noise_words(r),
       count_text(r.outliers), count_text(r.shots));
-  verdict.mend =
-      "check that option sensor is the instrument that made the recording, that its times are "
-      "right, and whether the elevation in the file has the opposite sign (option mirrored yes); "
-      "a longer recording, or option rate full, gives the estimate more data";
+  verdict.mend = fmt::format(
+      "check that {} is the instrument that made the recording, that its times are right, and "
+      "whether the elevation in the file has the opposite sign ({} yes); a longer recording, or {} "
+      "full, gives the estimate more data",
+      name_of(setting::sensor), name_of(setting::mirror), name_of(setting::rate));
   return verdict;
 }
 
@@ -160,11 +162,12 @@ std::string unobservable_html(const EstimateReport& r) {
       items.push_back(
           fmt::format("{}: its sigma remains {:.2g}", direction_text(weak), weak.sigma));
     }
-    html +=
-        "<p>The recording does not determine these combinations of the free parameters (in units "
-        "of 1 degree, or 0.01 of an index). Hold one parameter of each with <code>option "
-        "fixed</code>.</p>\n" +
-        list_html(items);
+    html += fmt::format(
+                "<p>The recording does not determine these combinations of the free parameters (in "
+                "units of 1 degree, or 0.01 of an index). Hold one parameter of each with "
+                "<code>{}</code>.</p>\n",
+                name_of(setting::fix)) +
+            list_html(items);
   } else {
     html += "<p>The recording determines all free parameters.</p>\n";
   }

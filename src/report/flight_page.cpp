@@ -14,6 +14,7 @@
 #include "risley/calibration/calibrate.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
 
@@ -102,11 +103,12 @@ Verdict verdict_of(const FlightReport& r) {
                 boresight_text(r, "boresight_x_deg"), boresight_text(r, "boresight_y_deg"),
                 boresight_text(r, "boresight_z_deg"),
                 angle_on_ground(r.datum.total, r.datum.height));
-  verdict.mend =
+  verdict.mend = fmt::format(
       "check in the differences between strips below that overlapping strips are of one flight; "
       "check the axes of the mount, and that recording and trajectory use the same time; give "
       "larger sigmas to what the mount states too precisely; and hold parameters that this flight "
-      "does not determine (option fixed)";
+      "does not determine ({})",
+      name_of(setting::fix));
   if (!r.converged) return verdict;
   if (!(r.datum.rotation <= calibration::kPoorDatum)) verdict.care_html = poor_rotation_html(r);
   if (!(r.rms_after < r.rms_before)) {

@@ -345,7 +345,7 @@ TEST_F(MakeCloud, ATurnedFrameIsRefusedByNameAndLeavesNothing) {
   try {
     make_cloud(reader, type_, path(), {});
     ADD_FAILURE() << "points in two frames";
-  } catch (const TurnedFrame& error) {
+  } catch (const EstimationError& error) {
     EXPECT_THAT(error.what(), ::testing::ContainsRegex("(39\\.9|40\\.0)[0-9]* deg in yaw"));
     EXPECT_THAT(error.what(), ::testing::ContainsRegex("-?0\\.0[0-9]* deg in pitch"));
   }
