@@ -34,7 +34,6 @@ struct EmulateChoices {
 };
 
 jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& common) {
-  if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
   jobs::EmulateOptions job;
   job.interface = options.interface;
   job.serial = options.serial;

@@ -52,7 +52,6 @@ const std::map<std::string, wire::ReturnMode>& return_modes() {
 }
 
 jobs::RecordOptions job_of(const RecordChoices& options) {
-  if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
   jobs::RecordOptions job;
   job.interface = options.interface;
   job.serials = options.serials;

@@ -13,8 +13,6 @@
 #include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
 
-#include "option_names.hpp"
-
 namespace risley::app {
 
 jobs::Provenance provenance_of(const CommonOptions& common) {
@@ -31,15 +29,6 @@ jobs::ResultFiles result_files(const std::string& folder, const std::string& sta
   return files;
 }
 
-std::vector<std::string> result_files_of(const std::string& folder) {
-  if (folder.empty()) return {};
-  std::vector<std::string> names;
-  for (const char* name : {"calibration.yaml", "states.nc", "report.json", "report.html"}) {
-    names.push_back((std::filesystem::path(folder) / name).string());
-  }
-  return names;
-}
-
 void require_folder_apart(const CommonOptions& common, const std::string& folder,
                           std::vector<std::string> states) {
   if (folder.empty()) return;
@@ -49,10 +38,7 @@ void require_folder_apart(const CommonOptions& common, const std::string& folder
   require_apart(common, outputs);
   // Before an hour of computing; of rotor states not all are written.
   for (const std::string& name : outputs) {
-    if (std::filesystem::path(name).extension() == ".nc" || jobs::is_own_result(name)) continue;
-    throw FileError(name, {},
-                    "is not a result of risley, and would be replaced by one: move it, or give "
-                    "another folder");
+    if (!name.ends_with(".nc")) jobs::require_own_result(name);
   }
 }
 
@@ -69,22 +55,9 @@ void write_page_file(const std::string& path, const std::string& html) {
   io::write_text_file(path, html);
 }
 
-std::vector<jobs::NamedText> report_texts(report::Report report) {
-  std::visit(
-      [](auto& one) {
-        put_flags(one.warnings);
-        one.reason = with_flags(one.reason);
-        if (one.verdict) {
-          one.verdict->words = with_flags(one.verdict->words);
-          one.verdict->to_do = with_flags(one.verdict->to_do);
-        }
-      },
-      report);
-  return {{"report.json", report::report_text(report)}, {"report.html", page_of(report)}};
-}
-
-std::string page_of(const report::Report& report) {
-  return with_flags(report::report_page(report));
+std::vector<jobs::NamedText> report_texts(const report::Report& report) {
+  return {{"report.json", report::report_text(report)},
+          {"report.html", report::report_page(report)}};
 }
 
 }  // namespace risley::app

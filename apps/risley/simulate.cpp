@@ -33,12 +33,6 @@ struct SimulateOptions {
 };
 
 jobs::SimulationOptions job_of(const SimulateOptions& options, const CommonOptions& common) {
-  if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
-  if (options.rate_hz) check_positive(*options.rate_hz, "--rate-hz", "Hz");
-  if (options.noise_angle_deg) {
-    check_not_negative(*options.noise_angle_deg, "--noise-angle-deg", "deg");
-  }
-  if (options.noise_range_m) check_not_negative(*options.noise_range_m, "--noise-range-m", "m");
   jobs::SimulationOptions job;
   job.sensor = options.sensor;
   take_simulated_values(options.values, job);

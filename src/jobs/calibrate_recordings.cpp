@@ -21,26 +21,7 @@ namespace {
 
 using calibration::RangedRecording;
 
-/// Wrong wishes are told before an hour of reading.
-calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOptions& options) {
-  check_ranged_input(options);
-  if (options.range_noise) require_positive(setting::noise_range, *options.range_noise);
-  if (options.prior_sigma) require_positive(setting::prior_sigma, *options.prior_sigma);
-  require_not_negative(setting::range_offset_sigma, options.range_offset_sigma);
-  require_not_negative(setting::patch_thickness, options.patch_thickness);
-  if (options.tolerance) require_not_negative(setting::tolerance, *options.tolerance);
-  if (options.method == calibration::CalibrationMethod::paper &&
-      (options.planes || !options.stations.empty() || options.prior_sigma)) {
-    throw InvalidArgument(fmt::format(
-        "{} paper cannot be combined with {}, {} or {}: it uses the walls of the recordings alone",
-        name_of(setting::method), name_of(setting::planes), name_of(setting::stations),
-        name_of(setting::prior_sigma)));
-  }
-  if (options.same_walls == calibration::SameWalls::yes && options.recordings.size() < 2) {
-    throw InvalidArgument(
-        fmt::format("{} needs two recordings or more, found 1", name_of(setting::same_walls)));
-  }
-  if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
+calibration::CalibrationOptions settings_of(const CalibrateRecordingsOptions& options) {
   calibration::CalibrationOptions result;
   result.method = options.method;
   result.additional = options.additional;
@@ -85,6 +66,27 @@ void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings
 
 }  // namespace
 
+void check(const CalibrateRecordingsOptions& options) {
+  check_ranged_input(options);
+  if (options.range_noise) require_positive(setting::noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(setting::prior_sigma, *options.prior_sigma);
+  require_not_negative(setting::range_offset_sigma, options.range_offset_sigma);
+  require_not_negative(setting::patch_thickness, options.patch_thickness);
+  if (options.tolerance) require_not_negative(setting::tolerance, *options.tolerance);
+  if (options.method == calibration::CalibrationMethod::paper &&
+      (options.planes || !options.stations.empty() || options.prior_sigma)) {
+    throw InvalidArgument(fmt::format(
+        "{} paper cannot be combined with {}, {} or {}: it uses the walls of the recordings alone",
+        name_of(setting::method), name_of(setting::planes), name_of(setting::stations),
+        name_of(setting::prior_sigma)));
+  }
+  if (options.same_walls == calibration::SameWalls::yes && options.recordings.size() < 2) {
+    throw InvalidArgument(
+        fmt::format("{} needs two recordings or more, found 1", name_of(setting::same_walls)));
+  }
+  if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
+}
+
 std::vector<scenes::Station> stations_of(const std::string& path,
                                          const std::vector<std::string>& names,
                                          std::size_t recordings) {
@@ -111,7 +113,8 @@ std::vector<scenes::Station> stations_of(const std::string& path,
 CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& options,
                                           const Progress& progress) {
   const Stopwatch whole;
-  calibration::CalibrationOptions settings = checked_settings(options);
+  check(options);
+  calibration::CalibrationOptions settings = settings_of(options);
   ResultFolder folder(options.files.folder);
   std::optional<InputHashes> hashes;
   if (folder) hashes.emplace(options.recordings, progress);

@@ -24,19 +24,6 @@ namespace {
 
 constexpr double kFilterRate = 1000.0;
 
-/// Wrong wishes are told before an hour of reading.
-void check(const EstimateRecordingOptions& options) {
-  if (options.rate) require_positive(setting::rate, *options.rate);
-  if (options.angle_noise) require_positive(setting::noise_angle, *options.angle_noise);
-  if (options.files.states == StatesRows::all && options.method == estimation::Method::ekf &&
-      options.rate) {
-    throw InvalidArgument(
-        fmt::format("{} all needs {} full: the filter has states only at the shots it uses",
-                    name_of(setting::states), name_of(setting::rate)));
-  }
-  if (!options.truth.empty()) check_truth_name(options.truth);
-}
-
 void write_files(const EstimateRecordingOptions& options, EstimatedRecording& result,
                  ResultFolder& folder, const Progress& progress) {
   if (result.estimate.converged) {
@@ -87,6 +74,18 @@ void check_beams(const estimation::PackedSeries& series, const recordings::Truth
 }
 
 }  // namespace
+
+void check(const EstimateRecordingOptions& options) {
+  if (options.rate) require_positive(setting::rate, *options.rate);
+  if (options.angle_noise) require_positive(setting::noise_angle, *options.angle_noise);
+  if (options.files.states == StatesRows::all && options.method == estimation::Method::ekf &&
+      options.rate) {
+    throw InvalidArgument(
+        fmt::format("{} all needs {} full: the filter has states only at the shots it uses",
+                    name_of(setting::states), name_of(setting::rate)));
+  }
+  if (!options.truth.empty()) check_truth_name(options.truth);
+}
 
 std::optional<double> usual_rate(estimation::Method method) {
   if (method == estimation::Method::ekf) return kFilterRate;

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/moving_platform.hpp"
 
+#include <fmt/format.h>
+
 #include "risley/core/error.hpp"
 #include "risley/core/setting.hpp"
 #include "risley/trajectories/trajectory_file.hpp"

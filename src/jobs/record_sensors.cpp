@@ -187,7 +187,8 @@ void Recorder::find() {
       throw wire::NetworkError(fmt::format(
           "{}: no packet came in {} s; a passive recording hears only what sensors send to this "
           "address and port: name the port that the other host told them with {}",
-          to_string(passive_data_->local()), options_.find_time, name_of(setting::data_port)));
+          to_string(passive_data_->local()), options_.find_time,
+          risley::name_of(setting::data_port)));
     }
   } else {
     found = search_sensors(listener_, options_, progress_.silent());

@@ -112,6 +112,8 @@ std::optional<simulation::Platform> platform_from(const SimulationOptions& optio
 simulation::SimulationSettings simulation_settings(const SimulationOptions& options) {
   if (options.duration) require_positive(setting::duration, *options.duration);
   if (options.rate) require_positive(setting::rate, *options.rate);
+  if (options.angle_noise) require_not_negative(setting::noise_angle, *options.angle_noise);
+  if (options.range_noise) require_not_negative(setting::noise_range, *options.range_noise);
   simulation::SimulationSettings settings;
   settings.truth = load_result(options.sensor);
   assign_truth(settings.truth, options.set);

@@ -29,13 +29,14 @@ inline constexpr Setting accuracy{"accuracy"}, anywhere{"anywhere"}, bend{"bend"
     noise_range{"noise-range-m"}, output{"output"}, patch_thickness{"patch-thickness-m"},
     plan{"plan"}, planes{"planes"}, prior_sigma{"prior-sigma-deg"}, process_noise{"process-noise"},
     range_offset_sigma{"range-offset-sigma-m"}, rate{"rate-hz"}, recording{"recording"},
-    restart{"restart-s"}, restart_takes{"restart-takes-s"}, same_walls{"same-walls"},
-    scene{"scene"}, seed{"seed"}, sensor{"sensor"}, sensor_type{"sensor-type"}, serial{"serial"},
-    shot_rate{"shot-rate-hz"}, speed{"speed"}, start{"start-s"}, start_angles{"start-angles-deg"},
-    states{"states"}, station{"station"}, stations{"stations"}, time{"time"},
-    time_from{"time-from-s"}, tolerance{"tolerance-deg"}, trajectory{"trajectory"},
-    trajectory_errors{"trajectory-errors"}, trajectory_topic{"trajectory-topic"}, truth{"truth"},
-    unlike{"unlike"}, wrong_checksums{"wrong-checksums"};
+    restart{"restart-s"}, resume{"resume"}, table{"table"}, restart_takes{"restart-takes-s"},
+    same_walls{"same-walls"}, scene{"scene"}, seed{"seed"}, sensor{"sensor"},
+    sensor_type{"sensor-type"}, serial{"serial"}, shot_rate{"shot-rate-hz"}, speed{"speed"},
+    start{"start-s"}, start_angles{"start-angles-deg"}, states{"states"}, station{"station"},
+    stations{"stations"}, time{"time"}, time_from{"time-from-s"}, tolerance{"tolerance-deg"},
+    trajectory{"trajectory"}, trajectory_errors{"trajectory-errors"},
+    trajectory_topic{"trajectory-topic"}, truth{"truth"}, unlike{"unlike"},
+    wrong_checksums{"wrong-checksums"};
 
 }  // namespace setting
 
