@@ -144,7 +144,10 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
 ExitStatus calibrate_each(CalibrateCommandOptions& options, const CLI::App& verb,
                           const CommonOptions& common) {
   options.many.into_folder = are_several(options.many);
-  const jobs::InputPlan plan = jobs::plan_inputs(options.many, cancellable());
+  CalibrateCommandOptions one = options;
+  one.many.names.resize(1);
+  const jobs::InputWork work = json::calibrate_each(job_of(one, common), log_words);
+  const jobs::InputPlan plan = jobs::plan_inputs(options.many, work, cancellable());
   const auto one_alone = [&](bool given, const char* option) {
     if (!given || plan.jobs.size() == 1) return;
     throw InvalidArgument(fmt::format(
@@ -154,9 +157,7 @@ ExitStatus calibrate_each(CalibrateCommandOptions& options, const CLI::App& verb
   };
   one_alone(!options.truths.empty(), "--truth");
   one_alone(!options.stations.empty(), "--stations");
-  options.many.names.resize(1);
-  return run_inputs(plan, json::calibrate_each(job_of(options, common), log_words), options.many,
-                    verb, common);
+  return run_inputs(plan, work, options.many, verb, common);
 }
 
 jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& options,

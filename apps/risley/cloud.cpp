@@ -187,16 +187,8 @@ Run declare_cloud(CLI::App& verb) {
       return write_beam_origin_map(*options, common);
     }
     jobs::ManyInputsOptions& many = options->many;
-    if (many.names.empty() && many.list.empty()) {
-      throw InvalidArgument("INPUT is missing: a recording, or --list");
-    }
     if (many.output.empty()) throw InvalidArgument("--output is missing");
     many.into_folder = output_is_folder(many);
-    if (many.into_folder) {
-      if (options->format.empty()) options->format = cloud::cloud_formats().front().name;
-      many.ending = cloud::find_cloud_format("", options->format).ending;
-    }
-    jobs::InputPlan plan = jobs::plan_inputs(many, cancellable());
     settings.writer.format = options->format;
     const jobs::Provenance provenance = provenance_of(common);
     jobs::InputWork work = json::cloud_each({{},
@@ -207,6 +199,7 @@ Run declare_cloud(CLI::App& verb) {
                                              settings,
                                              provenance},
                                             pages_of(*options, provenance), log_words);
+    jobs::InputPlan plan = jobs::plan_inputs(many, work, cancellable());
     split_by_device(options->reading, plan);
     for (const auto& [name, page] : {std::pair{"--distribution", options->distribution},
                                      std::pair{"--report", options->report}}) {

@@ -61,17 +61,6 @@ std::map<std::string, std::uint8_t> sensor_types() {
   return types;
 }
 
-/// Ending of a format's files in a folder.
-std::string ending_of(const std::string& format) {
-  for (const auto& known : recordings::writable_formats()) {
-    if (known.name == format) return known.ending;
-  }
-  for (const auto& known : trajectories::writable_trajectories()) {
-    if (known.name == format) return known.ending;
-  }
-  throw InvalidArgument("several files need --format, because -o is a folder");
-}
-
 /// Somebody who wants points has to take another verb.
 void refuse_point_clouds(const std::string& output) {
   const std::string name = lower_case(output);
@@ -131,10 +120,9 @@ Run declare_convert(CLI::App& verb) {
   return [options, &verb](const CommonOptions& common) {
     jobs::ManyInputsOptions& many = options->many;
     many.into_folder = output_is_folder(many);
-    if (many.into_folder) many.ending = ending_of(options->format);
     if (options->format.empty()) refuse_point_clouds(many.output);
-    jobs::InputPlan plan = jobs::plan_inputs(many, cancellable());
     const jobs::InputWork work = json::convert_each(settings_of(*options), log_words);
+    jobs::InputPlan plan = jobs::plan_inputs(many, work, cancellable());
     split_by_device(options->reading, plan);
     return run_inputs(plan, work, many, verb, common);
   };

@@ -153,16 +153,6 @@ void print_outcome(const EstimatedRecording& outcome) {
   }
 }
 
-ExitStatus estimate_several(const jobs::InputPlan& plan, const EstimateCommandOptions& options,
-                            const CLI::App& verb, const CommonOptions& common) {
-  if (!options.truth.empty() && plan.jobs.size() > 1) {
-    throw InvalidArgument(
-        fmt::format("--truth is of one recording, and there are {}", plan.jobs.size()));
-  }
-  return run_inputs(plan, json::estimate_each(job_of(options, common), log_words), options.many,
-                    verb, common);
-}
-
 ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
   require_folder_apart(common, options.many.output, {"states.nc"});
   EstimatedRecording outcome;
@@ -237,8 +227,13 @@ Run declare_estimate(CLI::App& verb) {
                   "OUT.truth.yaml of the simulated recording, to compare the estimate with");
   return [options, &verb](const CommonOptions& common) {
     options->many.into_folder = are_several(options->many);
-    const jobs::InputPlan plan = jobs::plan_inputs(options->many, cancellable());
-    if (plan.many) return estimate_several(plan, *options, verb, common);
+    const jobs::InputWork work = json::estimate_each(job_of(*options, common), log_words);
+    const jobs::InputPlan plan = jobs::plan_inputs(options->many, work, cancellable());
+    if (!options->truth.empty() && plan.jobs.size() > 1) {
+      throw InvalidArgument(
+          fmt::format("--truth is of one recording, and there are {}", plan.jobs.size()));
+    }
+    if (plan.many) return run_inputs(plan, work, options->many, verb, common);
     options->input = plan.jobs.front().input;
     return run_estimate(*options, common);
   };

@@ -131,19 +131,6 @@ ExitStatus run_trajectory_info(const InfoCommandOptions& options, const CommonOp
   return kDone;
 }
 
-ExitStatus inspect_several(const jobs::InputPlan& plan, const InfoCommandOptions& options,
-                           const CLI::App& verb, const CommonOptions& common) {
-  if (!options.share.empty()) {
-    throw InvalidArgument(
-        fmt::format("--share is of one recording, and there are {}", plan.jobs.size()));
-  }
-  return run_inputs(
-      plan,
-      json::inspect_each({read_options(options.reading), options.accuracy, options.topic},
-                         log_words),
-      options.many, verb, common);
-}
-
 ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& common) {
   if (options.share_ranges && options.share.empty()) {
     throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
@@ -194,8 +181,14 @@ Run declare_info(CLI::App& verb) {
   add_reading_options(verb, options->reading);
   return [options, &verb](const CommonOptions& common) {
     require_apart(common, {options->share});
-    const jobs::InputPlan plan = jobs::plan_inputs(options->many, cancellable());
-    if (plan.many) return inspect_several(plan, *options, verb, common);
+    const jobs::InputWork work = json::inspect_each(
+        {read_options(options->reading), options->accuracy, options->topic}, log_words);
+    const jobs::InputPlan plan = jobs::plan_inputs(options->many, work, cancellable());
+    if (!options->share.empty() && plan.many) {
+      throw InvalidArgument(
+          fmt::format("--share is of one recording, and there are {}", plan.jobs.size()));
+    }
+    if (plan.many) return run_inputs(plan, work, options->many, verb, common);
     options->input = plan.jobs.front().input;
     return run_info(*options, common);
   };

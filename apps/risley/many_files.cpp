@@ -43,12 +43,11 @@ std::string settings_text(const CLI::App& verb, const CommonOptions& common) {
 }
 
 std::string summary(const InputRun& run, const jobs::InputPlan& plan, const jobs::InputWork& work) {
-  std::string text = fmt::format("{} of {} files done", run.done(), plan.jobs.size());
-  if (run.skipped() > 0) text += fmt::format(", {} done before", run.skipped());
-  if (run.failed() > 0) text += fmt::format(", {} failed", run.failed());
-  if (!work.counted.empty()) {
-    text += fmt::format(", {} {} in all", grouped(run.counted()), work.counted);
-  }
+  const auto& [done, skipped, failed, counted, status] = run.counts();
+  std::string text = fmt::format("{} of {} files done", done, plan.jobs.size());
+  if (skipped > 0) text += fmt::format(", {} done before", skipped);
+  if (failed > 0) text += fmt::format(", {} failed", failed);
+  if (!work.counted.empty()) text += fmt::format(", {} {} in all", grouped(counted), work.counted);
   return text;
 }
 
@@ -119,7 +118,7 @@ ExitStatus run_several(const jobs::InputPlan& plan, const jobs::InputWork& work,
   run.for_each([](const InputJob&, const InputResult& result) {
     if (result.outcome.status != kDone) spdlog::error(result.outcome.text);
   });
-  return run.status();
+  return run.counts().status;
 }
 
 }  // namespace

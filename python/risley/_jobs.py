@@ -14,10 +14,10 @@ Fixed = Union[Mapping[str, Optional[float]], Iterable[str]]
 Rate = Union[None, float, str]
 
 
-def _held(fixed: Fixed) -> List[Tuple[str, Optional[float]]]:
-    if isinstance(fixed, Mapping):
-        return list(fixed.items())
-    return [(name, None) for name in fixed]
+def _held(fix: Fixed) -> List[Tuple[str, Optional[float]]]:
+    if isinstance(fix, Mapping):
+        return list(fix.items())
+    return [(name, None) for name in fix]
 
 
 def _paths(paths: Union[Path, Sequence[Path]]) -> List[str]:
@@ -27,9 +27,9 @@ def _paths(paths: Union[Path, Sequence[Path]]) -> List[str]:
 
 
 def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method: str = "map",
-             rate: Rate = None, angle_noise: Optional[float] = None,
-             angle_noise_deg: Optional[float] = None, fixed: Fixed = (), free: Iterable[str] = (),
-             mirrored: Optional[bool] = None, truth: Path = "", states: str = "knots",
+             rate: Rate = None, noise_angle: Optional[float] = None,
+             noise_angle_deg: Optional[float] = None, fix: Fixed = (), free: Iterable[str] = (),
+             mirror: Optional[bool] = None, truth: Path = "", states: str = "knots",
              shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
              extrinsics_deg: YawPitchRoll = None, device: str = "", threads: int = 0,
              progress: Progress = None) -> Estimate:
@@ -47,14 +47,14 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
         All shots at once, or the paper's filter.
     rate : float or 'full', optional
         Shots per second to use, Hz; by default what is usual for the method.
-    angle_noise, angle_noise_deg : float, optional
+    noise_angle, noise_angle_deg : float, optional
         Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
         default estimated.
-    fixed : mapping of str to float or None, or iterable of str
+    fix : mapping of str to float or None, or iterable of str
         Parameters to hold, at the given value (in the unit of the name) if there is one.
     free : iterable of str
         Further parameters to estimate.
-    mirrored : bool, optional
+    mirror : bool, optional
         Whether the elevation has the opposite sign; by default found from the recording.
     truth : str or path, optional
         ``OUT.truth.yaml`` of the simulation that made the recording, to compare the estimate with.
@@ -81,8 +81,8 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
     options = {
         "recording": source(recording), "sensor": os.fspath(sensor),
         "output": os.fspath(output), "method": method, "rate": rate,
-        "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg), "fixed": _held(fixed),
-        "free": list(free), "mirrored": mirrored, "truth": os.fspath(truth), "states": states,
+        "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg), "fix": _held(fix),
+        "free": list(free), "mirror": mirror, "truth": os.fspath(truth), "states": states,
         "device": device, "shot_rate": shot_rate, "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:
         return Estimate(_risley.estimate(options, threads, tell))
@@ -94,13 +94,13 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
               mount: Path = "", accuracy: Path = "", trajectory_errors: Path = "",
               control: Path = "", knot_spacing: Optional[float] = None,
               cell_size: Optional[float] = None, rate: Rate = None,
-              angle_noise: Optional[float] = None, angle_noise_deg: Optional[float] = None,
-              range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
+              noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
+              noise_range: Optional[float] = None, prior_sigma: Optional[float] = None,
               prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
               tolerance: Optional[float] = None, tolerance_deg: Optional[float] = None,
               beam_origin: bool = True, same_walls: Optional[bool] = None,
-              flat_walls: bool = False, patch_thickness: Optional[float] = None,
-              fixed: Fixed = (), free: Iterable[str] = (), mirrored: Optional[bool] = None,
+              walls: str = "uneven", patch_thickness: Optional[float] = None,
+              fix: Fixed = (), free: Iterable[str] = (), mirror: Optional[bool] = None,
               truth: Union[Path, Sequence[Path]] = (), force: bool = False,
               states: str = "knots", shot_rate: Optional[float] = None,
               extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
@@ -137,10 +137,10 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         Time between corrections of the trajectory, s; edge of the squares of ground, m.
     rate : float or 'full', optional
         Shots per second to use, Hz; by default all.
-    angle_noise, angle_noise_deg : float, optional
+    noise_angle, noise_angle_deg : float, optional
         Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
         default the sensor's.
-    range_noise : float, optional
+    noise_range : float, optional
         Standard deviation of ranges before rounding, m; by default the sensor's.
     prior_sigma, prior_sigma_deg : float, optional
         Prior standard deviation of every error angle around the believed value, rad or deg; by
@@ -155,11 +155,11 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     same_walls : bool, optional
         Whether the recordings are of the same walls from poses that differ by a turn, so that the
         walls' shape cancels; by default where their planes fit in one way only.
-    flat_walls : bool, default False
-        Take walls as exact planes, and ranges as free of errors but for a constant one.
+    walls : {'uneven', 'flat'}
+        'flat' takes walls as exact planes, and ranges as free of errors but for a constant one.
     patch_thickness : float, optional
         How far dark or light patches stand off their wall, one standard deviation, m; 0 for paint.
-    fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, device, threads, progress
+    fix, free, mirror, shot_rate, extrinsics, extrinsics_deg, device, threads, progress
         As in `risley.estimate`.
     truth : str, path or a sequence of them
         ``OUT.truth.yaml`` of the simulation that made each recording, to compare with.
@@ -185,18 +185,18 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     options = {
         "recordings": sources(recordings), "sensor": os.fspath(sensor),
         "output": os.fspath(output), "knot_spacing": knot_spacing, "cell_size": cell_size,
-        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "range_noise": range_noise,
+        "rate": rate, "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
+        "noise_range": noise_range,
         "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
         "range_offset_sigma": range_offset_sigma,
         "tolerance": angle("tolerance", tolerance, tolerance_deg),
-        "fixed": _held(fixed), "free": list(free),
-        "mirrored": mirrored, "truth": _paths(truth), "force": force, "device": device,
+        "fix": _held(fix), "free": list(free),
+        "mirror": mirror, "truth": _paths(truth), "force": force, "device": device,
         "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
     on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),
                 "station": list(station), "beam_origin": beam_origin, "same_walls": same_walls,
-                "flat_walls": flat_walls, "patch_thickness": patch_thickness,
+                "walls": walls, "patch_thickness": patch_thickness,
                 "states": states}
     in_flight = {"trajectory": os.fspath(trajectory), "trajectory_topic": trajectory_topic,
                  "mount": os.fspath(mount), "accuracy": os.fspath(accuracy),
@@ -224,9 +224,9 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
          mount: Path = "", trajectory_errors: Path = "", scene: Path = "",
          knot_spacing: Optional[float] = None, cell_size: Optional[float] = None,
          empty_circle: Optional[float] = None, rate: Optional[float] = None,
-         range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
+         noise_range: Optional[float] = None, prior_sigma: Optional[float] = None,
          prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
-         beam_origin: bool = True, flat_walls: bool = False, fixed: Fixed = (),
+         beam_origin: bool = True, walls: str = "uneven", fix: Fixed = (),
          free: Iterable[str] = (), seed: int = 0,
          progress: Progress = None) -> Plan:
     """Predict the accuracy of a calibration on planned walls or in a planned flight.
@@ -248,7 +248,7 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
         m; diameter of the circles that are searched for points, m.
     rate : float, optional
         Shots per second, Hz; by default the sensor's, for a flight 5000.
-    range_noise, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, flat_walls, fixed,
+    noise_range, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, walls, fix,
     free, seed
         As in `risley.calibrate`.
     progress : bool or callable, optional
@@ -265,9 +265,9 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
     """
     options: Dict[str, Any] = {
         "plan": os.fspath(scene_or_flight), "sensor": os.fspath(sensor), "rate": rate,
-        "range_noise": range_noise,
+        "noise_range": noise_range,
         "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
-        "range_offset_sigma": range_offset_sigma, "fixed": _held(fixed), "free": list(free)}
+        "range_offset_sigma": range_offset_sigma, "fix": _held(fix), "free": list(free)}
     of_flight = {"mount": mount, "trajectory_errors": trajectory_errors, "scene": scene,
                  "knot_spacing": knot_spacing, "cell_size": cell_size,
                  "empty_circle": empty_circle}
@@ -280,14 +280,14 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
             return Plan(_risley.plan_flight({**options, **of_flight, **paths, "seed": seed}, tell))
         _refuse(of_flight, f"goes with a flight, and {scene_or_flight} is a scene")
         return Plan(_risley.plan({**options, "duration": duration, "beam_origin": beam_origin,
-                                  "flat_walls": flat_walls},
+                                  "walls": walls},
                                  tell))
 
 
 def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "",
           directions: str = "smoothed", beam_origin: bool = True, beam_divergence: bool = True,
           covariance: bool = True, common_factors: bool = False, rate: Rate = None,
-          angle_noise: Optional[float] = None, angle_noise_deg: Optional[float] = None,
+          noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
           las_scale: Optional[float] = None, time: str = "gps", trajectory: Path = "",
           trajectory_topic: str = "", mount: Path = "", accuracy: Path = "",
           trajectory_errors: Path = "", crs: str = "", datum: str = "", distribution: bool = False,
@@ -316,7 +316,7 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
         Write for every point the loadings of the errors that all points share.
     rate : float or 'full', optional
         Directions per second from which rotation angles are found, Hz.
-    angle_noise, angle_noise_deg : float, optional
+    noise_angle, noise_angle_deg : float, optional
         Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
         default the calibration's.
     las_scale : float, optional
@@ -348,7 +348,7 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
         "output": os.fspath(output), "format": format, "directions": directions,
         "beam_origin": beam_origin, "beam_divergence": beam_divergence, "covariance": covariance,
         "common_factors": common_factors, "rate": rate,
-        "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
+        "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
         "las_scale": las_scale, "time": time, "trajectory": os.fspath(trajectory),
         "trajectory_topic": trajectory_topic, "mount": os.fspath(mount),
         "accuracy": os.fspath(accuracy), "trajectory_errors": os.fspath(trajectory_errors),
@@ -360,8 +360,8 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
 
 
 def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float] = None,
-             rate: Optional[float] = None, angle_noise: Optional[float] = None,
-             angle_noise_deg: Optional[float] = None, range_noise: Optional[float] = None,
+             rate: Optional[float] = None, noise_angle: Optional[float] = None,
+             noise_angle_deg: Optional[float] = None, noise_range: Optional[float] = None,
              quantize: bool = True, beam_origin: bool = True, rotor: str = "constant",
              set: Mapping[str, float] = {}, reported: Mapping[str, float] = {},
              reported_nominal: bool = False, start_angles: Optional[Sequence[float]] = None,
@@ -383,7 +383,7 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
         Length, s; by default 1, or until the end of the trajectory.
     rate : float, optional
         Shots per second, Hz; by default the sensor's.
-    angle_noise, angle_noise_deg, range_noise : float, optional
+    noise_angle, noise_angle_deg, noise_range : float, optional
         Standard deviations of directions, rad or deg, and of ranges, m; by default the sensor's.
     quantize : bool, default True
         Round to the sensor's resolution.
@@ -435,8 +435,8 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     """
     options = {
         "output": os.fspath(output), "sensor": os.fspath(sensor), "duration": duration,
-        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "range_noise": range_noise, "quantize": quantize, "beam_origin": beam_origin,
+        "rate": rate, "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
+        "noise_range": noise_range, "quantize": quantize, "beam_origin": beam_origin,
         "rotor": rotor, "set": list(set.items()), "reported": list(reported.items()),
         "reported_nominal": reported_nominal,
         "start_angles": angles("start_angles", start_angles, start_angles_deg),
@@ -569,9 +569,9 @@ def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
 
 
 def observability(recording: Source = "", *, sensor: Path = "", duration: Optional[float] = None,
-                  rate: Rate = None, angle_noise: Optional[float] = None,
-                  angle_noise_deg: Optional[float] = None, rounding: bool = True,
-                  fixed: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
+                  rate: Rate = None, noise_angle: Optional[float] = None,
+                  noise_angle_deg: Optional[float] = None, rounding: bool = True,
+                  fix: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
                   extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
                   device: str = "", threads: int = 0, progress: Progress = None) -> Dict[str, Any]:
     """Compute Cramér-Rao bounds of all parameters for a recording or a plan.
@@ -586,7 +586,7 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
         Shots per second of the plan, or to use from the recording, Hz.
     rounding : bool, default True
         Whether the angles of a plan are rounded to the sensor's resolution.
-    sensor, angle_noise, angle_noise_deg, fixed, free, shot_rate, extrinsics, extrinsics_deg, device
+    sensor, noise_angle, noise_angle_deg, fix, free, shot_rate, extrinsics, extrinsics_deg, device
         As in `risley.estimate`.
     threads, progress
         As in `risley.estimate`.
@@ -598,8 +598,8 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
     """
     options = {
         "recording": source(recording), "sensor": os.fspath(sensor), "duration": duration,
-        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "rounding": rounding, "fixed": _held(fixed), "free": list(free), "device": device,
+        "rate": rate, "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
+        "rounding": rounding, "fix": _held(fix), "free": list(free), "device": device,
         "shot_rate": shot_rate,
         "extrinsics": pose(extrinsics, extrinsics_deg)}
     with telling(progress) as tell:

@@ -303,9 +303,8 @@ std::vector<std::string> files_behind(const std::string& path) {
   return files;
 }
 
-std::vector<std::pair<std::string, std::string>> input_hashes(const std::string& path,
-                                                              const Progress& progress) {
-  std::vector<std::pair<std::string, std::string>> hashes;
+FileHashes input_hashes(const std::string& path, const Progress& progress) {
+  FileHashes hashes;
   for (const std::string& file : recordings::recording_files(path)) {
     hashes.emplace_back(file, hashes::sha256_of_file(file, progress));
   }

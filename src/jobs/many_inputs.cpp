@@ -37,7 +37,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Line = nlohmann::ordered_json;
-using FileHashes = std::vector<std::pair<std::string, std::string>>;
 
 constexpr std::string_view kJournalEnding = ".records.jsonl";
 
@@ -66,14 +65,133 @@ std::string journal_beside(const std::string& result) {
   return path.string() + std::string(kJournalEnding);
 }
 
+void make_folder_for(const std::string& output) {
+  const fs::path folder = fs::path(output).parent_path();
+  if (!folder.empty()) io::make_folder(folder.string());
+}
+
 std::vector<std::string> hashes_alone(const FileHashes& files) {
   std::vector<std::string> hashes;
   for (const auto& [file, hash] : files) hashes.push_back(hash);
   return hashes;
 }
 
+InputResult result_of(const Line& line) {
+  InputResult result;
+  result.outcome = {static_cast<ExitStatus>(line.at("status").get<int>()), line.at("json").dump(),
+                    line.at("text").get<std::string>(), line.at("counted").get<std::uint64_t>()};
+  line.at("inputs_sha256").get_to(result.hashes);
+  line.at("elapsed_s").get_to(result.elapsed);
+  return result;
+}
+
+/// The progress of all jobs together.
+class SharedProgress {
+ public:
+  SharedProgress(std::size_t jobs, const Progress& shown) : fraction_(jobs), shown_(shown) {}
+
+  /// For one of them. Its stages each go from 0 to 1; what it has reached once stays reached.
+  Progress of(std::size_t job) {
+    return shown_.with([this, job](double fraction, std::string_view) { reach(job, fraction); });
+  }
+  void end(std::size_t job, bool sound, const InputRun::Ended& ended) {
+    {
+      const std::scoped_lock lock(mutex_);
+      ++ended_;
+      if (!sound) ++failed_;
+      if (ended) ended(ended_, failed_);
+    }
+    reach(job, 1.0);
+  }
+
+ private:
+  void reach(std::size_t job, double fraction) {
+    const std::scoped_lock lock(mutex_);
+    const double further = std::clamp(fraction, 0.0, 1.0) - fraction_[job];
+    if (further > 0) {
+      fraction_[job] += further;
+      sum_ += further;
+    }
+    shown_.report(sum_ / static_cast<double>(fraction_.size()));
+  }
+
+  std::mutex mutex_;
+  std::vector<double> fraction_;
+  double sum_ = 0;
+  std::size_t ended_ = 0, failed_ = 0;
+  const Progress& shown_;
+};
+
+}  // namespace
+
+std::vector<std::string> InputWork::files_of(const InputJob& job) const {
+  if (files) return files(job);
+  return job.output.empty() ? std::vector<std::string>() : std::vector{job.output};
+}
+
+InputPlan plan_inputs(const ManyInputsOptions& options, const InputWork& work,
+                      const Progress& progress) {
+  const InputNames names{options.names, options.list, {}};
+  if (options.names.empty() && options.list.empty()) {
+    throw InvalidArgument(
+        fmt::format("INPUT is missing: a recording, or {}", name_of(setting::list)));
+  }
+  InputPlan plan;
+  plan.many = are_many(names) || !options.table.empty() || options.resume;
+  if (!options.table.empty()) tables::TableFile::check_name(options.table);
+  if (options.resume && options.output.empty() && options.table.empty()) {
+    throw InvalidArgument(fmt::format("{} needs results that stay: give {} or {}",
+                                      name_of(setting::resume), name_of(setting::output),
+                                      name_of(setting::table)));
+  }
+  // Results of one input without more have always stood alone; a table alone has nothing to resume.
+  if (plan.many && (!options.output.empty() || options.resume)) {
+    plan.journal = journal_beside(options.output.empty() ? options.table : options.output);
+  }
+  std::vector<std::string> excluded;
+  for (const std::string& made : {options.output, options.table}) {
+    if (!made.empty()) excluded.push_back(made);
+  }
+  const bool into_folder = options.into_folder && !options.output.empty();
+  if (into_folder && !work.into_folders && work.ending.empty()) {
+    throw InvalidArgument(fmt::format("several files need {}, because {} is a folder",
+                                      name_of(setting::format), name_of(setting::output)));
+  }
+  for (const Input& input : find_inputs({options.names, options.list, excluded}, progress)) {
+    plan.jobs.push_back({input.path,
+                         into_folder
+                             ? (fs::path(options.output) / (input.place + work.ending)).string()
+                             : options.output,
+                         input.place});
+  }
+  if (into_folder) {
+    if (!work.into_folders) io::make_folder(options.output);
+    std::error_code ignored;
+    if (plan.many && fs::is_directory(options.output, ignored)) plan.folder = options.output;
+  }
+  return plan;
+}
+
+std::string work_text(const std::string& program,
+                      std::vector<std::pair<std::string, std::vector<std::string>>> settings,
+                      const Progress& progress) {
+  std::vector<std::string> lines;
+  for (auto& [name, values] : settings) {
+    for (std::string& value : values) {
+      std::string contents;
+      for (const std::string& file : files_behind(value)) {
+        contents += " sha256:" + hashes::sha256_of_file(file, progress);
+      }
+      if (!contents.empty()) value = contents;
+    }
+    lines.push_back(fmt::format("{}={}", name, fmt::join(values, " ")));
+  }
+  std::sort(lines.begin(), lines.end());
+  return fmt::format("{}\n{}\n", program, fmt::join(lines, "\n"));
+}
+
 /// Lines of JSON in a file that grows, to be read in any order.
-class Journal {
+class InputRun::Journal {
  public:
   /// @param path  empty: a temporary file  @param go_on  behind the lines that are there
   Journal(const std::string& path, bool go_on)
@@ -145,299 +263,140 @@ class Journal {
   std::map<std::string, long> earlier_;
 };
 
-InputResult result_of(const Line& line) {
-  InputResult result;
-  result.outcome = {static_cast<ExitStatus>(line.at("status").get<int>()), line.at("json").dump(),
-                    line.at("text").get<std::string>(), line.at("counted").get<std::uint64_t>()};
-  line.at("inputs_sha256").get_to(result.hashes);
-  line.at("elapsed_s").get_to(result.elapsed);
-  return result;
-}
-
-/// The progress of all jobs together.
-class SharedProgress {
- public:
-  SharedProgress(std::size_t jobs, const Progress& shown) : fraction_(jobs), shown_(shown) {}
-
-  /// For one of them. Its stages each go from 0 to 1; what it has reached once stays reached.
-  Progress of(std::size_t job) {
-    return shown_.with([this, job](double fraction, std::string_view) { reach(job, fraction); });
-  }
-  void end(std::size_t job, bool sound, const InputRun::Ended& ended) {
-    {
-      const std::scoped_lock lock(mutex_);
-      ++ended_;
-      if (!sound) ++failed_;
-      if (ended) ended(ended_, failed_);
-    }
-    reach(job, 1.0);
-  }
-
- private:
-  void reach(std::size_t job, double fraction) {
-    const std::scoped_lock lock(mutex_);
-    const double further = std::clamp(fraction, 0.0, 1.0) - fraction_[job];
-    if (further > 0) {
-      fraction_[job] += further;
-      sum_ += further;
-    }
-    shown_.report(sum_ / static_cast<double>(fraction_.size()));
-  }
-
-  std::mutex mutex_;
-  std::vector<double> fraction_;
-  double sum_ = 0;
-  std::size_t ended_ = 0, failed_ = 0;
-  const Progress& shown_;
-};
-
-}  // namespace
-
-std::vector<std::string> InputWork::files_of(const InputJob& job) const {
-  if (files) return files(job);
-  return job.output.empty() ? std::vector<std::string>() : std::vector{job.output};
-}
-
-InputPlan plan_inputs(const ManyInputsOptions& options, const Progress& progress) {
-  const InputNames names{options.names, options.list, {}};
-  if (options.names.empty() && options.list.empty()) {
-    throw InvalidArgument(
-        fmt::format("INPUT is missing: a recording, or {}", name_of(setting::list)));
-  }
-  InputPlan plan;
-  plan.many = are_many(names) || !options.table.empty() || options.resume;
-  if (!options.table.empty()) tables::TableFile::check_name(options.table);
-  if (options.resume && options.output.empty() && options.table.empty()) {
-    throw InvalidArgument(fmt::format("{} needs results that stay: give {} or {}",
-                                      name_of(setting::resume), name_of(setting::output),
-                                      name_of(setting::table)));
-  }
-  // Results of one input without more have always stood alone; a table alone has nothing to resume.
-  if (plan.many && (!options.output.empty() || options.resume)) {
-    plan.journal = journal_beside(options.output.empty() ? options.table : options.output);
-  }
-  std::vector<std::string> excluded;
-  for (const std::string& made : {options.output, options.table}) {
-    if (!made.empty()) excluded.push_back(made);
-  }
-  const bool into_folder = options.into_folder && !options.output.empty();
-  for (const Input& input : find_inputs({options.names, options.list, excluded}, progress)) {
-    plan.jobs.push_back({input.path,
-                         into_folder
-                             ? (fs::path(options.output) / (input.place + options.ending)).string()
-                             : options.output,
-                         input.place});
-  }
-  if (into_folder) {
-    if (!options.ending.empty()) io::make_folder(options.output);
-    std::error_code ignored;
-    if (plan.many && fs::is_directory(options.output, ignored)) plan.folder = options.output;
-  }
-  return plan;
-}
-
-std::string work_text(const std::string& program,
-                      std::vector<std::pair<std::string, std::vector<std::string>>> settings,
-                      const Progress& progress) {
-  std::vector<std::string> lines;
-  for (auto& [name, values] : settings) {
-    for (std::string& value : values) {
-      std::string contents;
-      for (const std::string& file : files_behind(value)) {
-        contents += " sha256:" + hashes::sha256_of_file(file, progress);
-      }
-      if (!contents.empty()) value = contents;
-    }
-    lines.push_back(fmt::format("{}={}", name, fmt::join(values, " ")));
-  }
-  std::sort(lines.begin(), lines.end());
-  return fmt::format("{}\n{}\n", program, fmt::join(lines, "\n"));
-}
-
-class InputRun::Implementation {
- public:
-  Implementation(const InputPlan& plan, const InputWork& work, const std::string& work_text,
-                 const ManyInputsOptions& options)
-      : plan_(plan),
-        work_(work),
-        resume_(options.resume),
-        hashes_(plan.jobs.size()),
-        lines_(plan.jobs.size(), -1),
-        skipped_(plan.jobs.size()) {
-    if (!plan.folder.empty()) lock_.emplace(plan.folder);
-    if (!options.table.empty()) const io::OutputFile can_be_written(options.table);
-    journal_.emplace(plan.journal, resume_);
-    if (!plan.journal.empty()) work_text_ = work_text;
-  }
-
-  bool run(const Progress& progress, const Ended& ended) {
-    SharedProgress shared(plan_.jobs.size(), progress);
-    const auto run_one = [&](std::size_t i) {
-      const ExitStatus status = run_job(i, shared.of(i));
-      shared.end(i, status == kDone, ended);
-    };
-    std::vector<std::size_t> together, alone;
-    for (std::size_t i = 0; i < plan_.jobs.size(); ++i) {
-      (is_large(plan_.jobs[i].input) ? alone : together).push_back(i);
-    }
-    bool whole = true;
-    try {
-      parallel::for_each_job(together.size(), [&](std::size_t k) { run_one(together[k]); });
-      for (const std::size_t i : alone) run_one(i);
-    } catch (const Cancelled&) {
-      whole = false;
-    }
-    for_each([this](const InputJob&, const InputResult& result) {
-      if (result.outcome.status != kDone) {
-        ++failed;
-        status = std::max(status, result.outcome.status);
-      } else {
-        ++(result.skipped ? skipped : done);
-      }
-      counted += result.outcome.counted;
-    });
-    return whole;
-  }
-
-  template <class Call>
-  void for_each(const Call& call) const {
-    for (std::size_t i = 0; i < lines_.size(); ++i) {
-      if (lines_[i] < 0) continue;
-      InputResult result = result_of(journal_->at(lines_[i]));
-      result.skipped = skipped_[i] != 0;
-      call(plan_.jobs[i], result);
-    }
-  }
-
-  FileHashes hashes() const {
-    FileHashes all;
-    for (const FileHashes& of_one : hashes_) all.insert(all.end(), of_one.begin(), of_one.end());
-    return all;
-  }
-
-  std::size_t done = 0, skipped = 0, failed = 0;
-  std::uint64_t counted = 0;
-  ExitStatus status = kDone;
-
- private:
-  ExitStatus run_job(std::size_t i, const Progress& progress) {
-    const InputJob& job = plan_.jobs[i];
-    const Stopwatch watch;
-    InputOutcome outcome;
-    bool is_made = false;
-    try {
-      // Before the work: if the file changes meanwhile, the result is made again.
-      hashes_[i] = input_hashes(job.input, progress.silent());
-      if (resume_) {
-        if (const std::optional<ExitStatus> before = made_before(i, progress)) return *before;
-      }
-      make_folder_of(job);
-      outcome = work_.run(job, progress);
-      is_made = true;
-    } catch (const Cancelled&) {
-      throw;
-    } catch (...) {
-      outcome = work_.failed(job);
-    }
-    // What stands where a failed result would be is of an earlier run.
-    const Line outputs = is_made ? outputs_of(job, progress) : Line::object();
-    lines_[i] = journal_->add({{"place", job.place},
-                               {"work", hashes::sha256(work_text_)},
-                               {"inputs_sha256", hashes_alone(hashes_[i])},
-                               {"outputs", outputs},
-                               {"status", static_cast<int>(outcome.status)},
-                               {"json", Line::parse(outcome.json)},
-                               {"text", outcome.text},
-                               {"counted", outcome.counted},
-                               {"elapsed_s", watch.seconds()}});
-    return outcome.status;
-  }
-
-  /// Results are named by their place beside the journal, so that both may be moved.
-  fs::path folder_of_journal() const {
-    return fs::absolute(plan_.journal).lexically_normal().parent_path();
-  }
-
-  Line outputs_of(const InputJob& job, const Progress& progress) const {
-    Line outputs = Line::object();
-    if (plan_.journal.empty()) return outputs;
-    for (const std::string& file : work_.files_of(job)) {
-      std::error_code ignored;
-      if (!fs::is_regular_file(file, ignored)) continue;
-      outputs[fs::absolute(file).lexically_relative(folder_of_journal()).string()] =
-          hashes::sha256_of_file(file, progress.silent());
-    }
-    return outputs;
-  }
-
-  /// The status of a result that need not be made again, which is noted.
-  std::optional<ExitStatus> made_before(std::size_t i, const Progress& progress) {
-    const InputJob& job = plan_.jobs[i];
-    const auto found = journal_->earlier().find(job.place);
-    if (found == journal_->earlier().end()) return std::nullopt;
-    try {
-      const Line line = journal_->at(found->second);
-      const ExitStatus status = result_of(line).outcome.status;
-      if (line.at("work") != hashes::sha256(work_text_) ||
-          line.at("inputs_sha256") != hashes_alone(hashes_[i]) ||
-          (status != kDone && status != kNumbersFailed)) {
-        return std::nullopt;
-      }
-      const Line outputs = outputs_of(job, progress);
-      for (const auto& [file, hash] : line.at("outputs").items()) {
-        if (outputs.value(file, Line()) != hash) return std::nullopt;
-      }
-      // Files of a result that went well have to be those that it wrote.
-      if (status == kDone && outputs.size() != line.at("outputs").size()) return std::nullopt;
-      lines_[i] = found->second;
-      skipped_[i] = 1;
-      return status;
-    } catch (const Line::exception&) {  // made again
-    } catch (const FileError&) {
-    }
-    return std::nullopt;
-  }
-
-  void make_folder_of(const InputJob& job) const {
-    if (work_.into_folders || job.output.empty()) return;
-    const fs::path folder = fs::path(job.output).parent_path();
-    if (!folder.empty()) io::make_folder(folder.string());
-  }
-
-  const InputPlan& plan_;
-  const InputWork& work_;
-  bool resume_;
-  std::string work_text_;
-  std::vector<FileHashes> hashes_;  ///< of every input's files
-  std::vector<long> lines_;         ///< in the journal; -1: not finished
-  std::vector<char> skipped_;
-  std::optional<Journal> journal_;
-  std::optional<io::FolderLock> lock_;  ///< of the folder for all results
-};
-
 InputRun::InputRun(const InputPlan& plan, const InputWork& work, const std::string& work_text,
                    const ManyInputsOptions& options)
-    : implementation_(std::make_unique<Implementation>(plan, work, work_text, options)) {}
+    : plan_(plan),
+      work_(work),
+      resume_(options.resume),
+      work_hash_(hashes::sha256(work_text)),
+      hashes_(plan.jobs.size()),
+      lines_(plan.jobs.size(), -1),
+      skipped_(plan.jobs.size()) {
+  if (!plan.folder.empty()) lock_.emplace(plan.folder);
+  if (!options.table.empty()) const io::OutputFile can_be_written(options.table);
+  journal_ = std::make_unique<Journal>(plan.journal, resume_);
+}
 
 InputRun::~InputRun() = default;
 
 bool InputRun::run(const Progress& progress, const Ended& ended) {
-  return implementation_->run(progress, ended);
+  SharedProgress shared(plan_.jobs.size(), progress);
+  const auto run_one = [&](std::size_t i) {
+    const ExitStatus status = run_job(i, shared.of(i));
+    shared.end(i, status == kDone, ended);
+  };
+  std::vector<std::size_t> together, alone;
+  for (std::size_t i = 0; i < plan_.jobs.size(); ++i) {
+    (is_large(plan_.jobs[i].input) ? alone : together).push_back(i);
+  }
+  bool whole = true;
+  try {
+    parallel::for_each_job(together.size(), [&](std::size_t k) { run_one(together[k]); });
+    for (const std::size_t i : alone) run_one(i);
+  } catch (const Cancelled&) {
+    whole = false;
+  }
+  for_each([this](const InputJob&, const InputResult& result) {
+    if (result.outcome.status != kDone) {
+      ++counts_.failed;
+      counts_.status = std::max(counts_.status, result.outcome.status);
+    } else {
+      ++(result.skipped ? counts_.skipped : counts_.done);
+    }
+    counts_.counted += result.outcome.counted;
+  });
+  return whole;
 }
 
 void InputRun::for_each(
     const std::function<void(const InputJob&, const InputResult&)>& call) const {
-  implementation_->for_each(call);
+  for (std::size_t i = 0; i < lines_.size(); ++i) {
+    if (lines_[i] < 0) continue;
+    InputResult result = result_of(journal_->at(lines_[i]));
+    result.skipped = skipped_[i] != 0;
+    call(plan_.jobs[i], result);
+  }
 }
 
-std::vector<std::pair<std::string, std::string>> InputRun::hashes() const {
-  return implementation_->hashes();
+FileHashes InputRun::hashes() const {
+  FileHashes all;
+  for (const FileHashes& of_one : hashes_) all.insert(all.end(), of_one.begin(), of_one.end());
+  return all;
 }
 
-std::size_t InputRun::done() const { return implementation_->done; }
-std::size_t InputRun::skipped() const { return implementation_->skipped; }
-std::size_t InputRun::failed() const { return implementation_->failed; }
-std::uint64_t InputRun::counted() const { return implementation_->counted; }
-ExitStatus InputRun::status() const { return implementation_->status; }
+ExitStatus InputRun::run_job(std::size_t place, const Progress& progress) {
+  const InputJob& job = plan_.jobs[place];
+  const Stopwatch watch;
+  InputOutcome outcome;
+  bool is_made = false;
+  try {
+    // Before the work: if the file changes meanwhile, the result is made again.
+    hashes_[place] = input_hashes(job.input, progress.silent());
+    if (resume_) {
+      if (const std::optional<ExitStatus> before = made_before(place, progress)) return *before;
+    }
+    if (!work_.into_folders) make_folder_for(job.output);
+    outcome = work_.run(job, progress);
+    is_made = true;
+  } catch (const Cancelled&) {
+    throw;
+  } catch (...) {
+    outcome = work_.failed(job);
+  }
+  // What stands where a failed result would be is of an earlier run.
+  const FileHashes outputs = is_made ? outputs_of(job, progress) : FileHashes();
+  lines_[place] = journal_->add({{"place", job.place},
+                                 {"work_sha256", work_hash_},
+                                 {"inputs_sha256", hashes_alone(hashes_[place])},
+                                 {"outputs", outputs},
+                                 {"status", static_cast<int>(outcome.status)},
+                                 {"json", Line::parse(outcome.json)},
+                                 {"text", outcome.text},
+                                 {"counted", outcome.counted},
+                                 {"elapsed_s", watch.seconds()}});
+  return outcome.status;
+}
+
+/// Files of a result, named by their place beside the journal, so that both may be moved.
+FileHashes InputRun::outputs_of(const InputJob& job, const Progress& progress) const {
+  FileHashes outputs;
+  if (plan_.journal.empty()) return outputs;
+  const fs::path folder = fs::absolute(plan_.journal).lexically_normal().parent_path();
+  for (const std::string& file : work_.files_of(job)) {
+    std::error_code ignored;
+    if (!fs::is_regular_file(file, ignored)) continue;
+    outputs.emplace_back(fs::absolute(file).lexically_normal().lexically_relative(folder).string(),
+                         hashes::sha256_of_file(file, progress.silent()));
+  }
+  return outputs;
+}
+
+/// The status of a result that need not be made again, which is noted.
+std::optional<ExitStatus> InputRun::made_before(std::size_t place, const Progress& progress) {
+  const InputJob& job = plan_.jobs[place];
+  const auto found = journal_->earlier().find(job.place);
+  if (found == journal_->earlier().end()) return std::nullopt;
+  try {
+    const Line line = journal_->at(found->second);
+    const ExitStatus status = result_of(line).outcome.status;
+    if ((status != kDone && status != kNumbersFailed) || line.at("work_sha256") != work_hash_ ||
+        line.at("inputs_sha256") != Line(hashes_alone(hashes_[place]))) {
+      return std::nullopt;
+    }
+    const FileHashes outputs = outputs_of(job, progress);
+    const auto noted = line.at("outputs").get<FileHashes>();
+    // Of a result that went well, its files and no others.
+    if (status == kDone && outputs.size() != noted.size()) return std::nullopt;
+    for (const auto& output : noted) {
+      if (std::find(outputs.begin(), outputs.end(), output) == outputs.end()) return std::nullopt;
+    }
+    lines_[place] = found->second;
+    skipped_[place] = 1;
+    return status;
+  } catch (const Line::exception&) {  // made again
+  } catch (const FileError&) {
+  }
+  return std::nullopt;
+}
 
 }  // namespace risley::jobs

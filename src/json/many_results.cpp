@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "risley/cloud/cloud_writer.hpp"
 #include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/jobs/convert_recording.hpp"
@@ -19,6 +20,7 @@
 #include "risley/jobs/inspect_trajectory.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/json/result_columns.hpp"
+#include "risley/recordings/writer.hpp"
 #include "risley/tables/table_file.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 #include "risley/wire/udp_socket.hpp"
@@ -50,7 +52,9 @@ InputOutcome failed(const InputJob& job, const std::string& verb) {
 }
 
 InputWork work_of(std::string verb, std::string label) {
-  InputWork work{std::move(verb), std::move(label), {}, false, {}, {}, {}};
+  InputWork work;
+  work.verb = std::move(verb);
+  work.label = std::move(label);
   work.failed = [verb = work.verb](const InputJob& job) { return failed(job, verb); };
   return work;
 }
@@ -177,6 +181,17 @@ InputOutcome convert(const InputJob& job, const ConvertEachOptions& options, con
   return {done.damage ? jobs::kBadFile : jobs::kDone, text_of(json),
           fmt::format("{}: {} observations", job.output, grouped(written)),
           json.value("observations", std::uint64_t{0})};
+}
+
+/// Ending of a format's files in a folder; empty for none.
+std::string ending_of(const std::string& format) {
+  for (const auto& known : recordings::writable_formats()) {
+    if (known.name == format) return known.ending;
+  }
+  for (const auto& known : trajectories::writable_trajectories()) {
+    if (known.name == format) return known.ending;
+  }
+  return {};
 }
 
 /// What sent the beams where the points are.
@@ -327,6 +342,10 @@ InputWork cloud_each(jobs::CloudOfRecordingOptions options, const CloudPages& pa
                      const Tell& tell) {
   InputWork work = work_of("cloud", "making points");
   work.counted = "points";
+  const std::string& format = options.cloud.writer.format;
+  work.ending =
+      cloud::find_cloud_format("", format.empty() ? cloud::cloud_formats().front().name : format)
+          .ending;
   work.run = [options = std::move(options), pages, tell](const InputJob& job,
                                                          const Progress& progress) {
     return make_cloud(job, options, pages, tell, progress);
@@ -345,6 +364,7 @@ InputWork inspect_each(InspectEachOptions options, const Tell& tell) {
 InputWork convert_each(ConvertEachOptions options, const Tell& tell) {
   InputWork work = work_of("convert", "converting");
   work.counted = "observations";
+  work.ending = ending_of(options.format);
   work.run = [options = std::move(options), tell](const InputJob& job, const Progress& progress) {
     return convert(job, options, tell, progress);
   };
@@ -365,8 +385,9 @@ Json one_of_several(const InputJob& job, const InputResult& result) {
 
 Json counts_of(const jobs::InputRun& run, const InputWork& work) {
   Json counts = Json::object();
-  if (!work.counted.empty()) counts[work.counted] = run.counted();
-  counts.update({{"done", run.done()}, {"failed", run.failed()}, {"skipped", run.skipped()}});
+  const auto& [done, skipped, failed, counted, status] = run.counts();
+  if (!work.counted.empty()) counts[work.counted] = counted;
+  counts.update({{"done", done}, {"failed", failed}, {"skipped", skipped}});
   return counts;
 }
 

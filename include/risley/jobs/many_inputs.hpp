@@ -6,11 +6,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/io/folder_lock.hpp"
+#include "risley/jobs/inputs.hpp"
 
 namespace risley::jobs {
 
@@ -32,7 +35,6 @@ struct ManyInputsOptions {
   /// input does below the folder that all share; empty: none.
   std::string output;
   bool into_folder = false;  ///< whether it is such a folder, which is made where it is missing
-  std::string ending;        ///< of outputs in it, ".las"; empty for folders
   std::string table;         ///< to write with one row per input; empty: none
   bool resume = false;       ///< leave results that are whole as they are, see InputRun
 };
@@ -44,20 +46,6 @@ struct InputJob {
   std::string place;        ///< of its results below a folder, unlike that of any other job
   std::string device = {};  ///< of the input's, where each has a job
 };
-
-/// All of them.
-struct InputPlan {
-  std::vector<InputJob> jobs;
-  /// Whether they are told as several are: by what was asked for, not by how many inputs that came
-  /// to.
-  bool many = false;
-  std::string folder;   ///< that all results go to; empty: none, or each into one of its own
-  std::string journal;  ///< file that says what was made; empty: none is kept
-};
-
-/// Finds the inputs and says where their outputs go.
-/// @throws InvalidArgument, FileError, Cancelled
-InputPlan plan_inputs(const ManyInputsOptions& options, const Progress& progress = {});
 
 /// What came of one input.
 struct InputOutcome {
@@ -75,12 +63,23 @@ struct InputResult {
   bool skipped = false;             ///< it had been made before
 };
 
+/// What came of all of them.
+struct InputCounts {
+  std::size_t done = 0;     ///< how many went well, without those made before
+  std::size_t skipped = 0;  ///< how many had been made before, and well
+  std::size_t failed = 0;
+  std::uint64_t counted = 0;  ///< the sum
+  /// kDone when all went well, otherwise the highest status of those that did not.
+  ExitStatus status = kDone;
+};
+
 /// How each input is worked through.
 struct InputWork {
   std::string verb;           ///< "estimate"
   std::string label;          ///< for a bar, "estimating"
   std::string counted;        ///< name in the JSON of what is summed up, if anything
   bool into_folders = false;  ///< outputs are folders, which are made by who fills them
+  std::string ending;         ///< of files in a folder for all, ".las"; empty: not known
   /// Files that a job writes; without it the output alone.
   std::function<std::vector<std::string>(const InputJob&)> files;
   std::function<InputOutcome(const InputJob&, const Progress&)> run;
@@ -89,6 +88,21 @@ struct InputWork {
 
   std::vector<std::string> files_of(const InputJob& job) const;
 };
+
+/// All of them.
+struct InputPlan {
+  std::vector<InputJob> jobs;
+  /// Whether they are told as several are: by what was asked for, not by how many inputs that came
+  /// to.
+  bool many = false;
+  std::string folder;   ///< that all results go to; empty: none, or each into one of its own
+  std::string journal;  ///< file that says what was made; empty: none is kept
+};
+
+/// Finds the inputs and says where their outputs go.
+/// @throws InvalidArgument, FileError, Cancelled
+InputPlan plan_inputs(const ManyInputsOptions& options, const InputWork& work,
+                      const Progress& progress = {});
 
 /// Settings by name, with their values, as a text that is the same for the same work: names of
 /// existing files are replaced by the SHA-256 of what they hold.
@@ -124,18 +138,26 @@ class InputRun {
   /// Calls with what came of each input, in their order.
   void for_each(const std::function<void(const InputJob&, const InputResult&)>& call) const;
   /// Files of inputs with their SHA-256.
-  std::vector<std::pair<std::string, std::string>> hashes() const;
-
-  std::size_t done() const;     ///< how many went well, without those made before
-  std::size_t skipped() const;  ///< how many had been made before, and well
-  std::size_t failed() const;
-  std::uint64_t counted() const;  ///< the sum
-  /// kDone when all went well, otherwise the highest status of those that did not.
-  ExitStatus status() const;
+  FileHashes hashes() const;
+  /// Once it has run.
+  const InputCounts& counts() const { return counts_; }
 
  private:
-  class Implementation;
-  std::unique_ptr<Implementation> implementation_;
+  class Journal;
+  ExitStatus run_job(std::size_t place, const Progress& progress);
+  FileHashes outputs_of(const InputJob& job, const Progress& progress) const;
+  std::optional<ExitStatus> made_before(std::size_t place, const Progress& progress);
+
+  const InputPlan& plan_;
+  const InputWork& work_;
+  bool resume_;
+  std::string work_hash_;
+  std::vector<FileHashes> hashes_;  ///< of every input's files
+  std::vector<long> lines_;         ///< in the journal; -1: not finished
+  std::vector<char> skipped_;
+  InputCounts counts_;
+  std::optional<io::FolderLock> lock_;  ///< of the folder for all results
+  std::unique_ptr<Journal> journal_;
 };
 
 }  // namespace risley::jobs
