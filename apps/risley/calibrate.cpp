@@ -263,11 +263,9 @@ Run declare_calibrate(CLI::App& verb) {
       "to; with --table a folder of such folders, placed as the recordings are (default: none)");
   verb.add_flag("--no-report", o.no_report,
                 "Write no report.json and report.html, and do not compute what only they show");
-  verb.add_option("--method", o.method,
-                  "adjustment: weighted, of all recordings together; paper: unweighted distances "
-                  "from planes fitted by SVD")
-      ->check(CLI::IsMember({"adjustment", "paper"}))
-      ->capture_default_str();
+  add_choice(verb, "--method", o.method, {"adjustment", "paper"},
+             "adjustment: weighted, of all recordings together; paper: unweighted distances "
+             "from planes fitted by SVD");
   verb.add_option(
       "--planes", o.planes,
       "Walls by name (YAML); the normal of a wall with sigma_deg is known (default: walls "
@@ -332,12 +330,10 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
                   "Prior: 1 sigma of the range offset about what the sensor states, m; 0 holds it "
                   "there (default: 0.05, for a flight 0.02)");
-  verb.add_option(
-          "--walls", o.walls,
-          "'uneven': walls wave by millimetres, and ranges have errors near the sensor, on tilted "
-          "and on dark surfaces; 'flat': exact planes and a constant error, as in the paper")
-      ->check(CLI::IsMember({"uneven", "flat"}))
-      ->capture_default_str();
+  add_choice(
+      verb, "--walls", o.walls, {"uneven", "flat"},
+      "'uneven': walls wave by millimetres, and ranges have errors near the sensor, on tilted "
+      "and on dark surfaces; 'flat': exact planes and a constant error, as in the paper");
   verb.add_option("--patch-thickness-m", o.patch_thickness_m,
                   "1 sigma of how far dark or light patches stand off their wall, m: 0 for paint, "
                   "which makes the range error that depends on intensity exact (default: 0.01)");
@@ -348,19 +344,12 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--tolerance-deg", o.tolerance_deg,
                   "Root mean square error of directions up to which a unit counts as sound, deg "
                   "(default: the manufacturer's specification, as in the preset)");
-  verb.add_option("--beam-origin", o.beam_origin,
-                  "Let beams start where they leave the last prism; 'no': at the sensor's origin")
-      ->check(CLI::IsMember({"yes", "no"}))
-      ->capture_default_str();
-  verb.add_option(
-          "--states", o.states,
-          "Rotor states to write: 'knots': at one shot every 2 ms; 'all': at all shots; 'none'")
-      ->check(CLI::IsMember({"knots", "all", "none"}))
-      ->capture_default_str();
-  verb.add_option("--mirror", o.mirror,
-                  "Whether the elevation in the files has the opposite sign; 'auto' finds out")
-      ->check(CLI::IsMember({"auto", "yes", "no"}))
-      ->capture_default_str();
+  add_choice(verb, "--beam-origin", o.beam_origin, {"yes", "no"},
+             "Let beams start where they leave the last prism; 'no': at the sensor's origin");
+  add_choice(verb, "--states", o.states, {"knots", "all", "none"},
+             "Rotor states to write: 'knots': at one shot every 2 ms; 'all': at all shots; 'none'");
+  add_choice(verb, "--mirror", o.mirror, {"auto", "yes", "no"},
+             "Whether the elevation in the files has the opposite sign; 'auto' finds out");
   verb.add_flag("--force", o.force,
                 "Write calibration.yaml even where it does not improve on what the sensor believes")
       ->excludes("--plan");

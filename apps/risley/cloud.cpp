@@ -110,9 +110,7 @@ Run declare_cloud(CLI::App& verb) {
   const auto options = std::make_shared<CloudCommandOptions>();
   CloudCommandOptions& o = *options;
   const auto yes_no = [&verb](const char* name, std::string& value, const char* description) {
-    verb.add_option(name, value, description)
-        ->check(CLI::IsMember({"yes", "no"}))
-        ->capture_default_str();
+    add_choice(verb, name, value, {"yes", "no"}, description);
   };
   auto* inputs = add_many_options(verb, o.many, "Recordings with ranges");
   verb.add_option(
@@ -129,12 +127,9 @@ Run declare_cloud(CLI::App& verb) {
           "--format", o.format,
           "Format to write, whatever the ending (default: by the ending, las-1.4 in a folder)")
       ->check(CLI::IsMember(cloud_format_names()));
-  verb.add_option(
-          "--directions", o.directions,
-          "Directions of the points: 'smoothed', where the calibration sends the beam at the "
-          "smoothed rotation angles; 'reported', as the sensor reports them")
-      ->check(CLI::IsMember({"smoothed", "reported"}))
-      ->capture_default_str();
+  add_choice(verb, "--directions", o.directions, {"smoothed", "reported"},
+             "Directions of the points: 'smoothed', where the calibration sends the beam at the "
+             "smoothed rotation angles; 'reported', as the sensor reports them");
   yes_no("--beam-origin", o.beam_origin,
          "Let beams start where they leave the last prism; 'no': at the sensor's origin");
   yes_no("--covariance", o.covariance, "Write the covariance of every point");
@@ -171,11 +166,9 @@ Run declare_cloud(CLI::App& verb) {
       "1 sigma of azimuth and zenith before rounding, deg (default: the calibration's)");
   verb.add_option("--las-scale-m", o.las_scale_m, "Resolution of the coordinates in LAS files, m")
       ->capture_default_str();
-  verb.add_option("--time", o.time,
-                  "Times in LAS files: 'gps', GPS time where the recording's clock is UTC; "
-                  "'recording', the recording's clock as it is")
-      ->check(CLI::IsMember({"gps", "recording"}))
-      ->capture_default_str();
+  add_choice(verb, "--time", o.time, {"gps", "recording"},
+             "Times in LAS files: 'gps', GPS time where the recording's clock is UTC; "
+             "'recording', the recording's clock as it is");
   verb.add_option(
           "--beam-origin-map", o.beam_origin_map,
           "Page (HTML) to write with maps of where the calibration's beams start; no cloud is made")

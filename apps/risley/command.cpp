@@ -76,6 +76,11 @@ std::string duration_text(double seconds) {
 
 }  // namespace
 
+CLI::Option* add_choice(CLI::App& verb, const std::string& name, std::string& value,
+                        const std::vector<std::string>& choices, const std::string& words) {
+  return verb.add_option(name, value, words)->check(CLI::IsMember(choices))->capture_default_str();
+}
+
 void watch_signals() {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);

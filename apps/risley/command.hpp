@@ -62,6 +62,10 @@ Run declare_reproduce(CLI::App& verb);
 Run declare_record(CLI::App& verb);
 Run declare_emulate(CLI::App& verb);
 
+/// Declares an option with a few values, one of which it has already.
+CLI::Option* add_choice(CLI::App& verb, const std::string& name, std::string& value,
+                        const std::vector<std::string>& choices, const std::string& words);
+
 /// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in
 /// the making is removed by its owner.
 /// Who does not notice within two seconds, because it waits for a pipe or computes what cannot be

@@ -191,12 +191,10 @@ Run declare_estimate(CLI::App& verb) {
       "none)");
   verb.add_flag("--no-report", o.no_report,
                 "Write no report.json and report.html, and do not compute what only they show");
-  verb.add_option(
-          "--method", o.method,
-          "map: the most probable motion of the rotors, from all shots at once; ekf: the paper's "
-          "filter")
-      ->check(CLI::IsMember({"map", "ekf"}))
-      ->capture_default_str();
+  add_choice(
+      verb, "--method", o.method, {"map", "ekf"},
+      "map: the most probable motion of the rotors, from all shots at once; ekf: the paper's "
+      "filter");
   verb.add_option(
       "--rate-hz", o.rate_hz,
       "Shots per second to use, Hz, or 'full' for all (default: full with map, 1000 with ekf)");
@@ -208,16 +206,12 @@ Run declare_estimate(CLI::App& verb) {
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_reading_options(verb, o.reading);
   add_parameter_choice(verb, o.parameters);
-  verb.add_option(
-          "--states", o.states,
-          "Rotor states to write: 'knots': at one shot every 2 ms (ekf: at the shots used); 'all': "
-          "at all shots; 'none'")
-      ->check(CLI::IsMember({"knots", "all", "none"}))
-      ->capture_default_str();
-  verb.add_option("--mirror", o.mirror,
-                  "Whether the elevation in the file has the opposite sign; 'auto' finds out")
-      ->check(CLI::IsMember({"auto", "yes", "no"}))
-      ->capture_default_str();
+  add_choice(
+      verb, "--states", o.states, {"knots", "all", "none"},
+      "Rotor states to write: 'knots': at one shot every 2 ms (ekf: at the shots used); 'all': "
+      "at all shots; 'none'");
+  add_choice(verb, "--mirror", o.mirror, {"auto", "yes", "no"},
+             "Whether the elevation in the file has the opposite sign; 'auto' finds out");
   verb.add_option("--process-noise", o.process_noise,
                   "Process noise of the rotors' speed, deg/s per sqrt(s): a number; 'paper' (900); "
                   "'none' (constant acceleration); or 'auto' (random walks of the speed and, with "

@@ -115,13 +115,10 @@ Run declare_simulate(CLI::App& verb) {
                   "1 sigma of azimuth and zenith before rounding, deg (default: the sensor's)");
   verb.add_option("--noise-range-m", o.noise_range_m,
                   "1 sigma of ranges before rounding, m (default: the sensor's)");
-  verb.add_option("--quantize", o.quantize, "Round angles and ranges to the sensor's resolution")
-      ->check(CLI::IsMember({"yes", "no"}))
-      ->capture_default_str();
-  verb.add_option("--beam-origin", o.beam_origin,
-                  "Let beams start where they leave the last prism; 'no': at the sensor's origin")
-      ->check(CLI::IsMember({"yes", "no"}))
-      ->capture_default_str();
+  add_choice(verb, "--quantize", o.quantize, {"yes", "no"},
+             "Round angles and ranges to the sensor's resolution");
+  add_choice(verb, "--beam-origin", o.beam_origin, {"yes", "no"},
+             "Let beams start where they leave the last prism; 'no': at the sensor's origin");
   verb.add_option("--rotor", o.rotor, "How the rotors' speeds vary")
       ->check(CLI::IsMember(simulation::rotor_kind_names()))
       ->capture_default_str();

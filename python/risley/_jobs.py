@@ -2,28 +2,13 @@
 # SPDX-License-Identifier: MIT
 """Jobs on recordings and files: each does what a verb of the command does."""
 import os
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union
 
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._results import (Calibration, Cloud, Estimate, FlightCalibration, Identification,
                              Pattern, Plan, Simulation)
-from risley._units import (Path, Source, YawPitchRoll, angle, angles, pose, source, sources)
-
-Fixed = Union[Mapping[str, Optional[float]], Iterable[str]]
-Rate = Union[None, float, str]
-
-
-def _held(fix: Fixed) -> List[Tuple[str, Optional[float]]]:
-    if isinstance(fix, Mapping):
-        return list(fix.items())
-    return [(name, None) for name in fix]
-
-
-def _paths(paths: Union[Path, Sequence[Path]]) -> List[str]:
-    if isinstance(paths, (str, os.PathLike)):
-        return [os.fspath(paths)]
-    return [os.fspath(path) for path in paths]
+from risley._units import Fixed, Path, Rate, Source, YawPitchRoll, options_of, paths
 
 
 def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method: str = "map",
@@ -78,12 +63,7 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = {
-        "recording": source(recording), "sensor": os.fspath(sensor),
-        "output": os.fspath(output), "method": method, "rate": rate,
-        "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg), "fix": _held(fix),
-        "free": list(free), "mirror": mirror, "truth": os.fspath(truth), "states": states,
-        "device": device, "shot_rate": shot_rate, "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Estimate(_risley.estimate(options, threads, tell))
 
@@ -182,36 +162,16 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = {
-        "recordings": sources(recordings), "sensor": os.fspath(sensor),
-        "output": os.fspath(output), "knot_spacing": knot_spacing, "cell_size": cell_size,
-        "rate": rate, "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
-        "noise_range": noise_range,
-        "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
-        "range_offset_sigma": range_offset_sigma,
-        "tolerance": angle("tolerance", tolerance, tolerance_deg),
-        "fix": _held(fix), "free": list(free),
-        "mirror": mirror, "truth": _paths(truth), "force": force, "device": device,
-        "shot_rate": shot_rate,
-        "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
-    on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),
-                "station": list(station), "beam_origin": beam_origin, "same_walls": same_walls,
-                "walls": walls, "patch_thickness": patch_thickness,
-                "states": states}
-    in_flight = {"trajectory": os.fspath(trajectory), "trajectory_topic": trajectory_topic,
-                 "mount": os.fspath(mount), "accuracy": os.fspath(accuracy),
-                 "trajectory_errors": os.fspath(trajectory_errors),
-                 "control": os.fspath(control)}
+    options = options_of({**locals(), "truth": paths(truth)})
     with telling(progress) as tell:
         if os.fspath(trajectory):
             _refuse({"planes": planes, "stations": stations, "station": station},
                     "is not for a calibration with trajectory")
-            found = _risley.calibrate_flight({**options, **in_flight}, threads, tell)
-            return FlightCalibration(found)
+            return FlightCalibration(_risley.calibrate_flight(options, threads, tell))
         _refuse({"mount": mount, "accuracy": accuracy, "control": control,
                  "trajectory_errors": trajectory_errors, "knot_spacing": knot_spacing,
                  "cell_size": cell_size}, "is not for a calibration with no trajectory")
-        return Calibration(_risley.calibrate({**options, **on_walls}, threads, tell))
+        return Calibration(_risley.calibrate(options, threads, tell))
 
 
 def _refuse(options: Mapping[str, Any], why: str) -> None:
@@ -263,25 +223,17 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
     EstimationError, FileError, ValueError
         As in `risley.calibrate`.
     """
-    options: Dict[str, Any] = {
-        "plan": os.fspath(scene_or_flight), "sensor": os.fspath(sensor), "rate": rate,
-        "noise_range": noise_range,
-        "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
-        "range_offset_sigma": range_offset_sigma, "fix": _held(fix), "free": list(free)}
-    of_flight = {"mount": mount, "trajectory_errors": trajectory_errors, "scene": scene,
-                 "knot_spacing": knot_spacing, "cell_size": cell_size,
-                 "empty_circle": empty_circle}
+    options = options_of({**locals(), "plan": scene_or_flight})
     with telling(progress) as tell:
         if _risley.is_flight_plan(os.fspath(scene_or_flight)):
             if duration is not None:
                 raise ValueError("duration is not for a planned flight, whose strips say it")
-            paths = {"mount": os.fspath(mount), "trajectory_errors": os.fspath(trajectory_errors),
-                     "scene": os.fspath(scene)}
-            return Plan(_risley.plan_flight({**options, **of_flight, **paths, "seed": seed}, tell))
-        _refuse(of_flight, f"goes with a flight, and {scene_or_flight} is a scene")
-        return Plan(_risley.plan({**options, "duration": duration, "beam_origin": beam_origin,
-                                  "walls": walls},
-                                 tell))
+            return Plan(_risley.plan_flight(options, tell))
+        _refuse({"mount": mount, "trajectory_errors": trajectory_errors, "scene": scene,
+                 "knot_spacing": knot_spacing, "cell_size": cell_size,
+                 "empty_circle": empty_circle},
+                f"goes with a flight, and {scene_or_flight} is a scene")
+        return Plan(_risley.plan(options, tell))
 
 
 def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "",
@@ -343,18 +295,7 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = {
-        "recording": source(recording), "calibration": os.fspath(calibration),
-        "output": os.fspath(output), "format": format, "directions": directions,
-        "beam_origin": beam_origin, "beam_divergence": beam_divergence, "covariance": covariance,
-        "common_factors": common_factors, "rate": rate,
-        "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
-        "las_scale": las_scale, "time": time, "trajectory": os.fspath(trajectory),
-        "trajectory_topic": trajectory_topic, "mount": os.fspath(mount),
-        "accuracy": os.fspath(accuracy), "trajectory_errors": os.fspath(trajectory_errors),
-        "crs": crs, "datum": datum, "distribution": distribution, "device": device,
-        "shot_rate": shot_rate,
-        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Cloud(_risley.cloud(options, threads, tell))
 
@@ -433,18 +374,7 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     FileError, ValueError
         For files that cannot be read or written, and for options that make no sense.
     """
-    options = {
-        "output": os.fspath(output), "sensor": os.fspath(sensor), "duration": duration,
-        "rate": rate, "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
-        "noise_range": noise_range, "quantize": quantize, "beam_origin": beam_origin,
-        "rotor": rotor, "set": list(set.items()), "reported": list(reported.items()),
-        "reported_nominal": reported_nominal,
-        "start_angles": angles("start_angles", start_angles, start_angles_deg),
-        "scene": os.fspath(scene), "station": station, "trajectory": os.fspath(trajectory),
-        "trajectory_topic": trajectory_topic, "flight": os.fspath(flight),
-        "mount": os.fspath(mount), "trajectory_errors": os.fspath(trajectory_errors),
-        "trajectory_format": trajectory_format, "start": start, "clock_drift": clock_drift,
-        "seed": seed}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Simulation(_risley.simulate(options, threads, tell))
 
@@ -481,10 +411,7 @@ def identify(recording: Source, *, output: Path = "", force: bool = False, most_
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = {
-        "recording": source(recording), "output": os.fspath(output), "force": force,
-        "most_prisms": most_prisms, "fastest": fastest, "device": device, "shot_rate": shot_rate,
-        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Identification(*_risley.identify(options, threads, tell))
 
@@ -528,10 +455,7 @@ def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
     FileError, ValueError
         For files that cannot be written, and for options that make no sense.
     """
-    options = {
-        "sensor": os.fspath(sensor), "format": format, "output": os.fspath(output),
-        "duration": duration, "rate": rate, "every": every, "firing": firing,
-        "start_angles": angles("start_angles", start_angles, start_angles_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Pattern(_risley.pattern(options, threads, tell))
 
@@ -560,10 +484,7 @@ def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
     dict
         As ``coverage`` in ``risley pattern --coverage --json``.
     """
-    options = {
-        "sensor": os.fspath(sensor), "after": None if after is None else list(after),
-        "cell": angle("cell", cell, cell_deg), "rate": rate, "every": every, "firing": firing,
-        "start_angles": angles("start_angles", start_angles, start_angles_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return dict(_risley.coverage(options, threads, tell))
 
@@ -596,12 +517,7 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
     dict
         As in ``risley observability --json``.
     """
-    options = {
-        "recording": source(recording), "sensor": os.fspath(sensor), "duration": duration,
-        "rate": rate, "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
-        "rounding": rounding, "fix": _held(fix), "free": list(free), "device": device,
-        "shot_rate": shot_rate,
-        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return dict(_risley.observability(options, threads, tell))
 
@@ -637,7 +553,7 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01, anywhere: boo
         kind of sensor.
     """
     with telling(progress) as tell:
-        return dict(_risley.compare(_paths(results), false_alarm, anywhere, unlike, tell))
+        return dict(_risley.compare(paths(results), false_alarm, anywhere, unlike, tell))
 
 
 def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = None,
@@ -708,8 +624,6 @@ def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
     dict
         As in ``risley info --json``. Damage is reported under ``error``.
     """
-    options = {"input": source(file), "accuracy": os.fspath(accuracy),
-               "trajectory_topic": trajectory_topic, "device": device, "shot_rate": shot_rate,
-               "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of({**locals(), "recording": file})
     with telling(progress) as tell:
         return dict(_risley.info(options, tell))

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: MIT
 """Sensors on the network: record them, and be one."""
 import logging
-import os
 from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._risley import Stop
-from risley._units import Path, angle, angles
+from risley._units import Path, options_of
 
 _logger = logging.getLogger("risley")
 
@@ -41,7 +40,7 @@ def find_sensors(interface: str = "", *, find: float = 2.5,
         If the port of the broadcasts is taken, and for an address that is not of this machine.
     """
     with telling(progress) as tell:
-        found = _risley.find_sensors({"interface": interface, "find": find}, tell)
+        found = _risley.find_sensors(options_of({"interface": interface, "find": find}), tell)
     return list(found["sensors"])
 
 
@@ -99,11 +98,7 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
     FileError, ValueError
         If the file cannot be written, and for options that make no sense.
     """
-    options = {
-        "output": os.fspath(output), "duration": duration, "interface": interface,
-        "serial": list(serial), "find": find, "passive": passive,
-        "data_port": data_port, "coordinates": coordinates, "return_mode": return_mode,
-        "imu": imu, "optics": os.fspath(optics)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return dict(_risley.record(options, _note, stop, tell))
 
@@ -184,19 +179,6 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
     FileError, ValueError
         For files that cannot be read, and for options that make no sense.
     """
-    options = {
-        "interface": interface, "duration": duration, "serial": serial,
-        "sensor": os.fspath(sensor), "scene": os.fspath(scene), "station": station,
-        "recording": os.fspath(recording), "speed": speed, "time": time, "time_from": time_from,
-        "clock_drift": clock_drift, "clock_jump": clock_jump,
-        "clock_jump_by": clock_jump_by, "noise_angle": angle("noise_angle", noise_angle, noise_angle_deg),
-        "noise_range": noise_range, "quantize": quantize, "beam_origin": beam_origin,
-        "rotor": rotor, "set": list(set.items()), "reported": list(reported.items()),
-        "reported_nominal": reported_nominal,
-        "start_angles": angles("start_angles", start_angles, start_angles_deg), "loss": loss,
-        "duplication": duplication, "disorder": disorder, "disorder_packets": disorder_packets,
-        "delay": delay, "wrong_checksums": wrong_checksums, "heartbeat_dies": heartbeat_dies,
-        "restart": restart, "restart_takes": restart_takes,
-        "bend": list(bend.items()), "bend_s": bend_s, "seed": seed}
+    options = options_of(locals())
     with telling(progress) as tell:
         return dict(_risley.emulate(options, threads, _note, stop, tell))
