@@ -14,7 +14,7 @@ def command(*words, status=0):
     return json.loads(done.stdout)
 
 
-def help_of(*verb):
+def help_of(verb):
     """All options of a verb."""
-    return subprocess.run([os.environ["RISLEY_COMMAND"], *verb, "--help-all"],
+    return subprocess.run([os.environ["RISLEY_COMMAND"], verb, "--help"],
                           capture_output=True, text=True, check=True).stdout
