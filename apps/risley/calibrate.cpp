@@ -186,7 +186,7 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
     jobs::PlanFlightOptions job;
     take_common(options, job);
     take_grid(options, job);
-    require_positive(setting::empty_circle, options.empty_circle_m);
+    require_positive(kSetting.empty_circle, options.empty_circle_m);
     job.distribution.empty_circle = options.empty_circle_m;
     job.seed = common.seed;
     return run_flight_plan(job, options.plan, options.platform, options.scene, options.page,

@@ -64,7 +64,7 @@ cloud::CloudOptions cloud_options(const CloudCommandOptions& options) {
   result.loadings = options.common_factors == "yes";
   result.rate = rate_from(options.rate_hz);
   result.angle_noise = noise_angle(options.noise_angle_deg);
-  require_positive(setting::las_scale, options.las_scale_m);
+  require_positive(kSetting.las_scale, options.las_scale_m);
   result.writer.las_scale = options.las_scale_m;
   result.writer.gps_time = options.time == "gps";
   if (!options.distribution.empty()) result.distribution.emplace();

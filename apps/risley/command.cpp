@@ -177,14 +177,14 @@ double number_from(const std::string& text, std::string_view name) {
 std::optional<double> rate_from(const std::string& text) {
   if (text == "full") return std::nullopt;
   const double rate = number_from(text, "--rate-hz");
-  require_positive(setting::rate, rate);
+  require_positive(kSetting.rate, rate);
   return rate;
 }
 
 std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg) {
   if (!noise_angle_deg) return std::nullopt;
   const double noise = radians_from_degrees(*noise_angle_deg);
-  require_positive(setting::noise_angle, noise);
+  require_positive(kSetting.noise_angle, noise);
   return noise;
 }
 

@@ -44,8 +44,8 @@ std::optional<estimation::RotorProcess> rotor_process(const std::string& text) {
   if (text == "none") return estimation::kConstantAcceleration;
   estimation::RotorProcess process = estimation::kPaperProcess;
   if (text != "paper") {
-    process.acceleration = radians_from_degrees(number_from(text, flag_of(setting::process_noise)));
-    require_positive(setting::process_noise, process.acceleration);
+    process.acceleration = radians_from_degrees(number_from(text, flag_of(kSetting.process_noise)));
+    require_positive(kSetting.process_noise, process.acceleration);
   }
   return process;
 }

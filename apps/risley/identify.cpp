@@ -81,7 +81,7 @@ void print_outcome(const IdentifiedRecording& outcome) {
 }
 
 ExitStatus run_identify(const IdentifyCommandOptions& options, const CommonOptions& common) {
-  require_positive(setting::fastest, options.fastest_hz);
+  require_positive(kSetting.fastest, options.fastest_hz);
   require_apart(common, {options.output});
   jobs::IdentifyRecordingOptions job;
   job.recording = options.input;

@@ -115,7 +115,7 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
   if (to_stdout && options.coverage) {
     throw InvalidArgument("--coverage prints on stdout, where -o - puts the pattern itself");
   }
-  require_positive(setting::duration, options.duration_s);
+  require_positive(kSetting.duration, options.duration_s);
   require_apart(common, {options.output, options.report});
   const sensors::ScanPatternOptions scan = scan_options(options);
   Json json = Json::object();

@@ -96,7 +96,7 @@ void split_by_device(const ReadingWishes& wishes, jobs::InputPlan& plan) {
 recordings::ReadOptions read_options(const ReadingWishes& wishes) {
   recordings::ReadOptions options;
   options.device = wishes.device;
-  if (wishes.shot_rate_hz) require_positive(setting::shot_rate, *wishes.shot_rate_hz);
+  if (wishes.shot_rate_hz) require_positive(kSetting.shot_rate, *wishes.shot_rate_hz);
   options.shot_rate = wishes.shot_rate_hz;
   if (!wishes.extrinsics_deg.empty()) options.extrinsics = extrinsics_from(wishes.extrinsics_deg);
   return options;

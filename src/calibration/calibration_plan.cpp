@@ -76,7 +76,7 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
         fmt::format("scan half of the time, roll the sensor by 180 degrees on the spot and scan "
                     "the same walls again ({}): their shape then cancels, and directions are known "
                     "to {:.2g} instead of {:.2g} degrees",
-                    name_of(setting::same_walls), degrees_from_radians(f.rolled->total),
+                    name_of(kSetting.same_walls), degrees_from_radians(f.rolled->total),
                     degrees_from_radians(f.datum.total)));
   }
   if (std::hypot(f.datum.sigma_pitch, f.datum.sigma_yaw) > kPoorDatum) {

@@ -819,7 +819,7 @@ void FlightWork::judge_held(HeldParameter held) {
     result_.warnings.push_back(
         fmt::format("the strips contradict what is held: {}; the results are off by more than "
                     "their sigmas. Estimate it as well ({})",
-                    in_words(held, options_.sensor), name_of(setting::free)));
+                    in_words(held, options_.sensor), name_of(kSetting.free)));
   }
   result_.held.push_back(std::move(held));
 }

@@ -161,7 +161,7 @@ FoundPoses poses_before_same_walls(const std::vector<FoundPlane>& found,
       poses.why_not = fmt::format(
           "the walls of {} and {} fit in several ways, as in a square room: say how the sensor was "
           "turned ({})",
-          recordings[r], recordings[poses.reference], name_of(setting::stations));
+          recordings[r], recordings[poses.reference], name_of(kSetting.stations));
       return poses;
     }
     const Vector3d angles = best.turn.eulerAngles(2, 1, 0);

@@ -69,14 +69,14 @@ std::string better_scan() {
       "scan walls that are tilted steeply against the sensor's axis and fill its field of view, or "
       "more distant ones, or the same walls twice from one spot with the sensor rolled by 180 "
       "degrees; or give what is known of walls and poses ({}, {})",
-      name_of(setting::planes), name_of(setting::stations));
+      name_of(kSetting.planes), name_of(kSetting.stations));
 }
 
 CalibrationVerdict undecided_words(const Calibration& c) {
   if (std::any_of(c.prior_tests.begin(), c.prior_tests.end(), contradicts)) {
     return {CalibrationCode::undecided, c.reason,
             fmt::format("check the normals and poses that were stated, or leave them out ({}, {})",
-                        name_of(setting::planes), name_of(setting::stations))};
+                        name_of(kSetting.planes), name_of(kSetting.stations))};
   }
   if (c.unit_doubted) {
     return {CalibrationCode::undecided, c.reason, "state the unit of the ranges in the file"};
@@ -111,7 +111,7 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
         "the walls determine {} only to {:.2g} degrees: walls tilted by 30 degrees or more against "
         "the axis would do better, or a prior ({})",
         estimation::direction_text(c.unobservable.front()), c.unobservable.front().sigma,
-        name_of(setting::prior_sigma));
+        name_of(kSetting.prior_sigma));
   }
   const PriorTest* worst = nullptr;
   for (const PriorTest& test : c.prior_tests) {
@@ -264,7 +264,7 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
   for (const HeldParameter& held : c.held) {
     if (!held.significant) continue;
     return {CalibrationCode::undecided, in_words(held, c.sensor),
-            fmt::format("estimate {} as well ({})", held.name, name_of(setting::free))};
+            fmt::format("estimate {} as well ({})", held.name, name_of(kSetting.free))};
   }
   if (auto contradiction = contradiction_of(c)) return *contradiction;
   // Of the change of some unknowns, and how many these are.

@@ -100,7 +100,7 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
       "points need the whole turn to be stated: say it with {} YAW,PITCH,ROLL",
       degrees_from_radians(turn.yaw), degrees_from_radians(turn.pitch),
       estimate.converged ? "" : ", though the estimate failed: " + estimate.reason,
-      name_of(setting::extrinsics)));
+      name_of(kSetting.extrinsics)));
 }
 
 }  // namespace

@@ -15,14 +15,14 @@
 namespace risley {
 namespace {
 
-constexpr Setting kFilesToRead[] = {setting::accuracy,   setting::calibration,
-                                    setting::control,    setting::flight,
-                                    setting::from,       setting::mount,
-                                    setting::plan,       setting::planes,
-                                    setting::recording,  setting::scene,
-                                    setting::sensor,     setting::stations,
-                                    setting::trajectory, setting::trajectory_errors,
-                                    setting::truth};
+constexpr Setting kFilesToRead[] = {kSetting.accuracy,   kSetting.calibration,
+                                    kSetting.control,    kSetting.flight,
+                                    kSetting.from,       kSetting.mount,
+                                    kSetting.plan,       kSetting.planes,
+                                    kSetting.recording,  kSetting.scene,
+                                    kSetting.sensor,     kSetting.stations,
+                                    kSetting.trajectory, kSetting.trajectory_errors,
+                                    kSetting.truth};
 
 /// What flags end in.
 struct FlagUnit {
@@ -70,7 +70,7 @@ std::string flag_of(Setting setting) { return fmt::format("--{}", setting.flag);
 
 std::string keyword_of(Setting setting) {
   const std::string_view flag = setting.flag;
-  if (flag == setting::bend_time.flag) return "bend_s";  // beside what bends
+  if (flag == kSetting.bend_time.flag) return "bend_s";  // beside what bends
   std::string keyword(flag.substr(0, flag.size() - unit_of(setting).ending.size()));
   std::replace(keyword.begin(), keyword.end(), '-', '_');
   return keyword;

@@ -265,8 +265,8 @@ void say_verdict(Estimate& estimate, const sensors::Sensor& nominal,
       verdict.to_do = fmt::format(
           "see whether sensor, times, frame and elevation are those of the recording ({}, {}, {}, "
           "{}), and whether the sensor stood still",
-          name_of(setting::sensor), name_of(setting::shot_rate), name_of(setting::extrinsics),
-          name_of(setting::mirror));
+          name_of(kSetting.sensor), name_of(kSetting.shot_rate), name_of(kSetting.extrinsics),
+          name_of(kSetting.mirror));
       break;
     case EstimateCode::undecided:
       verdict.words = estimate.reason;

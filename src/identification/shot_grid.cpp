@@ -45,7 +45,7 @@ ShotGrid shot_grid(const estimation::AngleSeries& series, estimation::ShotRange 
     throw EstimationError(
         fmt::format("more than half of the shots have the same time as the shot before: give their "
                     "rate ({}), so that times are counted",
-                    name_of(setting::shot_rate)));
+                    name_of(kSetting.shot_rate)));
   }
   grid.slot.assign(stamp.size(), 0);
   double first = 0;  // time of slot 0 on the fitted grid

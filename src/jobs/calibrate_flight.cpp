@@ -31,17 +31,17 @@ using calibration::RangedRecording;
 /// Wrong wishes are told before an hour of reading.
 void check_flight_options(const CalibrateFlightOptions& options) {
   check_ranged_input(options);
-  if (options.range_noise) require_positive(setting::noise_range, *options.range_noise);
-  if (options.prior_sigma) require_positive(setting::prior_sigma, *options.prior_sigma);
-  require_not_negative(setting::range_offset_sigma, options.range_offset_sigma);
-  if (options.tolerance) require_not_negative(setting::tolerance, *options.tolerance);
-  require_positive(setting::knot_spacing, options.knot_spacing);
-  require_positive(setting::cell_size, options.cell_size);
+  if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(kSetting.prior_sigma, *options.prior_sigma);
+  require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
+  if (options.tolerance) require_not_negative(kSetting.tolerance, *options.tolerance);
+  require_positive(kSetting.knot_spacing, options.knot_spacing);
+  require_positive(kSetting.cell_size, options.cell_size);
   if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
   if (!options.platform.crs.empty() || !options.platform.datum.empty()) {
     throw InvalidArgument(
         fmt::format("{} and {} choose a map, and a flight is calibrated without one",
-                    name_of(setting::crs), name_of(setting::datum)));
+                    name_of(kSetting.crs), name_of(kSetting.datum)));
   }
 }
 
@@ -52,7 +52,7 @@ cloud::MovingPlatform platform_of(const CalibrateFlightOptions& options, const P
         fmt::format("{} states no accuracies: give {}, which says how wrong the trajectory may be "
                     "and for how long. Without it, strips that do not fit may be the fault of "
                     "either the sensor or the trajectory",
-                    options.platform.trajectory, name_of(setting::trajectory_errors)));
+                    options.platform.trajectory, name_of(kSetting.trajectory_errors)));
   }
   return platform;
 }

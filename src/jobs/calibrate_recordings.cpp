@@ -68,21 +68,21 @@ void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings
 
 void check(const CalibrateRecordingsOptions& options) {
   check_ranged_input(options);
-  if (options.range_noise) require_positive(setting::noise_range, *options.range_noise);
-  if (options.prior_sigma) require_positive(setting::prior_sigma, *options.prior_sigma);
-  require_not_negative(setting::range_offset_sigma, options.range_offset_sigma);
-  require_not_negative(setting::patch_thickness, options.patch_thickness);
-  if (options.tolerance) require_not_negative(setting::tolerance, *options.tolerance);
+  if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(kSetting.prior_sigma, *options.prior_sigma);
+  require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
+  require_not_negative(kSetting.patch_thickness, options.patch_thickness);
+  if (options.tolerance) require_not_negative(kSetting.tolerance, *options.tolerance);
   if (options.method == calibration::CalibrationMethod::paper &&
       (options.planes || !options.stations.empty() || options.prior_sigma)) {
     throw InvalidArgument(fmt::format(
         "{} paper cannot be combined with {}, {} or {}: it uses the walls of the recordings alone",
-        name_of(setting::method), name_of(setting::planes), name_of(setting::stations),
-        name_of(setting::prior_sigma)));
+        name_of(kSetting.method), name_of(kSetting.planes), name_of(kSetting.stations),
+        name_of(kSetting.prior_sigma)));
   }
   if (options.same_walls == calibration::SameWalls::yes && options.recordings.size() < 2) {
     throw InvalidArgument(
-        fmt::format("{} needs two recordings or more, found 1", name_of(setting::same_walls)));
+        fmt::format("{} needs two recordings or more, found 1", name_of(kSetting.same_walls)));
   }
   if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
 }
@@ -93,7 +93,7 @@ std::vector<scenes::Station> stations_of(const std::string& path,
   if (path.empty()) {
     if (!names.empty())
       throw InvalidArgument(
-          fmt::format("{} needs {}", name_of(setting::station), name_of(setting::stations)));
+          fmt::format("{} needs {}", name_of(kSetting.station), name_of(kSetting.stations)));
     return {};
   }
   const scenes::Scene scene = scenes::load_scene(path);
@@ -105,7 +105,7 @@ std::vector<scenes::Station> stations_of(const std::string& path,
     throw InvalidArgument(
         fmt::format("{} stations for {} recordings: {} must list one per recording, in their "
                     "order, or name them with {}",
-                    stations.size(), recordings, path, name_of(setting::station)));
+                    stations.size(), recordings, path, name_of(kSetting.station)));
   }
   return stations;
 }

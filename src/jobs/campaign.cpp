@@ -102,12 +102,12 @@ double bytes_of(const CampaignSetting& setting) {
 CampaignChunk range_of(const CampaignPlan& plan, const ChunkNumber& which) {
   if (which.count < 1 || which.number < 1 || which.number > which.count) {
     throw InvalidArgument(fmt::format("{} = {}/{}, wanted I/N with I from 1 to N",
-                                      name_of(setting::chunk), which.number, which.count));
+                                      name_of(kSetting.chunk), which.number, which.count));
   }
   const std::uint64_t cells = plan.cells();
   if (which.count > cells) {
     throw InvalidArgument(fmt::format("{} = {}/{}: the plan has {} cells, so N is at most {}",
-                                      name_of(setting::chunk), which.number, which.count, cells,
+                                      name_of(kSetting.chunk), which.number, which.count, cells,
                                       cells));
   }
   CampaignChunk chunk;

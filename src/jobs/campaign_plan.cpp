@@ -384,7 +384,7 @@ CampaignPlan parse_campaign_plan(const std::string& text, const std::string& pat
                                  std::uint64_t seed) {
   if (seed > kLargestSeed) {
     throw InvalidArgument(
-        fmt::format("{} = {}, allowed: 0 to {}", name_of(setting::seed), seed, kLargestSeed));
+        fmt::format("{} = {}, allowed: 0 to {}", name_of(kSetting.seed), seed, kLargestSeed));
   }
   const YamlNode root = io::parse_yaml(text, path);
   const YamlMap map(root, path, "");

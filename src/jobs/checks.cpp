@@ -18,7 +18,7 @@ namespace risley::jobs {
 void check_truth_name(const std::string& truth) {
   if (std::filesystem::path(truth).extension() != ".yaml") {
     throw InvalidArgument(
-        fmt::format("{} = {}, expected OUT.truth.yaml", name_of(setting::truth), truth));
+        fmt::format("{} = {}, expected OUT.truth.yaml", name_of(kSetting.truth), truth));
   }
 }
 
@@ -26,7 +26,7 @@ void check_truths(const std::vector<std::string>& truths, std::size_t recordings
   if (truths.size() != recordings) {
     throw InvalidArgument(
         fmt::format("{} truth files for {} recordings: give {} once per recording", truths.size(),
-                    recordings, name_of(setting::truth)));
+                    recordings, name_of(kSetting.truth)));
   }
   for (const std::string& truth : truths) check_truth_name(truth);
 }
@@ -44,7 +44,7 @@ void check_truth_is_of_recording(std::span<const Vector3<double>> recorded,
   throw InvalidArgument(fmt::format(
       "{} = {} belongs to another recording: at the same times its beams point "
       "elsewhere, by {:.3g} degrees in the median, allowed {:.0f}",
-      name_of(setting::truth), truth, degrees_from_radians(middle), degrees_from_radians(kMost)));
+      name_of(kSetting.truth), truth, degrees_from_radians(middle), degrees_from_radians(kMost)));
 }
 
 std::string truth_columns(const std::string& truth) {

@@ -59,13 +59,13 @@ void require_same_type(const CloudOfRecordingOptions& options, const sensors::Se
 RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
                                   const Progress& progress) {
   cloud::CloudOptions settings = options.cloud;
-  if (settings.rate) require_positive(setting::rate, *settings.rate);
-  if (settings.angle_noise) require_positive(setting::noise_angle, *settings.angle_noise);
-  require_positive(setting::las_scale, settings.writer.las_scale);
+  if (settings.rate) require_positive(kSetting.rate, *settings.rate);
+  if (settings.angle_noise) require_positive(kSetting.noise_angle, *settings.angle_noise);
+  require_positive(kSetting.las_scale, settings.writer.las_scale);
   if (settings.loadings && !settings.pointing.covariance) {
     throw InvalidArgument(fmt::format("{} yes and {} no cannot be combined",
-                                      name_of(setting::common_factors),
-                                      name_of(setting::covariance)));
+                                      name_of(kSetting.common_factors),
+                                      name_of(kSetting.covariance)));
   }
   const sensors::Sensor calibration = load_result(options.calibration);
   cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read

@@ -86,7 +86,7 @@ std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
         name,
         fmt::format(
             "{} is not in the folder of {}: results elsewhere are opened on demand alone ({})",
-            path, table, name_of(setting::anywhere)),
+            path, table, name_of(kSetting.anywhere)),
         true};
   }
   if (!fs::is_directory(path, ignored) && !fs::is_regular_file(path, ignored)) {
@@ -221,7 +221,7 @@ void leave_out_unlike(ComparedUnits& found, const std::vector<Sensor>& sensors) 
         "{} is a calibration, which says where beams truly go, and {} an estimate of what the "
         "sensor believes: they differ in a unit that never changed ({} compares them)",
         found.results[first ? pair.a : pair.b], found.results[first ? pair.b : pair.a],
-        name_of(setting::unlike));
+        name_of(kSetting.unlike));
   };
   const std::size_t before = found.pairs.size();
   std::string first;
@@ -262,7 +262,7 @@ void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Pro
 }  // namespace
 
 ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& progress) {
-  require_between(setting::false_alarm, options.false_alarm, 0, 1);
+  require_between(kSetting.false_alarm, options.false_alarm, 0, 1);
   ComparedUnits found;
   found.false_alarm = options.false_alarm;
   LoadedResults loaded = load(options, found.left_out, progress);

@@ -26,7 +26,7 @@ recordings::RecordingHeader header_of(const recordings::Reader& reader,
       const std::string told = recordings::device_type_name(device.type);
       if (told != "unknown" && device.type != *options.sensor_type && !device.type_inferred) {
         throw InvalidArgument(
-            fmt::format("{} {}: the recording itself names a {}", name_of(setting::sensor_type),
+            fmt::format("{} {}: the recording itself names a {}", name_of(kSetting.sensor_type),
                         recordings::device_type_name(*options.sensor_type), told));
       }
       device.type = *options.sensor_type;

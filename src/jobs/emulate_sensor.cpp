@@ -106,7 +106,7 @@ class Emulator {
     identity_.code = options.serial.empty() ? scan_.device().serial : options.serial;
     if (identity_.code.empty()) {
       throw InvalidArgument(fmt::format("{} = {}: does not name its serial number; choose one",
-                                        name_of(setting::recording), options.recording));
+                                        name_of(kSetting.recording), options.recording));
     }
     identity_.device_type = scan_.device().type;
     identity_.firmware = {3, 8, 0, 0};
@@ -455,35 +455,35 @@ EmulatedSensor Emulator::run() {
 
 EmulatedSensor emulate_sensor(const EmulateOptions& options, const EmulateNote& note,
                               const Progress& progress) {
-  if (options.duration) require_positive(setting::duration, *options.duration);
-  require_between(setting::speed, options.speed, 1 / kFastest, kFastest);
+  if (options.duration) require_positive(kSetting.duration, *options.duration);
+  require_between(kSetting.speed, options.speed, 1 / kFastest, kFastest);
   const EmulatedClock& clock = options.clock;
-  require_between(setting::time_from, clock.source_from, 0, 1e6);
-  require_between(setting::clock_drift, 1e-6 * clock.drift_ppm, -0.01, 0.01);
-  require_between(setting::clock_jump_by, clock.jump_by, -kFarthestJump, kFarthestJump);
-  if (clock.jump) require_not_negative(setting::clock_jump, *clock.jump);
+  require_between(kSetting.time_from, clock.source_from, 0, 1e6);
+  require_between(kSetting.clock_drift, 1e-6 * clock.drift_ppm, -0.01, 0.01);
+  require_between(kSetting.clock_jump_by, clock.jump_by, -kFarthestJump, kFarthestJump);
+  if (clock.jump) require_not_negative(kSetting.clock_jump, *clock.jump);
   if (clock.source == recordings::TimeReference::utc ||
       clock.source == recordings::TimeReference::relative) {
     throw InvalidArgument(fmt::format("{} = {}, allowed power-on, PTP and PPS",
-                                      name_of(setting::time), to_string(clock.source)));
+                                      name_of(kSetting.time), to_string(clock.source)));
   }
   const EmulatedFaults& faults = options.faults;
-  require_between(setting::loss, faults.loss, 0, 1);
-  require_between(setting::duplication, faults.duplication, 0, 1);
-  require_between(setting::disorder, faults.disorder, 0, 1);
-  require_between(setting::wrong_checksums, faults.wrong_checksums, 0, 1);
-  require_between(setting::disorder_packets, faults.farthest, 1, 1000);
-  require_between(setting::delay, faults.delay, 0, 60);
-  require_between(setting::restart_takes, faults.restart_time, 0, 3600);
+  require_between(kSetting.loss, faults.loss, 0, 1);
+  require_between(kSetting.duplication, faults.duplication, 0, 1);
+  require_between(kSetting.disorder, faults.disorder, 0, 1);
+  require_between(kSetting.wrong_checksums, faults.wrong_checksums, 0, 1);
+  require_between(kSetting.disorder_packets, faults.farthest, 1, 1000);
+  require_between(kSetting.delay, faults.delay, 0, 60);
+  require_between(kSetting.restart_takes, faults.restart_time, 0, 3600);
   if (faults.heartbeat_dies) {
-    require_not_negative(setting::heartbeat_dies, *faults.heartbeat_dies);
+    require_not_negative(kSetting.heartbeat_dies, *faults.heartbeat_dies);
   }
-  if (faults.restart) require_not_negative(setting::restart, *faults.restart);
-  if (faults.bend_time) require_not_negative(setting::bend_time, *faults.bend_time);
+  if (faults.restart) require_not_negative(kSetting.restart, *faults.restart);
+  if (faults.bend_time) require_not_negative(kSetting.bend_time, *faults.bend_time);
   if (faults.bend_time.has_value() == faults.bend.empty()) {
     throw InvalidArgument(
         fmt::format("{} and {} need each other: which parameters change, and when",
-                    name_of(setting::bend), name_of(setting::bend_time)));
+                    name_of(kSetting.bend), name_of(kSetting.bend_time)));
   }
   return Emulator(options, note, progress).run();
 }

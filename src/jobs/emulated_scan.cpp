@@ -49,7 +49,7 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   if (!grid) {
     throw InvalidArgument(fmt::format(
         "{} = {}: the device type {} is none that can be emulated, allowed {}",
-        name_of(setting::sensor), options.sensor, type, recordings::livox_types_text()));
+        name_of(kSetting.sensor), options.sensor, type, recordings::livox_types_text()));
   }
   settings.rate = 1e9 * grid->interval_denominator / grid->interval_numerator_ns;
   if (!settings.scene) settings.scene = scenes::parse_scene(kRoom, "the built-in room");
@@ -82,7 +82,7 @@ EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& 
   if (recorded_) {
     throw InvalidArgument(
         fmt::format("{} changes simulated optics: the shots of a recording are as they are",
-                    name_of(setting::bend)));
+                    name_of(kSetting.bend)));
   }
   SimulationOptions bent = options;
   for (const auto& [name, change] : bend) {

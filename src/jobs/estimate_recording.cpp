@@ -76,13 +76,13 @@ void check_beams(const estimation::PackedSeries& series, const recordings::Truth
 }  // namespace
 
 void check(const EstimateRecordingOptions& options) {
-  if (options.rate) require_positive(setting::rate, *options.rate);
-  if (options.angle_noise) require_positive(setting::noise_angle, *options.angle_noise);
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.angle_noise) require_positive(kSetting.noise_angle, *options.angle_noise);
   if (options.files.states == StatesRows::all && options.method == estimation::Method::ekf &&
       options.rate) {
     throw InvalidArgument(
         fmt::format("{} all needs {} full: the filter has states only at the shots it uses",
-                    name_of(setting::states), name_of(setting::rate)));
+                    name_of(kSetting.states), name_of(kSetting.rate)));
   }
   if (!options.truth.empty()) check_truth_name(options.truth);
 }

@@ -96,7 +96,7 @@ void judge(IdentifiedRecording& result) {
             : fmt::format(
                   "check the times ({} gives the rate of shots that are counted) and that the "
                   "recording is of one sensor at rest",
-                  name_of(setting::shot_rate));
+                  name_of(kSetting.shot_rate));
     return;
   }
   if (!found.decided) {

@@ -277,7 +277,7 @@ std::vector<Input> find_inputs(const InputNames& wanted, const Progress& progres
     }
     if (is_empty) {
       throw InvalidArgument(fmt::format("{}: {} names no recording, expected one a line",
-                                        name_of(setting::list), wanted.list));
+                                        name_of(kSetting.list), wanted.list));
     }
   }
   return std::move(finder).inputs();

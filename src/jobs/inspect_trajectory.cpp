@@ -19,12 +19,12 @@ bool is_trajectory(const InspectTrajectoryOptions& options, const recordings::Re
           trajectories::TrajectoryFileKind::none) {
     if (options.accuracy.empty()) return false;
     throw InvalidArgument(fmt::format("{} goes with a trajectory, and {} is none",
-                                      name_of(setting::accuracy), options.trajectory));
+                                      name_of(kSetting.accuracy), options.trajectory));
   }
   const std::pair<bool, Setting> of_recordings[] = {
-      {reading.shot_rate.has_value(), setting::shot_rate},
-      {reading.extrinsics.has_value(), setting::extrinsics},
-      {!reading.device.empty(), setting::device}};
+      {reading.shot_rate.has_value(), kSetting.shot_rate},
+      {reading.extrinsics.has_value(), kSetting.extrinsics},
+      {!reading.device.empty(), kSetting.device}};
   for (const auto& [given, setting] : of_recordings) {
     if (!given) continue;
     throw InvalidArgument(fmt::format("{} is for recordings, not trajectories", name_of(setting)));
@@ -48,7 +48,7 @@ InspectedTrajectory inspect_trajectory(const InspectTrajectoryOptions& options,
   if (trajectories::trajectory_file_kind(options.trajectory) == TrajectoryFileKind::accuracies) {
     if (!options.accuracy.empty()) {
       throw InvalidArgument(fmt::format("{}: {} itself holds accuracies, expected a trajectory",
-                                        name_of(setting::accuracy), options.trajectory));
+                                        name_of(kSetting.accuracy), options.trajectory));
     }
     take_accuracies(options.trajectory);
     return result;

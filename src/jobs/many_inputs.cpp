@@ -134,15 +134,15 @@ InputPlan plan_inputs(const ManyInputsOptions& options, const InputWork& work,
   const InputNames names{options.names, options.list, {}};
   if (options.names.empty() && options.list.empty()) {
     throw InvalidArgument(
-        fmt::format("INPUT is missing: a recording, or {}", name_of(setting::list)));
+        fmt::format("INPUT is missing: a recording, or {}", name_of(kSetting.list)));
   }
   InputPlan plan;
   plan.many = are_many(names) || !options.table.empty() || options.resume;
   if (!options.table.empty()) tables::TableFile::check_name(options.table);
   if (options.resume && options.output.empty() && options.table.empty()) {
     throw InvalidArgument(fmt::format("{} needs results that stay: give {} or {}",
-                                      name_of(setting::resume), name_of(setting::output),
-                                      name_of(setting::table)));
+                                      name_of(kSetting.resume), name_of(kSetting.output),
+                                      name_of(kSetting.table)));
   }
   // Results of one input without more have always stood alone; a table alone has nothing to resume.
   if (plan.many && (!options.output.empty() || options.resume)) {
@@ -155,7 +155,7 @@ InputPlan plan_inputs(const ManyInputsOptions& options, const InputWork& work,
   const bool into_folder = options.into_folder && !options.output.empty();
   if (into_folder && !work.into_folders && work.ending.empty()) {
     throw InvalidArgument(fmt::format("several files need {}, because {} is a folder",
-                                      name_of(setting::format), name_of(setting::output)));
+                                      name_of(kSetting.format), name_of(kSetting.output)));
   }
   for (const Input& input : find_inputs({options.names, options.list, excluded}, progress)) {
     plan.jobs.push_back({input.path,

@@ -28,13 +28,13 @@ cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& 
   if (files.trajectory.empty()) {
     throw InvalidArgument(
         fmt::format("{} is missing: mount, accuracies, errors and crs are for a sensor that moves",
-                    name_of(setting::trajectory)));
+                    name_of(kSetting.trajectory)));
   }
   if (files.mount.empty()) {
     throw InvalidArgument(
         fmt::format("{} is missing: a file that says how the sensor sits on the platform of the "
                     "trajectory (axes, lever arm, boresight, clock)",
-                    name_of(setting::mount)));
+                    name_of(kSetting.mount)));
   }
   cloud::MovingPlatform platform;
   platform.mount = trajectories::load_mount(files.mount);

@@ -43,9 +43,9 @@ estimation::Observability of_plan(const ObservabilityOptions& options,
 
 JudgedObservability judge_observability(const ObservabilityOptions& options,
                                         const Progress& progress) {
-  require_positive(setting::duration, options.duration);
-  if (options.rate) require_positive(setting::rate, *options.rate);
-  if (options.angle_noise) require_positive(setting::noise_angle, *options.angle_noise);
+  require_positive(kSetting.duration, options.duration);
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.angle_noise) require_positive(kSetting.noise_angle, *options.angle_noise);
   progress.check();
   JudgedObservability result;
   if (options.recording.empty()) {

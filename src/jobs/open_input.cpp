@@ -51,7 +51,7 @@ std::unique_ptr<recordings::Reader> open_input(const recordings::Source& source,
     return open_lidar(source, options, progress);
   } catch (const InvalidArgument& error) {  // several sensors
     throw InvalidArgument(
-        fmt::format("{}, {}: {}", name_of(setting::extrinsics), source.name(), error.what()));
+        fmt::format("{}, {}: {}", name_of(kSetting.extrinsics), source.name(), error.what()));
   }
 }
 

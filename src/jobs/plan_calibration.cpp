@@ -12,11 +12,11 @@ namespace risley::jobs {
 
 PlannedCalibration plan_calibration(const PlanCalibrationOptions& options,
                                     const Progress& progress) {
-  require_positive(setting::duration, options.duration);
-  if (options.rate) require_positive(setting::rate, *options.rate);
-  if (options.range_noise) require_positive(setting::noise_range, *options.range_noise);
-  if (options.prior_sigma) require_positive(setting::prior_sigma, *options.prior_sigma);
-  require_not_negative(setting::range_offset_sigma, options.range_offset_sigma);
+  require_positive(kSetting.duration, options.duration);
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(kSetting.prior_sigma, *options.prior_sigma);
+  require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
   calibration::CalibrationPlan plan;
   plan.scene = options.scene;
   plan.sensor = load_result(options.sensor.empty() ? kUsualSensor : options.sensor);

@@ -69,13 +69,13 @@ void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) 
     throw InvalidArgument(
         fmt::format("{} is missing: a file that says how the sensor sits on the platform and, with "
                     "its sigmas, how well that is known before the flight",
-                    name_of(setting::mount)));
+                    name_of(kSetting.mount)));
   }
   if (files.errors.empty()) {
     throw InvalidArgument(
         fmt::format("{} is missing: a file that says how wrong the trajectory of the flight will "
                     "be, and for how long",
-                    name_of(setting::trajectory_errors)));
+                    name_of(kSetting.trajectory_errors)));
   }
   options.mount = trajectories::load_mount(files.mount);
   options.errors = trajectories::load_error_model(files.errors);
@@ -89,12 +89,12 @@ void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) 
 }
 
 PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress& progress) {
-  if (options.rate) require_positive(setting::rate, *options.rate);
-  if (options.range_noise) require_positive(setting::noise_range, *options.range_noise);
-  if (options.prior_sigma) require_positive(setting::prior_sigma, *options.prior_sigma);
-  require_not_negative(setting::range_offset_sigma, options.range_offset_sigma);
-  require_positive(setting::knot_spacing, options.knot_spacing);
-  require_positive(setting::cell_size, options.cell_size);
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(kSetting.prior_sigma, *options.prior_sigma);
+  require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
+  require_positive(kSetting.knot_spacing, options.knot_spacing);
+  require_positive(kSetting.cell_size, options.cell_size);
   for (const trajectories::ErrorTerm& term : options.errors.terms) {
     if (!term.sigma) {
       throw InvalidArgument(

@@ -34,8 +34,8 @@ void require_recordings(const std::vector<recordings::Source>& recordings) {
 }  // namespace
 
 void check_ranged_input(const RangedInputOptions& options) {
-  if (options.rate) require_positive(setting::rate, *options.rate);
-  if (options.angle_noise) require_positive(setting::noise_angle, *options.angle_noise);
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.angle_noise) require_positive(kSetting.noise_angle, *options.angle_noise);
   require_recordings(options.recordings);
 }
 

@@ -441,7 +441,7 @@ void add_left_out_words(const estimation::SelectionCounts& counts,
     words.push_back(
         fmt::format("{} of {} shots have the time of the shot before, so that nobody knows when "
                     "they were fired, and were left out: {} counts shots, where none is missing",
-                    counts.equal_times, counts.rows, name_of(setting::shot_rate)));
+                    counts.equal_times, counts.rows, name_of(kSetting.shot_rate)));
   }
 }
 

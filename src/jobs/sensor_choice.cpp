@@ -152,7 +152,7 @@ void call_it_a_guess(SensorChoice& choice, const std::string& why) {
   choice.words = why;
   choice.warnings.push_back(fmt::format(
       "the file does not say which sensor recorded it: {} is a guess, {}; {} decides it",
-      choice.sensor.name, why, name_of(setting::sensor)));
+      choice.sensor.name, why, name_of(kSetting.sensor)));
 }
 
 /// Where the values of a calibration are from; empty for other presets.
@@ -203,7 +203,7 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
   choice.warnings.push_back(
       fmt::format("{}; {} is assumed. {} names the sensor, by a preset or a calibration file; the "
                   "prisms of an unknown sensor can be found with identify",
-                  choice.words, choice.sensor.name, name_of(setting::sensor)));
+                  choice.words, choice.sensor.name, name_of(kSetting.sensor)));
 }
 
 std::string span_text(double from, double to) {
@@ -384,7 +384,7 @@ SensorChoice choose_by_name(const FirstShots& shots, const Sensor& named,
   choice.warnings.push_back(
       fmt::format("the file names a {}, but its scan is that of a {}: {}; {} decides which it was",
                   named.model, candidates[found->matches.front().candidate].model,
-                  comparison(choice.misfits), name_of(setting::sensor)));
+                  comparison(choice.misfits), name_of(kSetting.sensor)));
   return choice;
 }
 
@@ -414,7 +414,7 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
     if (named == nullptr) {
       throw InvalidArgument(fmt::format(
           "there is no built-in preset for the recording's sensor ({}): name one with {}",
-          recordings::device_type_name(device.type), name_of(setting::sensor)));
+          recordings::device_type_name(device.type), name_of(kSetting.sensor)));
     }
   }
   if (named != nullptr && (!has_times || !one_sensor)) {
@@ -568,7 +568,7 @@ void require_possible(const SensorChoice& choice, const std::string& recording) 
       fmt::format("{} names {} lines of emitters, but {} ({}) has {} emitter{}: {} names the "
                   "sensor that made it",
                   recording, choice.lines, choice.sensor.name, choice.words, emitters,
-                  emitters == 1 ? "" : "s", name_of(setting::sensor)));
+                  emitters == 1 ? "" : "s", name_of(kSetting.sensor)));
 }
 
 std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {
@@ -578,7 +578,7 @@ std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {
     if (value) {
       if (parameter.kind != ParameterKind::train) {
         throw InvalidArgument(fmt::format("{} {}: only parameters of the prisms can be held",
-                                          name_of(setting::fix), name));
+                                          name_of(kSetting.fix), name));
       }
       sensor.set(name, *value);
     }

@@ -25,7 +25,7 @@ std::int64_t steady_ns() {
 }
 
 void require_find_time(const RecordOptions& options) {
-  require_between(setting::find, options.find_time, 0.1, 3600);
+  require_between(kSetting.find, options.find_time, 0.1, 3600);
 }
 
 BroadcastListener::BroadcastListener(const wire::Interface& interface) {

@@ -145,7 +145,7 @@ InputOutcome convert_poses(const InputJob& job, const ConvertEachOptions& option
                            const Progress& progress) {
   if (options.sensor_type) {
     throw InvalidArgument(fmt::format("{} is for recordings, and {} is a trajectory",
-                                      name_of(setting::sensor_type), job.input));
+                                      name_of(kSetting.sensor_type), job.input));
   }
   const jobs::ConvertedTrajectory done = jobs::convert_trajectory(
       {job.input, job.output, options.format, options.accuracy, options.topic}, progress);

@@ -263,7 +263,7 @@ std::shared_ptr<jobs::PlannedFlightResult> plan_flight(const py::dict& values,
   take_model(options, job);
   take_grid(options, job);
   options.take("empty_circle", job.distribution.empty_circle);
-  require_positive(setting::empty_circle, job.distribution.empty_circle);
+  require_positive(kSetting.empty_circle, job.distribution.empty_circle);
   options.take("seed", job.seed);
   jobs::FlightPlanFiles files;
   options.take("plan", files.plan);
@@ -377,7 +377,7 @@ py::object pattern(const py::dict& values, int threads, const py::object& tell) 
   options.take("format", job.format);
   options.take("output", job.output);
   options.take("duration", job.duration);
-  require_positive(setting::duration, job.duration);
+  require_positive(kSetting.duration, job.duration);
   job.scan = scan_options(options);
   return told_by(tell, threads,
                  [&](const Progress& progress) { return jobs::write_pattern(job, progress); });

@@ -291,12 +291,12 @@ class JudgedReader final : public Reader {
             fmt::format("times begin anew with every message or packet and tell nothing beyond "
                         "one: shots were counted in the order of the file, at the {:.6g} shots per "
                         "second within messages; {} names another rate",
-                        1e9 / device.order.step_ns, name_of(setting::shot_rate)));
+                        1e9 / device.order.step_ns, name_of(kSetting.shot_rate)));
       } else if (device.order.order == RowOrder::constant && !counted_) {
         warn(
             fmt::format("all times are the same, and tell nothing: shots are numbered in the order "
                         "of the file; {} counts their times",
-                        name_of(setting::shot_rate)));
+                        name_of(kSetting.shot_rate)));
       } else if (device.order.order == RowOrder::overlapping) {
         warn(
             "pieces of the recording begin within the time of those before them: several sensors "

@@ -35,7 +35,7 @@ std::uint8_t place_of(const RecordingHeader& header, const std::string& path,
   throw InvalidArgument(fmt::format(
       "{} = \"{}\" names {} of the sensors of {}, expected the serial number, the topic or the "
       "number of one: {}",
-      name_of(setting::device), wanted, found.empty() ? "none" : std::to_string(found.size()), path,
+      name_of(kSetting.device), wanted, found.empty() ? "none" : std::to_string(found.size()), path,
       devices_words(header)));
 }
 

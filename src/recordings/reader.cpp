@@ -115,7 +115,7 @@ void require_one_device(const RecordingHeader& header, const std::string& name) 
   throw InvalidArgument(
       fmt::format("{} holds {} sensors, and one is needed here ({}); {} chooses one, by its serial "
                   "number, its topic or its number in this list",
-                  name, header.devices.size(), devices_words(header), name_of(setting::device)));
+                  name, header.devices.size(), devices_words(header), name_of(kSetting.device)));
 }
 
 void require_times(const RecordingHeader& header) {
@@ -123,7 +123,7 @@ void require_times(const RecordingHeader& header) {
   throw MissingTimes(
       fmt::format("this recording of format {} holds no times of single shots, which are needed "
                   "here; expected a shot rate to count them by: say it with {}",
-                  header.format, name_of(setting::shot_rate)));
+                  header.format, name_of(kSetting.shot_rate)));
 }
 
 Recording load_recording(const Source& source, const Progress& progress,

@@ -317,7 +317,7 @@ std::string TimeGrid::words() const {
       "{}, and {} of {} shots share that of the shot before, which an estimation cannot use: no "
       "even grid of shots explains the times, as where shots are missing. {} counts "
       "shots, where none is missing",
-      rounded, equal_times_, shots_, name_of(setting::shot_rate));
+      rounded, equal_times_, shots_, name_of(kSetting.shot_rate));
 }
 
 }  // namespace risley::recordings

@@ -80,9 +80,9 @@ std::string boresight_advice_html(const CalibrationReport& r) {
            "a longer range to the walls",
            fmt::format(
                "the body turned upside down against a stop between two recordings, given with {}",
-               name_of(setting::stations)),
+               name_of(kSetting.stations)),
            fmt::format("walls whose normals are known in the sensor's frame, given with {}",
-                       name_of(setting::planes))}));
+                       name_of(kSetting.planes))}));
 }
 
 Verdict verdict_of(const CalibrationReport& r) {
@@ -107,7 +107,7 @@ Verdict verdict_of(const CalibrationReport& r) {
       "check in the views below that what was taken for walls really is walls; record more walls "
       "that fill the field of view, near and far and steeply tilted; hold parameters that these "
       "walls do not determine ({}); and check known normals and stations, if any were given",
-      name_of(setting::fix));
+      name_of(kSetting.fix));
   if (r.converged && has_poor_datum(r)) verdict.care_html = boresight_advice_html(r);
   return verdict;
 }

@@ -53,7 +53,7 @@ Verdict verdict_of(const EstimateReport& r) {
       "check that {} is the instrument that made the recording, that its times are right, and "
       "whether the elevation in the file has the opposite sign ({} yes); a longer recording, or {} "
       "full, gives the estimate more data",
-      name_of(setting::sensor), name_of(setting::mirror), name_of(setting::rate));
+      name_of(kSetting.sensor), name_of(kSetting.mirror), name_of(kSetting.rate));
   return verdict;
 }
 
@@ -166,7 +166,7 @@ std::string unobservable_html(const EstimateReport& r) {
                 "<p>The recording does not determine these combinations of the free parameters (in "
                 "units of 1 degree, or 0.01 of an index). Hold one parameter of each with "
                 "<code>{}</code>.</p>\n",
-                name_of(setting::fix)) +
+                name_of(kSetting.fix)) +
             list_html(items);
   } else {
     html += "<p>The recording determines all free parameters.</p>\n";

@@ -108,7 +108,7 @@ Verdict verdict_of(const FlightReport& r) {
       "check the axes of the mount, and that recording and trajectory use the same time; give "
       "larger sigmas to what the mount states too precisely; and hold parameters that this flight "
       "does not determine ({})",
-      name_of(setting::fix));
+      name_of(kSetting.fix));
   if (!r.converged) return verdict;
   if (!(r.datum.rotation <= calibration::kPoorDatum)) verdict.care_html = poor_rotation_html(r);
   if (!(r.rms_after < r.rms_before)) {

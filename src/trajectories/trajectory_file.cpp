@@ -96,7 +96,7 @@ Trajectory load_trajectory(const std::string& path, const Progress& progress,
   if (format == &kRosBagFormat) return read_ros_bag(path, topic, progress);
   if (!topic.empty()) {
     throw InvalidArgument(fmt::format("{} = {}: {} is not a ROS bag, and only bags have topics",
-                                      name_of(setting::trajectory_topic), topic, path));
+                                      name_of(kSetting.trajectory_topic), topic, path));
   }
   if (format != nullptr) return format->read(path, progress);
   if (is_smrmsg(head)) {

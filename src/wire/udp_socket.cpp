@@ -96,12 +96,12 @@ Interface interface_of(const std::string& address) {
     throw InvalidArgument(
         fmt::format("{}: which interface the sensors are at cannot be told, this machine has {}; "
                     "name the address of one",
-                    name_of(setting::interface_address), list_of(real.empty() ? all : real)));
+                    name_of(kSetting.interface_address), list_of(real.empty() ? all : real)));
   }
   const auto wanted = address_from(address);
   if (!wanted) {
     throw InvalidArgument(fmt::format("{} = {}, expected an IPv4 address of this machine: {}",
-                                      name_of(setting::interface_address), address, list_of(all)));
+                                      name_of(kSetting.interface_address), address, list_of(all)));
   }
   for (const Interface& one : all) {
     if (one.address == *wanted) return one;
@@ -114,7 +114,7 @@ Interface interface_of(const std::string& address) {
   }
   throw InvalidArgument(
       fmt::format("{} = {}: no interface of this machine has this address, there are {}",
-                  name_of(setting::interface_address), address, list_of(all)));
+                  name_of(kSetting.interface_address), address, list_of(all)));
 }
 
 struct UdpSocket::Batch {

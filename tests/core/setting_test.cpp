@@ -29,26 +29,26 @@ class SettingTest : public ::testing::Test {
 
 TEST_F(SettingTest, EveryFrontEndWritesNameAndUnitAsItsUsersDo) {
   const double angle = radians_from_degrees(-0.3);
-  EXPECT_EQ(name_of(setting::noise_angle), "option noise_angle");
+  EXPECT_EQ(name_of(kSetting.noise_angle), "option noise_angle");
   write_settings_as(SettingStyle::flag);
-  EXPECT_EQ(refusal(setting::noise_angle, angle), "--noise-angle-deg = -0.3 deg, allowed above 0");
-  EXPECT_EQ(refusal(setting::rate, 0), "--rate-hz = 0 Hz, allowed above 0");
-  EXPECT_EQ(refusal(setting::delay, -0.25), "--delay-ms = -250 ms, allowed above 0");
+  EXPECT_EQ(refusal(kSetting.noise_angle, angle), "--noise-angle-deg = -0.3 deg, allowed above 0");
+  EXPECT_EQ(refusal(kSetting.rate, 0), "--rate-hz = 0 Hz, allowed above 0");
+  EXPECT_EQ(refusal(kSetting.delay, -0.25), "--delay-ms = -250 ms, allowed above 0");
   write_settings_as(SettingStyle::keyword);
-  EXPECT_EQ(refusal(setting::noise_angle, -1), "noise_angle = -1 rad, allowed above 0");
-  EXPECT_EQ(refusal(setting::clock_drift, -1e-6), "clock_drift = -1e-06, allowed above 0");
-  EXPECT_EQ(name_of(setting::bend_time), "bend_s");
+  EXPECT_EQ(refusal(kSetting.noise_angle, -1), "noise_angle = -1 rad, allowed above 0");
+  EXPECT_EQ(refusal(kSetting.clock_drift, -1e-6), "clock_drift = -1e-06, allowed above 0");
+  EXPECT_EQ(name_of(kSetting.bend_time), "bend_s");
 }
 
 TEST_F(SettingTest, WhatIsNoNumberIsNeverAllowed) {
   for (const double value :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-    EXPECT_THROW(require_positive(setting::rate, value), InvalidArgument);
-    EXPECT_THROW(require_not_negative(setting::rate, value), InvalidArgument);
-    EXPECT_THROW(require_between(setting::rate, value, 0, 1), InvalidArgument);
+    EXPECT_THROW(require_positive(kSetting.rate, value), InvalidArgument);
+    EXPECT_THROW(require_not_negative(kSetting.rate, value), InvalidArgument);
+    EXPECT_THROW(require_between(kSetting.rate, value, 0, 1), InvalidArgument);
   }
-  EXPECT_NO_THROW(require_not_negative(setting::rate, 0));
-  EXPECT_NO_THROW(require_between(setting::loss, 1, 0, 1));
+  EXPECT_NO_THROW(require_not_negative(kSetting.rate, 0));
+  EXPECT_NO_THROW(require_between(kSetting.loss, 1, 0, 1));
 }
 
 TEST_F(SettingTest, FilesToReadAreKnownByTheirOptions) {

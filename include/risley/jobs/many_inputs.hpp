@@ -86,6 +86,7 @@ struct InputWork {
   /// What came of a job whose exception is being handled.
   std::function<InputOutcome(const InputJob&)> failed;
 
+  /// Those of `files`, or the output.
   std::vector<std::string> files_of(const InputJob& job) const;
 };
 

@@ -40,6 +40,7 @@ using Tell = std::function<void(const std::string& words, bool is_wrong)>;
 // A job of each of many inputs: the options are those of one, without its recording and output.
 // What is wrong with them is told before anything is read: InvalidArgument.
 
+/// As jobs::estimate_recording().
 jobs::InputWork estimate_each(jobs::EstimateRecordingOptions options, const Tell& tell);
 /// Each recording calibrated on its own.
 jobs::InputWork calibrate_each(jobs::CalibrateRecordingsOptions options, const Tell& tell);
@@ -55,12 +56,15 @@ struct InspectEachOptions {
   recordings::ReadOptions reading;
   std::string accuracy, topic;  ///< as jobs::InspectTrajectoryOptions
 };
+/// As jobs::inspect_recording() and jobs::inspect_trajectory().
 jobs::InputWork inspect_each(InspectEachOptions options, const Tell& tell);
 
+/// Of recordings and trajectories.
 struct ConvertEachOptions : InspectEachOptions {
   std::string format;                       ///< empty: as the outputs' names end
   std::optional<std::uint8_t> sensor_type;  ///< as jobs::ConvertRecordingOptions
 };
+/// As jobs::convert_recording() and jobs::convert_trajectory().
 jobs::InputWork convert_each(ConvertEachOptions options, const Tell& tell);
 
 /// One of "results": "status" and "message" stand where an object of its own has "error".

@@ -47,7 +47,7 @@ std::size_t chosen_topic(const bags::Bag& bag, const std::string& name) {
   }
   if (name.empty() && poses.size() > 1) {
     throw InvalidArgument(fmt::format("{} is missing: {} holds {} topics of poses, {}",
-                                      name_of(setting::trajectory_topic), bag.path(), poses.size(),
+                                      name_of(kSetting.trajectory_topic), bag.path(), poses.size(),
                                       bags::words_of(poses)));
   }
   const auto is_meant = [&](const bags::Topic& topic) {
@@ -57,7 +57,7 @@ std::size_t chosen_topic(const bags::Bag& bag, const std::string& name) {
   const auto found = std::find_if(topics.begin(), topics.end(), is_meant);
   if (found == topics.end()) {
     throw InvalidArgument(fmt::format("{} = {}: {} holds the poses of {}",
-                                      name_of(setting::trajectory_topic), name, bag.path(),
+                                      name_of(kSetting.trajectory_topic), name, bag.path(),
                                       bags::words_of(poses)));
   }
   if (std::find_if(found + 1, topics.end(), is_meant) != topics.end()) {
