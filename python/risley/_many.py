@@ -117,7 +117,7 @@ def calibrate_many(inputs: Union[Path, Sequence[Path]] = (), *, list: Path = "",
     """
     if "trajectory" in options:
         raise ValueError("trajectory is not for many inputs: a flight is calibrated as a whole")
-    return _many("calibrate", calibrate, locals(), options)
+    return _many("calibrate", calibrate, locals(), options, recordings="each")
 
 
 def cloud_many(inputs: Union[Path, Sequence[Path]], calibration: Path, output: Path, *,
