@@ -26,11 +26,11 @@ from risley._sensors import load_sensor, presets
 __all__ = [
     "Calibration", "Cancelled", "ChunkReader", "Cloud", "Device", "Directions", "Estimate",
     "EstimationError", "FileError", "FlightCalibration", "Identification", "Inverse",
-    "Linearisation", "ManyResults", "MissingFileError", "NetworkError", "Pattern", "Plan", "PrismTrain", "Rays",
-    "Recording", "RecordingHeader", "Sensor", "Simulation", "Solution", "Stop", "Verdict",
-    "__version__", "calibrate", "calibrate_many", "campaign", "cloud", "cloud_many", "compare",
-    "convert_many", "coverage", "emulate", "estimate", "estimate_many",
-    "find_sensors", "from_arrays", "identify", "info", "info_many", "invert", "linearise", "load_sensor",
-    "observability", "observe", "pattern", "plan", "presets", "rays", "read", "read_chunks",
-    "record", "simulate", "write",
+    "Linearisation", "ManyResults", "MissingFileError", "NetworkError", "Pattern", "Plan",
+    "PrismTrain", "Rays", "Recording", "RecordingHeader", "Sensor", "Simulation", "Solution",
+    "Stop", "Verdict", "__version__", "calibrate", "calibrate_many", "campaign", "cloud",
+    "cloud_many", "compare", "convert_many", "coverage", "emulate", "estimate",
+    "estimate_many", "find_sensors", "from_arrays", "identify", "info", "info_many", "invert",
+    "linearise", "load_sensor", "observability", "observe", "pattern", "plan", "presets",
+    "rays", "read", "read_chunks", "record", "simulate", "write",
 ]
