@@ -5,14 +5,12 @@
 #include <set>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/setting.hpp"
 #include "risley/jobs/beam_origins.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
-#include "risley/jobs/recording_input.hpp"
 #include "risley/report/beam_origin_page.hpp"
 #include "risley/report/cloud_page.hpp"
 #include "risley/report/distribution_page.hpp"
@@ -23,7 +21,6 @@
 #include "many_files.hpp"
 #include "platform_options.hpp"
 #include "reading_options.hpp"
-#include "recording_text.hpp"
 #include "result_folder.hpp"
 
 namespace risley::app {

@@ -3,7 +3,6 @@
 #include "command.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -15,8 +14,6 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
-#include <new>
-#include <set>
 #include <thread>
 #include <unordered_map>
 

@@ -3,27 +3,20 @@
 #include <algorithm>
 #include <map>
 #include <memory>
-#include <optional>
 #include <set>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "risley/cloud/cloud_writer.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
-#include "risley/jobs/convert_recording.hpp"
-#include "risley/jobs/convert_trajectory.hpp"
 #include "risley/recordings/writer.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
 #include "reading_options.hpp"
-#include "recording_text.hpp"
-#include "trajectory_text.hpp"
 
 namespace risley::app {
 namespace {

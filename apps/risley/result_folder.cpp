@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <fstream>
 #include <utility>
-#include <variant>
 
 #include <fmt/format.h>
 
