@@ -65,8 +65,8 @@ std::string journal_beside(const std::string& result) {
   return path.string() + std::string(kJournalEnding);
 }
 
-void make_folder_for(const std::string& output) {
-  const fs::path folder = fs::path(output).parent_path();
+void make_folder_for(const std::string& file) {
+  const fs::path folder = fs::path(file).parent_path();
   if (!folder.empty()) io::make_folder(folder.string());
 }
 
@@ -274,6 +274,7 @@ InputRun::InputRun(const InputPlan& plan, const InputWork& work, const std::stri
       skipped_(plan.jobs.size()) {
   if (!plan.folder.empty()) lock_.emplace(plan.folder);
   if (!options.table.empty()) const io::OutputFile can_be_written(options.table);
+  make_folder_for(plan.journal);
   journal_ = std::make_unique<Journal>(plan.journal, resume_);
 }
 

@@ -28,7 +28,7 @@ class ManyInputsTest : public ::testing::Test {
     fs::create_directories(folder_ / "in/deep");
     for (const char* name : {"in/a.csv", "in/deep/b.csv", "in/fails.csv"}) write(name, name);
     options_.names = {(folder_ / "in").string()};
-    options_.output = (folder_ / "out").string();
+    options_.output = (folder_ / "new/out").string();
     options_.into_folder = true;
     work_.ending = ".txt";
     work_.run = [this](const InputJob& job, const Progress&) {
@@ -77,7 +77,7 @@ TEST_F(ManyInputsTest, OneThatFailsDoesNotStopTheRest) {
   EXPECT_EQ(status_, kBadFile);
   EXPECT_EQ(counted_, 4U);
   EXPECT_THAT(texts_, ElementsAre("a", "deep/b", "fails failed"));
-  EXPECT_TRUE(fs::exists(folder_ / "out/deep/b.txt"));
+  EXPECT_TRUE(fs::exists(folder_ / "new/out/deep/b.txt"));
 }
 
 TEST_F(ManyInputsTest, WhatIsWholeIsNotMadeAgain) {
@@ -90,20 +90,20 @@ TEST_F(ManyInputsTest, WhatIsWholeIsNotMadeAgain) {
   EXPECT_THAT(run("other work"), ElementsAre(0, 2, 1, 1));
   write("in/a.csv", "other bytes");
   EXPECT_THAT(run("other work"), ElementsAre(1, 1, 1, 2));
-  write("out/deep/b.txt", "edited");
+  write("new/out/deep/b.txt", "edited");
   EXPECT_THAT(run("other work"), ElementsAre(1, 1, 1, 2));
-  fs::remove(folder_ / "out/a.txt");
+  fs::remove(folder_ / "new/out/a.txt");
   EXPECT_THAT(run("other work"), ElementsAre(1, 1, 1, 2));
 }
 
 TEST_F(ManyInputsTest, AJournalThatACrashCutOffIsGoneOnWith) {
   run();
   options_.resume = true;
-  const fs::path journal = folder_ / "out.records.jsonl";
+  const fs::path journal = folder_ / "new/out.records.jsonl";
   fs::resize_file(journal, fs::file_size(journal) - 10);
   EXPECT_LE(run()[3], 2U);
   EXPECT_THAT(run(), ElementsAre(0, 2, 1, 1));
-  write("out.records.jsonl", "somebody's own notes\n");
+  write("new/out.records.jsonl", "somebody's own notes\n");
   EXPECT_THROW(run(), FileError);
 }
 
