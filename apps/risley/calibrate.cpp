@@ -9,6 +9,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/calibrate_flight.hpp"
 #include "risley/jobs/calibrate_recordings.hpp"
 #include "risley/jobs/inputs.hpp"
@@ -19,7 +20,6 @@
 #include "command.hpp"
 #include "flight_text.hpp"
 #include "many_files.hpp"
-#include "option_names.hpp"
 #include "parameter_choice.hpp"
 #include "plan_flight.hpp"
 #include "platform_options.hpp"
@@ -34,12 +34,12 @@ using calibration::CalibrationCode;
 using jobs::CalibratedRecordings;
 
 struct CalibrateCommandOptions {
-  std::vector<std::string> inputs, station_names, truths;
-  ManyWishes many;
+  std::vector<std::string> station_names, truths;
+  jobs::ManyInputsOptions many;  ///< with the recordings and the folder of results
   jobs::PlatformFiles platform;
-  std::string folder, method = "adjustment", rate_hz = "full", sensor, planes, control, stations,
-                      beam_origin = "yes", walls = "uneven", states = "knots", mirror = "auto",
-                      plan, scene, page;
+  std::string method = "adjustment", rate_hz = "full", sensor, planes, control, stations,
+              beam_origin = "yes", walls = "uneven", states = "knots", mirror = "auto", plan, scene,
+              page;
   std::optional<double> noise_angle_deg, noise_range_m, prior_sigma_deg, tolerance_deg;
   std::optional<double> range_offset_sigma_m, patch_thickness_m, knot_spacing_s, cell_size_m;
   double duration_s = 10.0, empty_circle_m = cloud::PointDistributionOptions{}.empty_circle;
@@ -51,16 +51,9 @@ struct CalibrateCommandOptions {
 /// What all kinds of calibrations share; `Job` is the options of one.
 template <class Job>
 void take_common(const CalibrateCommandOptions& options, Job& job) {
-  if (options.noise_range_m) check_positive(*options.noise_range_m, "--noise-range-m", "m");
-  if (options.range_offset_sigma_m) {
-    check_not_negative(*options.range_offset_sigma_m, "--range-offset-sigma-m", "m");
-    job.range_offset_sigma = *options.range_offset_sigma_m;
-  }
-  if (options.prior_sigma_deg) {
-    check_positive(*options.prior_sigma_deg, "--prior-sigma-deg", "deg");
-    job.prior_sigma = radians_from_degrees(*options.prior_sigma_deg);
-  }
-  if (options.rate_hz != "full") job.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
+  if (options.range_offset_sigma_m) job.range_offset_sigma = *options.range_offset_sigma_m;
+  if (options.prior_sigma_deg) job.prior_sigma = radians_from_degrees(*options.prior_sigma_deg);
+  job.rate = rate_from(options.rate_hz);
   job.sensor = options.sensor;
   job.fixed = held_parameters(options.parameters.fixed);
   job.additional = options.parameters.freed;
@@ -70,14 +63,8 @@ void take_common(const CalibrateCommandOptions& options, Job& job) {
 /// What flights share, flown and planned.
 template <class Job>
 void take_grid(const CalibrateCommandOptions& options, Job& job) {
-  if (options.knot_spacing_s) {
-    check_positive(*options.knot_spacing_s, "--knot-spacing-s", "s");
-    job.knot_spacing = *options.knot_spacing_s;
-  }
-  if (options.cell_size_m) {
-    check_positive(*options.cell_size_m, "--cell-size-m", "m");
-    job.cell_size = *options.cell_size_m;
-  }
+  if (options.knot_spacing_s) job.knot_spacing = *options.knot_spacing_s;
+  if (options.cell_size_m) job.cell_size = *options.cell_size_m;
 }
 
 /// What recordings of walls and of a flight share.
@@ -85,17 +72,14 @@ template <class Job>
 void take_recordings(const CalibrateCommandOptions& options, const CommonOptions& common,
                      Job& job) {
   take_common(options, job);
-  job.recordings.assign(options.inputs.begin(), options.inputs.end());
+  job.recordings.assign(options.many.names.begin(), options.many.names.end());
   job.reading = read_options(options.reading);
   job.angle_noise = noise_angle(options.noise_angle_deg);
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
   job.seed = common.seed;
-  if (options.tolerance_deg) {
-    check_not_negative(*options.tolerance_deg, "--tolerance-deg", "deg");
-    job.tolerance = radians_from_degrees(*options.tolerance_deg);
-  }
+  if (options.tolerance_deg) job.tolerance = radians_from_degrees(*options.tolerance_deg);
   job.truths = options.truths;
-  job.details = !options.folder.empty() && !options.no_report;
+  job.details = !options.many.output.empty() && !options.no_report;
   job.force = options.force;
 }
 
@@ -104,38 +88,20 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
   jobs::CalibrateRecordingsOptions job;
   take_recordings(options, common, job);
   job.beam_origin = options.beam_origin == "yes";
-  if (options.patch_thickness_m) {
-    check_not_negative(*options.patch_thickness_m, "--patch-thickness-m", "m");
-    job.patch_thickness = *options.patch_thickness_m;
-  }
+  if (options.patch_thickness_m) job.patch_thickness = *options.patch_thickness_m;
   job.flat_walls = options.walls == "flat";
   if (options.same_walls) job.same_walls = calibration::SameWalls::yes;
   if (options.method == "paper") job.method = calibration::CalibrationMethod::paper;
   if (!options.planes.empty()) job.planes = scenes::load_scene(options.planes);
-  job.stations = jobs::stations_of(options.stations, options.station_names, options.inputs.size());
-  std::vector<std::string> states = {"states.nc"};
-  for (std::size_t i = 1; i <= options.inputs.size(); ++i) {
-    states.push_back(fmt::format("states_{}.nc", i));
-  }
-  require_folder_apart(common, options.folder, states);
-  job.files = result_files(options.folder, options.states, common);
+  job.stations =
+      jobs::stations_of(options.stations, options.station_names, options.many.names.size());
+  job.files = result_files(options.many.output, options.states, common);
   if (job.details) {
     job.texts = [](const CalibratedRecordings& outcome) {
       return report_texts(report::report_of(outcome));
     };
   }
   return job;
-}
-
-/// What is said of a calibration is in words of the command.
-template <class Outcome>
-void put_flags_into(Outcome& outcome) {
-  auto& c = outcome.calibration;
-  c.reason = with_flags(c.reason);
-  put_flags(outcome.warnings);
-  put_flags(outcome.choice.warnings);
-  put_flags(c.verdict);
-  put_flags(c.warnings);
 }
 
 const char* why_not_written(CalibrationCode code) {
@@ -157,12 +123,11 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
     ProgressBar bar("calibrating", common);
     return calibrate(bar.progress());
   }();
-  put_flags_into(outcome);
   const auto& c = outcome.calibration;
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   for (const std::string& warning : c.warnings) spdlog::warn(warning);
   if (!c.converged) log_failure(c.reason, common);
-  if (c.converged && !outcome.calibration_written && !options.folder.empty()) {
+  if (c.converged && !outcome.calibration_written && !options.many.output.empty()) {
     spdlog::warn("calibration.yaml was not written, because {}: --force writes it",
                  why_not_written(c.verdict.code));
   }
@@ -174,46 +139,23 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
   return c.converged ? kDone : kNumbersFailed;
 }
 
-/// One of several recordings, each calibrated on its own.
-FileOutcome calibrate_one(const FileJob& file, const CalibrateCommandOptions& options,
-                          const CommonOptions& common, const Progress& progress) {
-  CalibrateCommandOptions own = options;
-  own.inputs = {file.input};
-  own.folder = file.output;
-  CalibratedRecordings found = jobs::calibrate_recordings(job_of(own, common), progress);
-  put_flags_into(found);
-  const calibration::Calibration& c = found.calibration;
-  for (const std::string& words : found.warnings) spdlog::warn("{}: {}", file.input, words);
-  for (const std::string& words : c.warnings) spdlog::warn("{}: {}", file.input, words);
-  return judged_outcome(file, json::of(found), c.converged ? "" : c.reason,
-                        fmt::format("{}, {} points on {} planes", jobs::sensor_name(found.choice),
-                                    grouped(c.points), c.planes.size()));
-}
-
-ExitStatus calibrate_each(const CalibrateCommandOptions& options, const CLI::App& verb,
+ExitStatus calibrate_each(CalibrateCommandOptions& options, const CLI::App& verb,
                           const CommonOptions& common) {
-  const FileJobs files = file_jobs(options.many, options.folder, are_several(options.many), "");
+  options.many.into_folder = are_several(options.many);
+  CalibrateCommandOptions one = options;
+  one.many.names.resize(1);
+  const jobs::InputWork work = json::calibrate_each(job_of(one, common), log_words);
+  const jobs::InputPlan plan = jobs::plan_inputs(options.many, work, cancellable());
   const auto one_alone = [&](bool given, const char* option) {
-    if (!given || files.jobs.size() == 1) return;
+    if (!given || plan.jobs.size() == 1) return;
     throw InvalidArgument(fmt::format(
         "{} is of one recording, and there are {}: with --table or --resume each is calibrated on "
         "its own",
-        option, files.jobs.size()));
+        option, plan.jobs.size()));
   };
   one_alone(!options.truths.empty(), "--truth");
   one_alone(!options.stations.empty(), "--stations");
-  CalibrateCommandOptions first = options;
-  first.inputs = {files.jobs.front().input};
-  first.folder.clear();
-  job_of(first, common);  // wrong options are told before anything is read
-  FileWork work;
-  work.label = "calibrating";
-  work.into_folders = true;
-  work.files = [](const FileJob& file) { return result_files_of(file.output); };
-  work.run = [&](const FileJob& file, const Progress& progress) {
-    return calibrate_one(file, options, common, progress);
-  };
-  return run_file_jobs(files, work, options.many, verb, common);
+  return run_inputs(plan, work, options.many, verb, common);
 }
 
 jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& options,
@@ -223,8 +165,8 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
   job.platform = options.platform;
   job.control = options.control;
   take_grid(options, job);
-  require_folder_apart(common, options.folder, {"mount.yaml", "trajectory.csv"});
-  job.files = result_files(options.folder, "none", common);
+  require_folder_apart(common, options.many.output, {"mount.yaml", "trajectory.csv"});
+  job.files = result_files(options.many.output, "none", common);
   if (job.details) {
     job.texts = [](const jobs::CalibratedFlight& outcome) {
       return report_texts(report::report_of(outcome));
@@ -234,7 +176,7 @@ jobs::CalibrateFlightOptions flight_job_of(const CalibrateCommandOptions& option
 }
 
 ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions& common) {
-  if (!options.inputs.empty()) throw InvalidArgument("--plan takes no recordings");
+  if (!options.many.names.empty()) throw InvalidArgument("--plan takes no recordings");
   if (!options.many.table.empty() || options.many.resume || options.no_report) {
     throw InvalidArgument("--table, --resume and --no-report go with recordings, not with --plan");
   }
@@ -242,7 +184,7 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
     jobs::PlanFlightOptions job;
     take_common(options, job);
     take_grid(options, job);
-    check_positive(options.empty_circle_m, "--empty-circle-m", "m");
+    require_positive(kSetting.empty_circle, options.empty_circle_m);
     job.distribution.empty_circle = options.empty_circle_m;
     job.seed = common.seed;
     return run_flight_plan(job, options.plan, options.platform, options.scene, options.page,
@@ -255,7 +197,6 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
         "and --cell-size-m go with a flight, which has strips",
         options.plan));
   }
-  check_positive(options.duration_s, "--duration-s", "s");
   jobs::PlanCalibrationOptions job;
   job.flat_walls = options.walls == "flat";
   take_common(options, job);
@@ -285,17 +226,17 @@ CommonOptions with_recordings_found(CalibrateCommandOptions& options, CommonOpti
       found.push_back(std::move(input.path));
     }
   };
-  for (const std::string& name : options.inputs) {
+  for (const std::string& name : options.many.names) {
     jobs::are_many({{name}, "", {}}) ? add({{name}, "", {}}) : found.push_back(name);
   }
   if (!options.many.list.empty()) {
     add({{}, options.many.list, {}});
     common.files.push_back(options.many.list);
   }
-  if (found == options.inputs) return common;
-  options.inputs = std::move(found);
+  if (found == options.many.names) return common;
+  options.many.names = std::move(found);
   common.inputs.clear();
-  for (const std::string& name : options.inputs) add_files(name, common.inputs);
+  for (const std::string& name : options.many.names) add_files(name, common.inputs);
   return common;
 }
 
@@ -315,16 +256,14 @@ Run declare_calibrate(CLI::App& verb) {
           "Calibrate every recording on its own, but skip those whose results are whole and were "
           "made from the same bytes with the same options and version");
   verb.add_option(
-      "-o,--output", o.folder,
+      "-o,--output", o.many.output,
       "Folder to write calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html "
       "to; with --table a folder of such folders, placed as the recordings are (default: none)");
   verb.add_flag("--no-report", o.no_report,
                 "Write no report.json and report.html, and do not compute what only they show");
-  verb.add_option("--method", o.method,
-                  "adjustment: weighted, of all recordings together; paper: unweighted distances "
-                  "from planes fitted by SVD")
-      ->check(CLI::IsMember({"adjustment", "paper"}))
-      ->capture_default_str();
+  add_choice(verb, "--method", o.method, {"adjustment", "paper"},
+             "adjustment: weighted, of all recordings together; paper: unweighted distances "
+             "from planes fitted by SVD");
   verb.add_option(
       "--planes", o.planes,
       "Walls by name (YAML); the normal of a wall with sigma_deg is known (default: walls "
@@ -389,12 +328,10 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
                   "Prior: 1 sigma of the range offset about what the sensor states, m; 0 holds it "
                   "there (default: 0.05, for a flight 0.02)");
-  verb.add_option(
-          "--walls", o.walls,
-          "'uneven': walls wave by millimetres, and ranges have errors near the sensor, on tilted "
-          "and on dark surfaces; 'flat': exact planes and a constant error, as in the paper")
-      ->check(CLI::IsMember({"uneven", "flat"}))
-      ->capture_default_str();
+  add_choice(
+      verb, "--walls", o.walls, {"uneven", "flat"},
+      "'uneven': walls wave by millimetres, and ranges have errors near the sensor, on tilted "
+      "and on dark surfaces; 'flat': exact planes and a constant error, as in the paper");
   verb.add_option("--patch-thickness-m", o.patch_thickness_m,
                   "1 sigma of how far dark or light patches stand off their wall, m: 0 for paint, "
                   "which makes the range error that depends on intensity exact (default: 0.01)");
@@ -405,19 +342,12 @@ Run declare_calibrate(CLI::App& verb) {
   verb.add_option("--tolerance-deg", o.tolerance_deg,
                   "Root mean square error of directions up to which a unit counts as sound, deg "
                   "(default: the manufacturer's specification, as in the preset)");
-  verb.add_option("--beam-origin", o.beam_origin,
-                  "Let beams start where they leave the last prism; 'no': at the sensor's origin")
-      ->check(CLI::IsMember({"yes", "no"}))
-      ->capture_default_str();
-  verb.add_option(
-          "--states", o.states,
-          "Rotor states to write: 'knots': at one shot every 2 ms; 'all': at all shots; 'none'")
-      ->check(CLI::IsMember({"knots", "all", "none"}))
-      ->capture_default_str();
-  verb.add_option("--mirror", o.mirror,
-                  "Whether the elevation in the files has the opposite sign; 'auto' finds out")
-      ->check(CLI::IsMember({"auto", "yes", "no"}))
-      ->capture_default_str();
+  add_choice(verb, "--beam-origin", o.beam_origin, {"yes", "no"},
+             "Let beams start where they leave the last prism; 'no': at the sensor's origin");
+  add_choice(verb, "--states", o.states, {"knots", "all", "none"},
+             "Rotor states to write: 'knots': at one shot every 2 ms; 'all': at all shots; 'none'");
+  add_choice(verb, "--mirror", o.mirror, {"auto", "yes", "no"},
+             "Whether the elevation in the files has the opposite sign; 'auto' finds out");
   verb.add_flag("--force", o.force,
                 "Write calibration.yaml even where it does not improve on what the sensor believes")
       ->excludes("--plan");
@@ -428,15 +358,13 @@ Run declare_calibrate(CLI::App& verb) {
       ->allow_extra_args(false)
       ->take_all();
   return [options, &verb](const CommonOptions& typed) {
-    options->inputs = options->many.inputs;
     // `--truth A B` leaves B among the recordings.
     const auto truth = std::stable_partition(
-        options->inputs.begin(), options->inputs.end(),
+        options->many.names.begin(), options->many.names.end(),
         [](const std::string& input) { return !input.ends_with(".truth.yaml"); });
-    options->truths.insert(options->truths.end(), truth, options->inputs.end());
-    options->inputs.erase(truth, options->inputs.end());
+    options->truths.insert(options->truths.end(), truth, options->many.names.end());
+    options->many.names.erase(truth, options->many.names.end());
     if (!options->plan.empty()) return run_plan(*options, typed);
-    options->many.inputs = options->inputs;
     if (!options->many.table.empty() || options->many.resume) {
       return calibrate_each(*options, verb, typed);
     }
@@ -444,7 +372,8 @@ Run declare_calibrate(CLI::App& verb) {
     if ((options->knot_spacing_s || options->cell_size_m) && !moves(options->platform)) {
       throw InvalidArgument("--knot-spacing-s and --cell-size-m go with --trajectory or --plan");
     }
-    if (options->inputs.empty()) throw InvalidArgument("INPUT is missing: a recording, or --plan");
+    if (options->many.names.empty())
+      throw InvalidArgument("INPUT is missing: a recording, or --plan");
     if (moves(options->platform)) {
       return run_job(
           *options, common,
@@ -453,6 +382,11 @@ Run declare_calibrate(CLI::App& verb) {
           },
           print_flight);
     }
+    std::vector<std::string> states = {"states.nc"};
+    for (std::size_t i = 1; i <= options->many.names.size(); ++i) {
+      states.push_back(fmt::format("states_{}.nc", i));
+    }
+    require_folder_apart(common, options->many.output, states);
     return run_job(
         *options, common,
         [&](const Progress& progress) {

@@ -15,6 +15,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
+#include "risley/json/many_results.hpp"
 
 #include "command.hpp"
 #include "recording_text.hpp"
@@ -115,7 +116,7 @@ ExitStatus tell_merged(const jobs::CampaignResult& merged, const CampaignCommand
   json["summary"] = summary;
   for (const std::string& warning : merged.warnings) spdlog::warn(warning);
   if (common.json) {
-    print_json(common, with_status(json, damage));
+    print_json(common, json::with_status(json, damage));
   } else {
     print_merged(merged);
   }

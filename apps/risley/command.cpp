@@ -3,7 +3,6 @@
 #include "command.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -15,8 +14,6 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
-#include <new>
-#include <set>
 #include <thread>
 #include <unordered_map>
 
@@ -26,16 +23,16 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/hashes/sha256.hpp"
 #include "risley/io/file_identity.hpp"
 #include "risley/io/temporaries.hpp"
 #include "risley/jobs/result_files.hpp"
+#include "risley/json/many_results.hpp"
 #include "risley/recordings/reader.hpp"
-#include "risley/wire/udp_socket.hpp"
 
 namespace risley::app {
 namespace {
@@ -76,6 +73,11 @@ std::string duration_text(double seconds) {
 
 }  // namespace
 
+CLI::Option* add_choice(CLI::App& verb, const std::string& name, std::string& value,
+                        const std::vector<std::string>& choices, const std::string& words) {
+  return verb.add_option(name, value, words)->check(CLI::IsMember(choices))->capture_default_str();
+}
+
 void watch_signals() {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
@@ -100,7 +102,7 @@ void prepare_interruption(const CommonOptions& common) {
                  {"error", "interrupted"},
                  {"exit_status", static_cast<int>(kInterrupted)}};
   if (common.verb == "estimate" || common.verb == "calibrate") {
-    object.update(undecided("interrupted"));
+    object.update(json::undecided("interrupted"));
   }
   object_when_interrupted = object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -160,49 +162,6 @@ void ProgressBar::show(double fraction, std::string_view stage) {
   std::fflush(stderr);
 }
 
-Json with_status(Json result, const std::optional<FileError>& damage) {
-  if (damage) result["exit_status"] = static_cast<int>(kBadFile);
-  return result;
-}
-
-Json undecided(const std::string& message) {
-  return {{"serial", nullptr},
-          {"sensor", nullptr},
-          {"verdict",
-           {{"code", "undecided"},
-            {"words", message},
-            {"to_do", "mend what the words name, or record again"}}}};
-}
-
-Failure current_failure() {
-  try {
-    throw;
-  } catch (const recordings::MissingTimes& error) {
-    return {kWrongUsage, fmt::format("{}: say it with --shot-rate-hz", error.what()), {}};
-  } catch (const InvalidArgument& error) {
-    return {kWrongUsage, with_flags(error.what()), {}};
-  } catch (const FileError& error) {
-    return {kBadFile, error.what(), json::of(error)};
-  } catch (const wire::NetworkError& error) {
-    return {kBadFile, with_flags(error.what()), {}};
-  } catch (const cloud::TurnedFrame& error) {
-    const std::string text =
-        fmt::format("{}: say it with --extrinsics YAW,PITCH,ROLL", error.what());
-    return {kNumbersFailed, text, {{"converged", false}, {"reason", text}}};
-  } catch (const EstimationError& error) {
-    const std::string text = with_flags(error.what());
-    return {kNumbersFailed, text, {{"converged", false}, {"reason", text}}};
-  } catch (const Cancelled&) {
-    return {kInterrupted, "interrupted", {}};
-  } catch (const std::bad_alloc&) {
-    return {kFault, "there is not enough memory", {}};
-  } catch (const std::exception& error) {  // a bug: nothing the user did
-    return {kFault, fmt::format("internal error: {}", error.what()), {}};
-  } catch (...) {
-    return {kFault, "internal error of an unknown kind", {}};
-  }
-}
-
 double number_from(const std::string& text, std::string_view name) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
@@ -212,28 +171,18 @@ double number_from(const std::string& text, std::string_view name) {
   return value;
 }
 
-double positive_number(const std::string& text, std::string_view option, std::string_view unit) {
-  const double value = number_from(text, option);
-  check_positive(value, option, unit);
-  return value;
-}
-
-void check_positive(double value, std::string_view option, std::string_view unit) {
-  if (!(value > 0) || !std::isfinite(value)) {
-    throw InvalidArgument(fmt::format("{} = {} {}, allowed above 0", option, value, unit));
-  }
-}
-
-void check_not_negative(double value, std::string_view option, std::string_view unit) {
-  if (!(value >= 0) || !std::isfinite(value)) {
-    throw InvalidArgument(fmt::format("{} = {} {}, allowed 0 and above", option, value, unit));
-  }
+std::optional<double> rate_from(const std::string& text) {
+  if (text == "full") return std::nullopt;
+  const double rate = number_from(text, "--rate-hz");
+  require_positive(kSetting.rate, rate);
+  return rate;
 }
 
 std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg) {
   if (!noise_angle_deg) return std::nullopt;
-  check_positive(*noise_angle_deg, "--noise-angle-deg", "deg");
-  return radians_from_degrees(*noise_angle_deg);
+  const double noise = radians_from_degrees(*noise_angle_deg);
+  require_positive(kSetting.noise_angle, noise);
+  return noise;
 }
 
 void add_files(const std::string& path, std::vector<std::string>& files) {
@@ -243,10 +192,6 @@ void add_files(const std::string& path, std::vector<std::string>& files) {
 
 void note_files(const CLI::App& verb, CommonOptions& common) {
   namespace fs = std::filesystem;
-  static constexpr std::array<std::string_view, 15> kReading = {
-      "--sensor",   "--calibration", "--planes", "--control",           "--stations",
-      "--truth",    "--scene",       "--plan",   "--recording",         "--from",
-      "--accuracy", "--trajectory",  "--mount",  "--trajectory-errors", "--flight"};
   for (const CLI::Option* option : verb.get_options()) {
     for (const std::string& value : option->results()) {
       std::error_code ignored;
@@ -261,9 +206,8 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
         // Of two results the numbers are compared as well.
         const std::optional<std::string> numbers = jobs::calibration_in(value);
         if (option->results().size() > 1 && numbers) common.files.push_back(*numbers);
-      } else if (std::find(kReading.begin(), kReading.end(), name) != kReading.end() &&
-                 (fs::is_regular_file(value, ignored) ||
-                  recordings::recording_files(value).size() > 1)) {
+      } else if (names_file_to_read(name) && (fs::is_regular_file(value, ignored) ||
+                                              recordings::recording_files(value).size() > 1)) {
         add_files(value, common.files);
       }
     }

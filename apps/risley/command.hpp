@@ -16,25 +16,17 @@
 #include <nlohmann/json.hpp>
 
 #include "risley/core/progress.hpp"
+#include "risley/jobs/many_inputs.hpp"
 #include "risley/jobs/provenance.hpp"
 #include "risley/json/results.hpp"
 #include "risley/optics/parameters.hpp"
-
-#include "option_names.hpp"
 
 namespace risley::app {
 
 using json::Json;
 
-/// What the shell sees.
-enum ExitStatus : int {
-  kDone = 0,
-  kNumbersFailed = 1,
-  kWrongUsage = 2,
-  kBadFile = 3,
-  kFault = 4,          ///< of the program or of the machine: a bug, no memory
-  kInterrupted = 130,  ///< 128 + SIGINT, as shells have it
-};
+using jobs::ExitStatus;
+using enum jobs::ExitStatus;
 
 /// Options that every verb has.
 struct CommonOptions {
@@ -48,22 +40,6 @@ struct CommonOptions {
   std::vector<std::string> inputs;  ///< INPUT, as typed
   std::vector<std::string> files;   ///< existing files that options name to be read
 };
-
-/// How an exception ends a command.
-struct Failure {
-  ExitStatus status = kNumbersFailed;
-  std::string message;
-  Json details;  ///< for --json, may be null
-};
-
-/// The result of a verb that did what damage of a file left to do, with the exit status.
-Json with_status(Json result, const std::optional<FileError>& damage);
-
-/// Of the exception that is being handled.
-Failure current_failure();
-
-/// What objects of verbs with a verdict have where nothing could be estimated.
-Json undecided(const std::string& message);
 
 /// Does the work of a verb and prints its result.
 using Run = std::function<ExitStatus(const CommonOptions&)>;
@@ -85,6 +61,10 @@ Run declare_report(CLI::App& verb);
 Run declare_reproduce(CLI::App& verb);
 Run declare_record(CLI::App& verb);
 Run declare_emulate(CLI::App& verb);
+
+/// Declares an option with a few values, one of which it has already.
+CLI::Option* add_choice(CLI::App& verb, const std::string& name, std::string& value,
+                        const std::vector<std::string>& choices, const std::string& words);
 
 /// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in
 /// the making is removed by its owner.
@@ -134,13 +114,10 @@ double now();
 
 /// @param name  of what it is the value of. @throws InvalidArgument unless it is a finite number
 double number_from(const std::string& text, std::string_view name);
-/// A value of --rate-hz and the like. @throws InvalidArgument naming the option
-double positive_number(const std::string& text, std::string_view option, std::string_view unit);
-/// @throws InvalidArgument unless the value is finite and above (or at) zero
-void check_positive(double value, std::string_view option, std::string_view unit);
-void check_not_negative(double value, std::string_view option, std::string_view unit);
+/// A value of --rate-hz. @return nothing for 'full'  @throws InvalidArgument
+std::optional<double> rate_from(const std::string& text);
 
-/// The value of --noise-angle-deg, rad. @throws InvalidArgument naming the option
+/// The value of --noise-angle-deg, rad. @throws InvalidArgument
 std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg);
 
 /// For a library function that tells nothing; a signal cancels it.

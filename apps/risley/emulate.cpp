@@ -34,7 +34,6 @@ struct EmulateChoices {
 };
 
 jobs::EmulateOptions job_of(const EmulateChoices& options, const CommonOptions& common) {
-  if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
   jobs::EmulateOptions job;
   job.interface = options.interface;
   job.serial = options.serial;
@@ -85,9 +84,7 @@ void print_emulated(const jobs::EmulatedSensor& truth) {
 
 void declare_clock(CLI::App& verb, EmulateChoices& o) {
   const std::string group = "Clock of the sensor";
-  verb.add_option("--time", o.time_source, "What its times count from")
-      ->check(CLI::IsMember({"power-on", "ptp", "pps"}))
-      ->capture_default_str()
+  add_choice(verb, "--time", o.time_source, {"power-on", "ptp", "pps"}, "What its times count from")
       ->group(group);
   verb.add_option("--time-from-s", o.time_source_from_s,
                   "When that begins, s after the first start; before, they count from power-on")

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -11,11 +10,11 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/estimate_recording.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
-#include "option_names.hpp"
 #include "parameter_choice.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
@@ -29,9 +28,9 @@ using estimation::Estimate;
 using jobs::EstimatedRecording;
 
 struct EstimateCommandOptions {
-  std::string input, folder, method = "map", rate_hz, sensor, states = "knots", mirror = "auto",
-                             process_noise = "auto", truth;
-  ManyWishes many;
+  std::string input, method = "map", rate_hz, sensor, states = "knots", mirror = "auto",
+                     process_noise = "auto", truth;
+  jobs::ManyInputsOptions many;  ///< its output is the folder
   bool no_report = false;
   std::optional<double> noise_angle_deg;
   ParameterWishes parameters;
@@ -43,8 +42,8 @@ std::optional<estimation::RotorProcess> rotor_process(const std::string& text) {
   if (text == "none") return estimation::kConstantAcceleration;
   estimation::RotorProcess process = estimation::kPaperProcess;
   if (text != "paper") {
-    process.acceleration =
-        radians_from_degrees(positive_number(text, "--process-noise", "deg/s per sqrt(s)"));
+    process.acceleration = radians_from_degrees(number_from(text, flag_of(kSetting.process_noise)));
+    require_positive(kSetting.process_noise, process.acceleration);
   }
   return process;
 }
@@ -56,20 +55,15 @@ jobs::EstimateRecordingOptions job_of(const EstimateCommandOptions& options,
   job.reading = read_options(options.reading);
   job.sensor = options.sensor;
   job.method = options.method == "ekf" ? estimation::Method::ekf : estimation::Method::map;
-  if (options.rate_hz.empty()) {
-    job.rate = jobs::usual_rate(job.method);
-  } else if (options.rate_hz != "full") {
-    job.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
-  }
+  job.rate = options.rate_hz.empty() ? jobs::usual_rate(job.method) : rate_from(options.rate_hz);
   job.angle_noise = noise_angle(options.noise_angle_deg);
   job.fixed = held_parameters(options.parameters.fixed);
   job.additional = options.parameters.freed;
   job.rotor_process = rotor_process(options.process_noise);
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
   job.truth = options.truth;
-  job.details = !options.folder.empty() && !options.no_report;
-  require_folder_apart(common, options.folder, {"states.nc"});
-  job.files = result_files(options.folder, options.states, common);
+  job.details = !options.many.output.empty() && !options.no_report;
+  job.files = result_files(options.many.output, options.states, common);
   if (job.details) {
     job.texts = [](const EstimatedRecording& outcome) {
       return report_texts(report::report_of(outcome));
@@ -157,53 +151,13 @@ void print_outcome(const EstimatedRecording& outcome) {
   }
 }
 
-/// One of several.
-FileOutcome estimate_one(const FileJob& file, const EstimateCommandOptions& options,
-                         const CommonOptions& common, const Progress& progress) {
-  EstimateCommandOptions own = options;
-  own.input = file.input;
-  own.folder = file.output;
-  EstimatedRecording found = jobs::estimate_recording(job_of(own, common), progress);
-  put_flags(found.warnings);
-  put_flags(found.choice.warnings);
-  put_flags(found.estimate.verdict);
-  const Estimate& e = found.estimate;
-  for (const std::string& words : found.warnings) spdlog::warn("{}: {}", file.input, words);
-  for (const std::string& words : e.warnings) spdlog::warn("{}: {}", file.input, words);
-  return judged_outcome(
-      file, json::of(found), e.converged ? "" : with_flags(e.reason),
-      fmt::format("{}, {} shots, {} of them outliers", jobs::sensor_name(found.choice),
-                  grouped(e.series.size()), grouped(e.outliers)));
-}
-
-ExitStatus estimate_several(const FileJobs& files, const EstimateCommandOptions& options,
-                            const CLI::App& verb, const CommonOptions& common) {
-  if (!options.truth.empty() && files.jobs.size() > 1) {
-    throw InvalidArgument(
-        fmt::format("--truth is of one recording, and there are {}", files.jobs.size()));
-  }
-  EstimateCommandOptions first = options;
-  first.input = files.jobs.front().input;
-  job_of(first, common);  // wrong options are told before anything is read
-  FileWork work;
-  work.label = "estimating";
-  work.into_folders = true;
-  work.files = [](const FileJob& file) { return result_files_of(file.output); };
-  work.run = [&](const FileJob& file, const Progress& progress) {
-    return estimate_one(file, options, common, progress);
-  };
-  return run_file_jobs(files, work, options.many, verb, common);
-}
-
 ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptions& common) {
+  require_folder_apart(common, options.many.output, {"states.nc"});
   EstimatedRecording outcome;
   {
     ProgressBar bar("estimating", common);
     outcome = jobs::estimate_recording(job_of(options, common), bar.progress());
   }
-  put_flags(outcome.warnings);
-  put_flags(outcome.choice.warnings);
-  put_flags(outcome.estimate.verdict);
   const Estimate& e = outcome.estimate;
   spdlog::debug(
       "{} observations of format {}, {} without a direction, {} out of order; {} shots used "
@@ -229,18 +183,16 @@ Run declare_estimate(CLI::App& verb) {
   EstimateCommandOptions& o = *options;
   add_many_options(verb, o.many, "Recordings, each of one sensor, of any known format");
   verb.add_option(
-      "-o,--output", o.folder,
+      "-o,--output", o.many.output,
       "Folder to write calibration.yaml, states.nc, report.json and report.html to; for "
       "several inputs a folder of such folders, placed as the inputs are (default: "
       "none)");
   verb.add_flag("--no-report", o.no_report,
                 "Write no report.json and report.html, and do not compute what only they show");
-  verb.add_option(
-          "--method", o.method,
-          "map: the most probable motion of the rotors, from all shots at once; ekf: the paper's "
-          "filter")
-      ->check(CLI::IsMember({"map", "ekf"}))
-      ->capture_default_str();
+  add_choice(
+      verb, "--method", o.method, {"map", "ekf"},
+      "map: the most probable motion of the rotors, from all shots at once; ekf: the paper's "
+      "filter");
   verb.add_option(
       "--rate-hz", o.rate_hz,
       "Shots per second to use, Hz, or 'full' for all (default: full with map, 1000 with ekf)");
@@ -252,16 +204,12 @@ Run declare_estimate(CLI::App& verb) {
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_reading_options(verb, o.reading);
   add_parameter_choice(verb, o.parameters);
-  verb.add_option(
-          "--states", o.states,
-          "Rotor states to write: 'knots': at one shot every 2 ms (ekf: at the shots used); 'all': "
-          "at all shots; 'none'")
-      ->check(CLI::IsMember({"knots", "all", "none"}))
-      ->capture_default_str();
-  verb.add_option("--mirror", o.mirror,
-                  "Whether the elevation in the file has the opposite sign; 'auto' finds out")
-      ->check(CLI::IsMember({"auto", "yes", "no"}))
-      ->capture_default_str();
+  add_choice(
+      verb, "--states", o.states, {"knots", "all", "none"},
+      "Rotor states to write: 'knots': at one shot every 2 ms (ekf: at the shots used); 'all': "
+      "at all shots; 'none'");
+  add_choice(verb, "--mirror", o.mirror, {"auto", "yes", "no"},
+             "Whether the elevation in the file has the opposite sign; 'auto' finds out");
   verb.add_option("--process-noise", o.process_noise,
                   "Process noise of the rotors' speed, deg/s per sqrt(s): a number; 'paper' (900); "
                   "'none' (constant acceleration); or 'auto' (random walks of the speed and, with "
@@ -270,10 +218,15 @@ Run declare_estimate(CLI::App& verb) {
   verb.add_option("--truth", o.truth,
                   "OUT.truth.yaml of the simulated recording, to compare the estimate with");
   return [options, &verb](const CommonOptions& common) {
-    const FileJobs files =
-        file_jobs(options->many, options->folder, are_several(options->many), "");
-    if (files.many) return estimate_several(files, *options, verb, common);
-    options->input = files.jobs.front().input;
+    options->many.into_folder = are_several(options->many);
+    const jobs::InputWork work = json::estimate_each(job_of(*options, common), log_words);
+    const jobs::InputPlan plan = jobs::plan_inputs(options->many, work, cancellable());
+    if (!options->truth.empty() && plan.jobs.size() > 1) {
+      throw InvalidArgument(
+          fmt::format("--truth is of one recording, and there are {}", plan.jobs.size()));
+    }
+    if (plan.many) return run_inputs(plan, work, options->many, verb, common);
+    options->input = plan.jobs.front().input;
     return run_estimate(*options, common);
   };
 }

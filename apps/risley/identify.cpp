@@ -9,11 +9,11 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/identification/fitted_values.hpp"
 #include "risley/jobs/identify_recording.hpp"
 
 #include "command.hpp"
-#include "option_names.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "result_folder.hpp"
@@ -81,7 +81,7 @@ void print_outcome(const IdentifiedRecording& outcome) {
 }
 
 ExitStatus run_identify(const IdentifyCommandOptions& options, const CommonOptions& common) {
-  check_positive(options.fastest_hz, "--fastest-hz", "Hz");
+  require_positive(kSetting.fastest, options.fastest_hz);
   require_apart(common, {options.output});
   jobs::IdentifyRecordingOptions job;
   job.recording = options.input;
@@ -96,7 +96,6 @@ ExitStatus run_identify(const IdentifyCommandOptions& options, const CommonOptio
     ProgressBar bar("identifying", common);
     outcome = jobs::identify_recording(job, bar.progress());
   }
-  put_flags(outcome.warnings);
   for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
   if (!options.output.empty() && !outcome.written) {
     spdlog::warn("{} was not written: {}; --force writes it all the same", options.output,

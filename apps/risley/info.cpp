@@ -14,7 +14,6 @@
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/inspect_trajectory.hpp"
 #include "risley/jobs/prepared_recording.hpp"
-#include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
@@ -32,7 +31,7 @@ using recordings::TimeAuditResult;
 using recordings::ValueRange;
 
 struct InfoCommandOptions {
-  ManyWishes many;
+  jobs::ManyInputsOptions many;
   std::string input, share, accuracy, topic;
   bool share_ranges = false;
   ReadingWishes reading;
@@ -117,7 +116,6 @@ void print_excerpt(const Excerpt& excerpt) {
 
 ExitStatus run_trajectory_info(const InfoCommandOptions& options, const CommonOptions& common) {
   if (!options.share.empty()) throw InvalidArgument("--share is for recordings, not trajectories");
-  require_no_reading_options(options.reading, "trajectories");
   jobs::InspectedTrajectory found;
   {
     ProgressBar bar("reading", common);
@@ -133,95 +131,25 @@ ExitStatus run_trajectory_info(const InfoCommandOptions& options, const CommonOp
   return kDone;
 }
 
-bool is_of_trajectory(const InfoCommandOptions& options) {
-  return !options.topic.empty() ||
-         trajectories::trajectory_file_kind(options.input, cancellable()) !=
-             trajectories::TrajectoryFileKind::none;
-}
-
-void require_no_accuracy(const InfoCommandOptions& options) {
-  if (options.accuracy.empty()) return;
-  throw InvalidArgument(
-      fmt::format("--accuracy goes with a trajectory, and {} is none", options.input));
-}
-
-FileOutcome inspect_poses(const InfoCommandOptions& options, const Progress& progress) {
-  require_no_reading_options(options.reading, "trajectories");
-  const jobs::InspectedTrajectory found =
-      jobs::inspect_trajectory({options.input, options.accuracy, options.topic}, progress);
-  log_warnings(options.input, found.warnings);
-  Json json = json::of(found);
-  json["input"] = options.input;
-  std::string text = fmt::format("{}: {}, {} records", options.input, json.value("format", ""),
-                                 grouped(json.value("records", std::uint64_t{0})));
-  return {kDone, std::move(json), std::move(text)};
-}
-
-/// Names options in what was found as the command does, and prints it.
-void log_all_warnings(const std::string& input, InspectedRecording& found) {
-  for (recordings::ReadWarning& warning : found.warnings) {
-    warning.message = with_flags(warning.message);
-  }
-  if (found.choice) put_flags(found.choice->warnings);
-  log_warnings(input, found.warnings);
-}
-
-/// One of several.
-FileOutcome inspect_one(const std::string& input, const InfoCommandOptions& all,
-                        const Progress& progress) {
-  InfoCommandOptions options = all;
-  options.input = input;
-  if (is_of_trajectory(options)) return inspect_poses(options, progress);
-  require_no_accuracy(options);
-  InspectedRecording found =
-      jobs::inspect_recording({input, read_options(options.reading), {}, {}}, progress);
-  log_all_warnings(input, found);
-  Json json = with_status(json::of(found), found.damage);
-  json["input"] = input;
-  std::string text =
-      fmt::format("{}: {}, {}, {} observations", input, found.header.format,
-                  found.choice ? jobs::sensor_name(*found.choice) : jobs::sensor_name(found.header),
-                  grouped(found.audit.observations));
-  if (found.header.has_times) text += fmt::format(" in {:.6g} s", found.audit.duration_s);
-  if (found.audit.gaps.count > 0) text += fmt::format(", {} gaps", grouped(found.audit.gaps.count));
-  if (found.damage) text += fmt::format("; damaged: {}", found.damage->what());
-  return {found.damage ? kBadFile : kDone, std::move(json), std::move(text)};
-}
-
-ExitStatus inspect_several(const FileJobs& files, const InfoCommandOptions& options,
-                           const CLI::App& verb, const CommonOptions& common) {
-  if (!options.share.empty()) {
-    throw InvalidArgument(
-        fmt::format("--share is of one recording, and there are {}", files.jobs.size()));
-  }
-  read_options(options.reading);  // wrong options are told before anything is read
-  FileWork work;
-  work.label = "reading";
-  work.run = [&](const FileJob& file, const Progress& progress) {
-    return inspect_one(file.input, options, progress);
-  };
-  return run_file_jobs(files, work, options.many, verb, common);
-}
-
 ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& common) {
   if (options.share_ranges && options.share.empty()) {
     throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
   }
-  if (is_of_trajectory(options)) return run_trajectory_info(options, common);
-  require_no_accuracy(options);
+  const recordings::ReadOptions reading = read_options(options.reading);
+  if (jobs::is_trajectory({options.input, options.accuracy, options.topic}, reading,
+                          cancellable())) {
+    return run_trajectory_info(options, common);
+  }
   InspectedRecording found;
   {
     ProgressBar bar("reading", common);
-    found = jobs::inspect_recording({options.input,
-                                     read_options(options.reading),
-                                     options.share,
-                                     {.ranges = options.share_ranges}},
-                                    bar.progress());
+    found = jobs::inspect_recording(
+        {options.input, reading, options.share, {.ranges = options.share_ranges}}, bar.progress());
   }
-  log_all_warnings(options.input, found);
+  log_warnings(options.input, found.warnings);
   if (found.damage) spdlog::error(found.damage->what());
   if (common.json) {
-    print_json(common, with_status(json::of(found), found.damage));
+    print_json(common, json::with_status(json::of(found), found.damage));
   } else {
     print_audit(found);
     if (found.excerpt) print_excerpt(*found.excerpt);
@@ -253,9 +181,15 @@ Run declare_info(CLI::App& verb) {
   add_reading_options(verb, options->reading);
   return [options, &verb](const CommonOptions& common) {
     require_apart(common, {options->share});
-    const FileJobs files = file_jobs(options->many, "", false, "");
-    if (files.many) return inspect_several(files, *options, verb, common);
-    options->input = files.jobs.front().input;
+    const jobs::InputWork work = json::inspect_each(
+        {read_options(options->reading), options->accuracy, options->topic}, log_words);
+    const jobs::InputPlan plan = jobs::plan_inputs(options->many, work, cancellable());
+    if (!options->share.empty() && plan.many) {
+      throw InvalidArgument(
+          fmt::format("--share is of one recording, and there are {}", plan.jobs.size()));
+    }
+    if (plan.many) return run_inputs(plan, work, options->many, verb, common);
+    options->input = plan.jobs.front().input;
     return run_info(*options, common);
   };
 }

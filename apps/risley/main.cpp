@@ -17,7 +17,9 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
+#include "risley/json/many_results.hpp"
 
 #include "command_line.hpp"
 
@@ -32,7 +34,7 @@ ExitStatus fail(ExitStatus status, const std::string& message, const CommonOptio
     Json object = {{"error", message}, {"exit_status", static_cast<int>(status)}};
     if (details.is_object()) object.update(details);
     if (common.verb == "estimate" || common.verb == "calibrate") {
-      object.update(undecided(message));
+      object.update(json::undecided(message));
     }
     print_json(common, object);
   }
@@ -43,7 +45,7 @@ ExitStatus run_verb(const Run& run, const CommonOptions& common) {
   try {
     return run(common);
   } catch (...) {
-    const Failure failure = current_failure();
+    const json::Failure failure = json::current_failure();
     return fail(failure.status, failure.message, common, failure.details);
   }
 }
@@ -57,7 +59,7 @@ ExitStatus run_command(const std::vector<std::string>& words) {
     CommonOptions told = line.common();
     told.json = std::find(words.begin(), words.end(), "--json") != words.end();
     if (!words.empty()) told.verb = words.front();
-    const Failure failure = current_failure();
+    const json::Failure failure = json::current_failure();
     return fail(failure.status, failure.message, told, failure.details);
   }
   const CommonOptions& common = line.common();
@@ -150,6 +152,7 @@ ExitStatus run_on_large_stack(const std::vector<std::string>& words) {
 int main(int argc, char** argv) {
   using namespace risley::app;
   std::set_terminate(end_by_fault);
+  risley::write_settings_as(risley::SettingStyle::flag);
   keep_freed_memory();
   hold_standard_streams();
   start_log();

@@ -12,7 +12,6 @@
 #include "risley/core/angle.hpp"
 
 #include "command.hpp"
-#include "option_names.hpp"
 #include "parameter_choice.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
@@ -82,14 +81,13 @@ void print_observability(const JudgedObservability& judged) {
 
 ExitStatus run_observability(const ObservabilityCommandOptions& options,
                              const CommonOptions& common) {
-  check_positive(options.duration_s, "--duration-s", "s");
   jobs::ObservabilityOptions job;
   job.recording = options.input;
   job.reading = read_options(options.reading);
   job.sensor = options.sensor;
   job.duration = options.duration_s;
   if (!options.rate_hz.empty() && (options.input.empty() || options.rate_hz != "full")) {
-    job.rate = positive_number(options.rate_hz, "--rate-hz", "Hz");
+    job.rate = rate_from(options.rate_hz);
   }
   job.angle_noise = noise_angle(options.noise_angle_deg);
   job.rounding = options.rounding;
@@ -100,7 +98,6 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     ProgressBar bar("estimating", common);
     judged = jobs::judge_observability(job, bar.progress());
   }
-  put_flags(judged.warnings);
   for (const std::string& warning : judged.warnings) spdlog::warn(warning);
   if (!judged.converged) spdlog::warn("the estimate did not converge: {}", judged.reason);
   if (common.json) {

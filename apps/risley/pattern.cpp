@@ -14,6 +14,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/pattern_details.hpp"
 #include "risley/jobs/write_pattern.hpp"
 #include "risley/report/pattern_page.hpp"
@@ -114,7 +115,7 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
   if (to_stdout && options.coverage) {
     throw InvalidArgument("--coverage prints on stdout, where -o - puts the pattern itself");
   }
-  check_positive(options.duration_s, "--duration-s", "s");
+  require_positive(kSetting.duration, options.duration_s);
   require_apart(common, {options.output, options.report});
   const sensors::ScanPatternOptions scan = scan_options(options);
   Json json = Json::object();

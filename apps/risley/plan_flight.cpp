@@ -76,7 +76,6 @@ ExitStatus run_flight_plan(jobs::PlanFlightOptions options, const std::string& p
     ProgressBar bar("planning", common);
     planned = jobs::plan_flight(options, bar.progress());
   }
-  put_flags(planned.warnings);
   for (const std::string& warning : planned.warnings) spdlog::warn(warning);
   for (const std::string& warning : planned.forecast.warnings) spdlog::warn(warning);
   if (!page.empty()) {

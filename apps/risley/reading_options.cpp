@@ -12,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 
 namespace risley::app {
 namespace {
@@ -70,13 +71,13 @@ void add_every_device(CLI::App& verb, ReadingWishes& wishes) {
       ->excludes("--device");
 }
 
-void split_by_device(const ReadingWishes& wishes, FileJobs& jobs) {
+void split_by_device(const ReadingWishes& wishes, jobs::InputPlan& plan) {
   if (!wishes.every_device) return;
-  std::vector<FileJob> split;
-  for (const FileJob& job : jobs.jobs) {
+  std::vector<jobs::InputJob> split;
+  for (const jobs::InputJob& job : plan.jobs) {
     const auto devices = recordings::open_recording(job.input, {}, cancellable())->header().devices;
     for (std::size_t i = 0; i < devices.size(); ++i) {
-      FileJob one = job;
+      jobs::InputJob one = job;
       if (devices.size() > 1) {
         one.device = std::to_string(i);
         const std::string name = "-" + (devices[i].serial.empty() ? one.device : devices[i].serial);
@@ -84,28 +85,18 @@ void split_by_device(const ReadingWishes& wishes, FileJobs& jobs) {
         one.output =
             (output.parent_path() / output.stem()).string() + name + output.extension().string();
         one.place += name;
-        jobs.many = true;
+        plan.many = true;
       }
       split.push_back(std::move(one));
     }
   }
-  jobs.jobs = std::move(split);
+  plan.jobs = std::move(split);
 }
 
-void require_no_reading_options(const ReadingWishes& wishes, std::string_view what) {
-  const char* const given = wishes.shot_rate_hz              ? "--shot-rate-hz"
-                            : !wishes.extrinsics_deg.empty() ? "--extrinsics"
-                            : !wishes.device.empty()         ? "--device"
-                                                             : nullptr;
-  if (given != nullptr) {
-    throw InvalidArgument(fmt::format("{} is for recordings, not {}", given, what));
-  }
-}
-
-recordings::ReadOptions read_options(const ReadingWishes& wishes, const FileJob& job) {
+recordings::ReadOptions read_options(const ReadingWishes& wishes) {
   recordings::ReadOptions options;
-  options.device = job.device.empty() ? wishes.device : job.device;
-  if (wishes.shot_rate_hz) check_positive(*wishes.shot_rate_hz, "--shot-rate-hz", "Hz");
+  options.device = wishes.device;
+  if (wishes.shot_rate_hz) require_positive(kSetting.shot_rate, *wishes.shot_rate_hz);
   options.shot_rate = wishes.shot_rate_hz;
   if (!wishes.extrinsics_deg.empty()) options.extrinsics = extrinsics_from(wishes.extrinsics_deg);
   return options;

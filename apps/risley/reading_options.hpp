@@ -4,12 +4,10 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 
 #include "risley/recordings/reader.hpp"
 
 #include "command.hpp"
-#include "many_files.hpp"
 
 namespace risley::app {
 
@@ -30,14 +28,9 @@ void add_every_device(CLI::App& verb, ReadingWishes& wishes);
 /// Gives every sensor of recordings of several a job of its own where that was asked for; the
 /// serial number, or the number of the sensor, is added to the names of outputs.
 /// @throws FileError
-void split_by_device(const ReadingWishes& wishes, FileJobs& jobs);
+void split_by_device(const ReadingWishes& wishes, jobs::InputPlan& plan);
 
-/// @param what  is read instead of recordings, in words
-/// @throws InvalidArgument when any of these options was given
-void require_no_reading_options(const ReadingWishes& wishes, std::string_view what);
-
-/// @param job  whose device is meant, where it names one
 /// @throws InvalidArgument naming the option
-recordings::ReadOptions read_options(const ReadingWishes& wishes, const FileJob& job = {});
+recordings::ReadOptions read_options(const ReadingWishes& wishes);
 
 }  // namespace risley::app

@@ -52,7 +52,6 @@ const std::map<std::string, wire::ReturnMode>& return_modes() {
 }
 
 jobs::RecordOptions job_of(const RecordChoices& options) {
-  if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
   jobs::RecordOptions job;
   job.interface = options.interface;
   job.serials = options.serials;
@@ -257,12 +256,11 @@ Run declare_record(CLI::App& verb) {
   verb.add_option("--duration-s", o.duration_s,
                   "Length of the recording, s (default: until Ctrl-C or SIGTERM)")
       ->excludes(list);
-  verb.add_option("--coordinates", o.coordinates, "What the sensors are to send")
-      ->check(CLI::IsMember({"spherical", "cartesian", "as-is"}))
-      ->capture_default_str();
-  verb.add_option("--return-mode", o.return_mode, "Returns of a shot that the sensors are to send")
-      ->check(CLI::IsMember({"first", "strongest", "dual", "triple", "as-is"}))
-      ->capture_default_str();
+  add_choice(verb, "--coordinates", o.coordinates, {"spherical", "cartesian", "as-is"},
+             "What the sensors are to send");
+  add_choice(verb, "--return-mode", o.return_mode,
+             {"first", "strongest", "dual", "triple", "as-is"},
+             "Returns of a shot that the sensors are to send");
   verb.add_option("--optics", o.optics,
                   "Watch the optics, and tell when they change: 'own' against their beginning; a "
                   "preset or calibration file also against that")
@@ -273,9 +271,7 @@ Run declare_record(CLI::App& verb) {
                   "127.0.0.1, or at an address and port of this machine")
       ->type_name("[ADDRESS:]PORT")
       ->excludes(list);
-  verb.add_option("--imu", o.imu, "Inertial samples of Avia, Horizon and Tele-15")
-      ->check(CLI::IsMember({"yes", "no"}))
-      ->capture_default_str();
+  add_choice(verb, "--imu", o.imu, {"yes", "no"}, "Inertial samples of Avia, Horizon and Tele-15");
   return [options](const CommonOptions& common) {
     end_in_own_time();
     const jobs::RecordOptions job = job_of(*options);

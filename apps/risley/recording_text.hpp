@@ -2,19 +2,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "risley/core/text.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::app {
 
-/// Warnings on stderr, each with the name of the file; options in them get the names that users
-/// know.
-void log_warnings(const std::string& file, std::vector<recordings::ReadWarning>& warnings);
-
-/// 1234567 as "1 234 567".
-std::string grouped(std::uint64_t number);
+/// Warnings on stderr, each with the name of the file.
+void log_warnings(const std::string& file, const std::vector<recordings::ReadWarning>& warnings);
 
 }  // namespace risley::app

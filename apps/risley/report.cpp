@@ -56,7 +56,7 @@ ExitStatus report_one(const std::string& folder, std::string page, const CommonO
   if (page.empty()) page = (fs::path(folder) / "report.html").string();
   require_apart(common, {page});
   const report::Report report = report_of(folder);
-  return write_page(page, page_of(report), {{"verb", report::verb_of(report)}}, common);
+  return write_page(page, report::report_page(report), {{"verb", report::verb_of(report)}}, common);
 }
 
 /// Of two results, side by side.

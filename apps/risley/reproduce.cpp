@@ -14,7 +14,6 @@
 #include "risley/jobs/sensor_choice.hpp"
 
 #include "command.hpp"
-#include "option_names.hpp"
 #include "reading_options.hpp"
 #include "recording_text.hpp"
 #include "reproduction/reproduction_page.hpp"
@@ -107,7 +106,7 @@ reproduction::RealRecording real_recording(const std::string& path, const Readin
   jobs::EstimationInput input =
       jobs::read_for_estimation({path, read_options(reading), {}, {}}, bar.progress());
   for (const std::string& warning : input.warnings) {
-    spdlog::warn("{}: {}", path, with_flags(warning));
+    spdlog::warn("{}: {}", path, warning);
   }
   return {std::filesystem::path(path).filename().string(), std::move(input.choice.sensor),
           input.series.rows(), std::move(input.head)};

@@ -5,15 +5,12 @@
 #include <filesystem>
 #include <fstream>
 #include <utility>
-#include <variant>
 
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
-
-#include "option_names.hpp"
 
 namespace risley::app {
 
@@ -31,15 +28,6 @@ jobs::ResultFiles result_files(const std::string& folder, const std::string& sta
   return files;
 }
 
-std::vector<std::string> result_files_of(const std::string& folder) {
-  if (folder.empty()) return {};
-  std::vector<std::string> names;
-  for (const char* name : {"calibration.yaml", "states.nc", "report.json", "report.html"}) {
-    names.push_back((std::filesystem::path(folder) / name).string());
-  }
-  return names;
-}
-
 void require_folder_apart(const CommonOptions& common, const std::string& folder,
                           std::vector<std::string> states) {
   if (folder.empty()) return;
@@ -49,10 +37,7 @@ void require_folder_apart(const CommonOptions& common, const std::string& folder
   require_apart(common, outputs);
   // Before an hour of computing; of rotor states not all are written.
   for (const std::string& name : outputs) {
-    if (std::filesystem::path(name).extension() == ".nc" || jobs::is_own_result(name)) continue;
-    throw FileError(name, {},
-                    "is not a result of risley, and would be replaced by one: move it, or give "
-                    "another folder");
+    if (!name.ends_with(".nc")) jobs::require_own_result(name);
   }
 }
 
@@ -69,19 +54,9 @@ void write_page_file(const std::string& path, const std::string& html) {
   io::write_text_file(path, html);
 }
 
-std::vector<jobs::NamedText> report_texts(report::Report report) {
-  Json& json = report.json;
-  for (Json* text : {&json["reason"], &json["verdict"]["words"], &json["verdict"]["to_do"]}) {
-    *text = with_flags(text->get<std::string>());
-  }
-  for (Json* texts : {&json["warnings"], &json["sensor_choice"]["warnings"]}) {
-    for (Json& text : *texts) text = with_flags(text.get<std::string>());
-  }
-  return {{"report.json", report::report_text(report)}, {"report.html", page_of(report)}};
-}
-
-std::string page_of(const report::Report& report) {
-  return with_flags(report::report_page(report));
+std::vector<jobs::NamedText> report_texts(const report::Report& report) {
+  return {{"report.json", report::report_text(report)},
+          {"report.html", report::report_page(report)}};
 }
 
 }  // namespace risley::app

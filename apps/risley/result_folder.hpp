@@ -20,9 +20,6 @@ jobs::Provenance provenance_of(const CommonOptions& common);
 jobs::ResultFiles result_files(const std::string& folder, const std::string& states,
                                const CommonOptions& common);
 
-/// Files that stand in a folder of results of one recording; none for an empty name.
-std::vector<std::string> result_files_of(const std::string& folder);
-
 /// As require_apart(), for a verb that writes a folder for results.
 /// @param states  names of files of rotor states
 void require_folder_apart(const CommonOptions& common, const std::string& folder,
@@ -32,8 +29,6 @@ void require_folder_apart(const CommonOptions& common, const std::string& folder
 void write_page_file(const std::string& path, const std::string& html);
 
 /// report.json and the page report.html.
-std::vector<jobs::NamedText> report_texts(report::Report report);
-/// The page; what it says of options is in words of the command.
-std::string page_of(const report::Report& report);
+std::vector<jobs::NamedText> report_texts(const report::Report& report);
 
 }  // namespace risley::app

@@ -33,12 +33,6 @@ struct SimulateOptions {
 };
 
 jobs::SimulationOptions job_of(const SimulateOptions& options, const CommonOptions& common) {
-  if (options.duration_s) check_positive(*options.duration_s, "--duration-s", "s");
-  if (options.rate_hz) check_positive(*options.rate_hz, "--rate-hz", "Hz");
-  if (options.noise_angle_deg) {
-    check_not_negative(*options.noise_angle_deg, "--noise-angle-deg", "deg");
-  }
-  if (options.noise_range_m) check_not_negative(*options.noise_range_m, "--noise-range-m", "m");
   jobs::SimulationOptions job;
   job.sensor = options.sensor;
   take_simulated_values(options.values, job);
@@ -121,13 +115,10 @@ Run declare_simulate(CLI::App& verb) {
                   "1 sigma of azimuth and zenith before rounding, deg (default: the sensor's)");
   verb.add_option("--noise-range-m", o.noise_range_m,
                   "1 sigma of ranges before rounding, m (default: the sensor's)");
-  verb.add_option("--quantize", o.quantize, "Round angles and ranges to the sensor's resolution")
-      ->check(CLI::IsMember({"yes", "no"}))
-      ->capture_default_str();
-  verb.add_option("--beam-origin", o.beam_origin,
-                  "Let beams start where they leave the last prism; 'no': at the sensor's origin")
-      ->check(CLI::IsMember({"yes", "no"}))
-      ->capture_default_str();
+  add_choice(verb, "--quantize", o.quantize, {"yes", "no"},
+             "Round angles and ranges to the sensor's resolution");
+  add_choice(verb, "--beam-origin", o.beam_origin, {"yes", "no"},
+             "Let beams start where they leave the last prism; 'no': at the sensor's origin");
   verb.add_option("--rotor", o.rotor, "How the rotors' speeds vary")
       ->check(CLI::IsMember(simulation::rotor_kind_names()))
       ->capture_default_str();

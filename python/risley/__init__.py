@@ -10,6 +10,8 @@ estimated `EstimationError`. Ctrl-C stops what is running.
 """
 from risley._jobs import (calibrate, campaign, cloud, compare, coverage, estimate, identify,
                           info, observability, pattern, plan, simulate)
+from risley._many import (ManyResults, calibrate_many, cloud_many, convert_many, estimate_many,
+                          info_many)
 from risley._network import emulate, find_sensors, record
 from risley._optics import (Directions, Inverse, Linearisation, Rays, invert, linearise, observe,
                             rays)
@@ -24,10 +26,11 @@ from risley._sensors import load_sensor, presets
 __all__ = [
     "Calibration", "Cancelled", "ChunkReader", "Cloud", "Device", "Directions", "Estimate",
     "EstimationError", "FileError", "FlightCalibration", "Identification", "Inverse",
-    "Linearisation", "MissingFileError", "NetworkError", "Pattern", "Plan", "PrismTrain", "Rays",
-    "Recording", "RecordingHeader", "Sensor", "Simulation", "Solution", "Stop", "Verdict",
-    "__version__", "calibrate", "campaign", "cloud", "compare", "coverage", "emulate", "estimate",
-    "find_sensors", "from_arrays", "identify", "info", "invert", "linearise", "load_sensor",
-    "observability", "observe", "pattern", "plan", "presets", "rays", "read", "read_chunks",
-    "record", "simulate", "write",
+    "Linearisation", "ManyResults", "MissingFileError", "NetworkError", "Pattern", "Plan",
+    "PrismTrain", "Rays", "Recording", "RecordingHeader", "Sensor", "Simulation", "Solution",
+    "Stop", "Verdict", "__version__", "calibrate", "calibrate_many", "campaign", "cloud",
+    "cloud_many", "compare", "convert_many", "coverage", "emulate", "estimate",
+    "estimate_many", "find_sensors", "from_arrays", "identify", "info", "info_many", "invert",
+    "linearise", "load_sensor", "observability", "observe", "pattern", "plan", "presets",
+    "rays", "read", "read_chunks", "record", "simulate", "write",
 ]

@@ -2,34 +2,19 @@
 # SPDX-License-Identifier: MIT
 """Jobs on recordings and files: each does what a verb of the command does."""
 import os
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union
 
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._results import (Calibration, Cloud, Estimate, FlightCalibration, Identification,
                              Pattern, Plan, Simulation)
-from risley._units import (Path, Source, YawPitchRoll, angle, angles, pose, source, sources)
-
-Fixed = Union[Mapping[str, Optional[float]], Iterable[str]]
-Rate = Union[None, float, str]
-
-
-def _held(fixed: Fixed) -> List[Tuple[str, Optional[float]]]:
-    if isinstance(fixed, Mapping):
-        return list(fixed.items())
-    return [(name, None) for name in fixed]
-
-
-def _paths(paths: Union[Path, Sequence[Path]]) -> List[str]:
-    if isinstance(paths, (str, os.PathLike)):
-        return [os.fspath(paths)]
-    return [os.fspath(path) for path in paths]
+from risley._units import Fixed, Path, Rate, Source, YawPitchRoll, options_of, paths
 
 
 def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method: str = "map",
-             rate: Rate = None, angle_noise: Optional[float] = None,
-             angle_noise_deg: Optional[float] = None, fixed: Fixed = (), free: Iterable[str] = (),
-             mirrored: Optional[bool] = None, truth: Path = "", states: str = "knots",
+             rate: Rate = None, noise_angle: Optional[float] = None,
+             noise_angle_deg: Optional[float] = None, fix: Fixed = (), free: Iterable[str] = (),
+             mirror: Optional[bool] = None, truth: Path = "", states: str = "knots",
              shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
              extrinsics_deg: YawPitchRoll = None, device: str = "", threads: int = 0,
              progress: Progress = None) -> Estimate:
@@ -47,14 +32,14 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
         All shots at once, or the paper's filter.
     rate : float or 'full', optional
         Shots per second to use, Hz; by default what is usual for the method.
-    angle_noise, angle_noise_deg : float, optional
+    noise_angle, noise_angle_deg : float, optional
         Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
         default estimated.
-    fixed : mapping of str to float or None, or iterable of str
+    fix : mapping of str to float or None, or iterable of str
         Parameters to hold, at the given value (in the unit of the name) if there is one.
     free : iterable of str
         Further parameters to estimate.
-    mirrored : bool, optional
+    mirror : bool, optional
         Whether the elevation has the opposite sign; by default found from the recording.
     truth : str or path, optional
         ``OUT.truth.yaml`` of the simulation that made the recording, to compare the estimate with.
@@ -78,12 +63,7 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = {
-        "recording": source(recording), "sensor": os.fspath(sensor),
-        "output": os.fspath(output), "method": method, "rate": rate,
-        "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg), "fixed": _held(fixed),
-        "free": list(free), "mirrored": mirrored, "truth": os.fspath(truth), "states": states,
-        "device": device, "shot_rate": shot_rate, "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Estimate(_risley.estimate(options, threads, tell))
 
@@ -94,13 +74,13 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
               mount: Path = "", accuracy: Path = "", trajectory_errors: Path = "",
               control: Path = "", knot_spacing: Optional[float] = None,
               cell_size: Optional[float] = None, rate: Rate = None,
-              angle_noise: Optional[float] = None, angle_noise_deg: Optional[float] = None,
-              range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
+              noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
+              noise_range: Optional[float] = None, prior_sigma: Optional[float] = None,
               prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
               tolerance: Optional[float] = None, tolerance_deg: Optional[float] = None,
               beam_origin: bool = True, same_walls: Optional[bool] = None,
-              flat_walls: bool = False, patch_thickness: Optional[float] = None,
-              fixed: Fixed = (), free: Iterable[str] = (), mirrored: Optional[bool] = None,
+              walls: str = "uneven", patch_thickness: Optional[float] = None,
+              fix: Fixed = (), free: Iterable[str] = (), mirror: Optional[bool] = None,
               truth: Union[Path, Sequence[Path]] = (), force: bool = False,
               states: str = "knots", shot_rate: Optional[float] = None,
               extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
@@ -137,10 +117,10 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         Time between corrections of the trajectory, s; edge of the squares of ground, m.
     rate : float or 'full', optional
         Shots per second to use, Hz; by default all.
-    angle_noise, angle_noise_deg : float, optional
+    noise_angle, noise_angle_deg : float, optional
         Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
         default the sensor's.
-    range_noise : float, optional
+    noise_range : float, optional
         Standard deviation of ranges before rounding, m; by default the sensor's.
     prior_sigma, prior_sigma_deg : float, optional
         Prior standard deviation of every error angle around the believed value, rad or deg; by
@@ -155,11 +135,11 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     same_walls : bool, optional
         Whether the recordings are of the same walls from poses that differ by a turn, so that the
         walls' shape cancels; by default where their planes fit in one way only.
-    flat_walls : bool, default False
-        Take walls as exact planes, and ranges as free of errors but for a constant one.
+    walls : {'uneven', 'flat'}
+        'flat' takes walls as exact planes, and ranges as free of errors but for a constant one.
     patch_thickness : float, optional
         How far dark or light patches stand off their wall, one standard deviation, m; 0 for paint.
-    fixed, free, mirrored, shot_rate, extrinsics, extrinsics_deg, device, threads, progress
+    fix, free, mirror, shot_rate, extrinsics, extrinsics_deg, device, threads, progress
         As in `risley.estimate`.
     truth : str, path or a sequence of them
         ``OUT.truth.yaml`` of the simulation that made each recording, to compare with.
@@ -182,36 +162,16 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = {
-        "recordings": sources(recordings), "sensor": os.fspath(sensor),
-        "output": os.fspath(output), "knot_spacing": knot_spacing, "cell_size": cell_size,
-        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "range_noise": range_noise,
-        "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
-        "range_offset_sigma": range_offset_sigma,
-        "tolerance": angle("tolerance", tolerance, tolerance_deg),
-        "fixed": _held(fixed), "free": list(free),
-        "mirrored": mirrored, "truth": _paths(truth), "force": force, "device": device,
-        "shot_rate": shot_rate,
-        "extrinsics": pose(extrinsics, extrinsics_deg), "seed": seed}
-    on_walls = {"method": method, "planes": os.fspath(planes), "stations": os.fspath(stations),
-                "station": list(station), "beam_origin": beam_origin, "same_walls": same_walls,
-                "flat_walls": flat_walls, "patch_thickness": patch_thickness,
-                "states": states}
-    in_flight = {"trajectory": os.fspath(trajectory), "trajectory_topic": trajectory_topic,
-                 "mount": os.fspath(mount), "accuracy": os.fspath(accuracy),
-                 "trajectory_errors": os.fspath(trajectory_errors),
-                 "control": os.fspath(control)}
+    options = options_of({**locals(), "truth": paths(truth)})
     with telling(progress) as tell:
         if os.fspath(trajectory):
             _refuse({"planes": planes, "stations": stations, "station": station},
                     "is not for a calibration with trajectory")
-            found = _risley.calibrate_flight({**options, **in_flight}, threads, tell)
-            return FlightCalibration(found)
+            return FlightCalibration(_risley.calibrate_flight(options, threads, tell))
         _refuse({"mount": mount, "accuracy": accuracy, "control": control,
                  "trajectory_errors": trajectory_errors, "knot_spacing": knot_spacing,
                  "cell_size": cell_size}, "is not for a calibration with no trajectory")
-        return Calibration(_risley.calibrate({**options, **on_walls}, threads, tell))
+        return Calibration(_risley.calibrate(options, threads, tell))
 
 
 def _refuse(options: Mapping[str, Any], why: str) -> None:
@@ -224,9 +184,9 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
          mount: Path = "", trajectory_errors: Path = "", scene: Path = "",
          knot_spacing: Optional[float] = None, cell_size: Optional[float] = None,
          empty_circle: Optional[float] = None, rate: Optional[float] = None,
-         range_noise: Optional[float] = None, prior_sigma: Optional[float] = None,
+         noise_range: Optional[float] = None, prior_sigma: Optional[float] = None,
          prior_sigma_deg: Optional[float] = None, range_offset_sigma: Optional[float] = None,
-         beam_origin: bool = True, flat_walls: bool = False, fixed: Fixed = (),
+         beam_origin: bool = True, walls: str = "uneven", fix: Fixed = (),
          free: Iterable[str] = (), seed: int = 0,
          progress: Progress = None) -> Plan:
     """Predict the accuracy of a calibration on planned walls or in a planned flight.
@@ -248,7 +208,7 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
         m; diameter of the circles that are searched for points, m.
     rate : float, optional
         Shots per second, Hz; by default the sensor's, for a flight 5000.
-    range_noise, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, flat_walls, fixed,
+    noise_range, prior_sigma, prior_sigma_deg, range_offset_sigma, beam_origin, walls, fix,
     free, seed
         As in `risley.calibrate`.
     progress : bool or callable, optional
@@ -263,31 +223,23 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
     EstimationError, FileError, ValueError
         As in `risley.calibrate`.
     """
-    options: Dict[str, Any] = {
-        "plan": os.fspath(scene_or_flight), "sensor": os.fspath(sensor), "rate": rate,
-        "range_noise": range_noise,
-        "prior_sigma": angle("prior_sigma", prior_sigma, prior_sigma_deg),
-        "range_offset_sigma": range_offset_sigma, "fixed": _held(fixed), "free": list(free)}
-    of_flight = {"mount": mount, "trajectory_errors": trajectory_errors, "scene": scene,
-                 "knot_spacing": knot_spacing, "cell_size": cell_size,
-                 "empty_circle": empty_circle}
+    options = options_of({**locals(), "plan": scene_or_flight})
     with telling(progress) as tell:
         if _risley.is_flight_plan(os.fspath(scene_or_flight)):
             if duration is not None:
                 raise ValueError("duration is not for a planned flight, whose strips say it")
-            paths = {"mount": os.fspath(mount), "trajectory_errors": os.fspath(trajectory_errors),
-                     "scene": os.fspath(scene)}
-            return Plan(_risley.plan_flight({**options, **of_flight, **paths, "seed": seed}, tell))
-        _refuse(of_flight, f"goes with a flight, and {scene_or_flight} is a scene")
-        return Plan(_risley.plan({**options, "duration": duration, "beam_origin": beam_origin,
-                                  "flat_walls": flat_walls},
-                                 tell))
+            return Plan(_risley.plan_flight(options, tell))
+        _refuse({"mount": mount, "trajectory_errors": trajectory_errors, "scene": scene,
+                 "knot_spacing": knot_spacing, "cell_size": cell_size,
+                 "empty_circle": empty_circle},
+                f"goes with a flight, and {scene_or_flight} is a scene")
+        return Plan(_risley.plan(options, tell))
 
 
 def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "",
           directions: str = "smoothed", beam_origin: bool = True, beam_divergence: bool = True,
           covariance: bool = True, common_factors: bool = False, rate: Rate = None,
-          angle_noise: Optional[float] = None, angle_noise_deg: Optional[float] = None,
+          noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
           las_scale: Optional[float] = None, time: str = "gps", trajectory: Path = "",
           trajectory_topic: str = "", mount: Path = "", accuracy: Path = "",
           trajectory_errors: Path = "", crs: str = "", datum: str = "", distribution: bool = False,
@@ -316,7 +268,7 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
         Write for every point the loadings of the errors that all points share.
     rate : float or 'full', optional
         Directions per second from which rotation angles are found, Hz.
-    angle_noise, angle_noise_deg : float, optional
+    noise_angle, noise_angle_deg : float, optional
         Standard deviation of the noise of azimuth and zenith before rounding, rad or deg; by
         default the calibration's.
     las_scale : float, optional
@@ -343,25 +295,14 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = {
-        "recording": source(recording), "calibration": os.fspath(calibration),
-        "output": os.fspath(output), "format": format, "directions": directions,
-        "beam_origin": beam_origin, "beam_divergence": beam_divergence, "covariance": covariance,
-        "common_factors": common_factors, "rate": rate,
-        "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "las_scale": las_scale, "time": time, "trajectory": os.fspath(trajectory),
-        "trajectory_topic": trajectory_topic, "mount": os.fspath(mount),
-        "accuracy": os.fspath(accuracy), "trajectory_errors": os.fspath(trajectory_errors),
-        "crs": crs, "datum": datum, "distribution": distribution, "device": device,
-        "shot_rate": shot_rate,
-        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Cloud(_risley.cloud(options, threads, tell))
 
 
 def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float] = None,
-             rate: Optional[float] = None, angle_noise: Optional[float] = None,
-             angle_noise_deg: Optional[float] = None, range_noise: Optional[float] = None,
+             rate: Optional[float] = None, noise_angle: Optional[float] = None,
+             noise_angle_deg: Optional[float] = None, noise_range: Optional[float] = None,
              quantize: bool = True, beam_origin: bool = True, rotor: str = "constant",
              set: Mapping[str, float] = {}, reported: Mapping[str, float] = {},
              reported_nominal: bool = False, start_angles: Optional[Sequence[float]] = None,
@@ -383,7 +324,7 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
         Length, s; by default 1, or until the end of the trajectory.
     rate : float, optional
         Shots per second, Hz; by default the sensor's.
-    angle_noise, angle_noise_deg, range_noise : float, optional
+    noise_angle, noise_angle_deg, noise_range : float, optional
         Standard deviations of directions, rad or deg, and of ranges, m; by default the sensor's.
     quantize : bool, default True
         Round to the sensor's resolution.
@@ -433,18 +374,7 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     FileError, ValueError
         For files that cannot be read or written, and for options that make no sense.
     """
-    options = {
-        "output": os.fspath(output), "sensor": os.fspath(sensor), "duration": duration,
-        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "range_noise": range_noise, "quantize": quantize, "beam_origin": beam_origin,
-        "rotor": rotor, "set": list(set.items()), "reported": list(reported.items()),
-        "reported_nominal": reported_nominal,
-        "start_angles": angles("start_angles", start_angles, start_angles_deg),
-        "scene": os.fspath(scene), "station": station, "trajectory": os.fspath(trajectory),
-        "trajectory_topic": trajectory_topic, "flight": os.fspath(flight),
-        "mount": os.fspath(mount), "trajectory_errors": os.fspath(trajectory_errors),
-        "trajectory_format": trajectory_format, "start": start, "clock_drift": clock_drift,
-        "seed": seed}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Simulation(_risley.simulate(options, threads, tell))
 
@@ -481,10 +411,7 @@ def identify(recording: Source, *, output: Path = "", force: bool = False, most_
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = {
-        "recording": source(recording), "output": os.fspath(output), "force": force,
-        "most_prisms": most_prisms, "fastest": fastest, "device": device, "shot_rate": shot_rate,
-        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Identification(*_risley.identify(options, threads, tell))
 
@@ -528,10 +455,7 @@ def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
     FileError, ValueError
         For files that cannot be written, and for options that make no sense.
     """
-    options = {
-        "sensor": os.fspath(sensor), "format": format, "output": os.fspath(output),
-        "duration": duration, "rate": rate, "every": every, "firing": firing,
-        "start_angles": angles("start_angles", start_angles, start_angles_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return Pattern(_risley.pattern(options, threads, tell))
 
@@ -560,18 +484,15 @@ def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
     dict
         As ``coverage`` in ``risley pattern --coverage --json``.
     """
-    options = {
-        "sensor": os.fspath(sensor), "after": None if after is None else list(after),
-        "cell": angle("cell", cell, cell_deg), "rate": rate, "every": every, "firing": firing,
-        "start_angles": angles("start_angles", start_angles, start_angles_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return dict(_risley.coverage(options, threads, tell))
 
 
 def observability(recording: Source = "", *, sensor: Path = "", duration: Optional[float] = None,
-                  rate: Rate = None, angle_noise: Optional[float] = None,
-                  angle_noise_deg: Optional[float] = None, rounding: bool = True,
-                  fixed: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
+                  rate: Rate = None, noise_angle: Optional[float] = None,
+                  noise_angle_deg: Optional[float] = None, rounding: bool = True,
+                  fix: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
                   extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
                   device: str = "", threads: int = 0, progress: Progress = None) -> Dict[str, Any]:
     """Compute Cramér-Rao bounds of all parameters for a recording or a plan.
@@ -586,7 +507,7 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
         Shots per second of the plan, or to use from the recording, Hz.
     rounding : bool, default True
         Whether the angles of a plan are rounded to the sensor's resolution.
-    sensor, angle_noise, angle_noise_deg, fixed, free, shot_rate, extrinsics, extrinsics_deg, device
+    sensor, noise_angle, noise_angle_deg, fix, free, shot_rate, extrinsics, extrinsics_deg, device
         As in `risley.estimate`.
     threads, progress
         As in `risley.estimate`.
@@ -596,12 +517,7 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
     dict
         As in ``risley observability --json``.
     """
-    options = {
-        "recording": source(recording), "sensor": os.fspath(sensor), "duration": duration,
-        "rate": rate, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "rounding": rounding, "fixed": _held(fixed), "free": list(free), "device": device,
-        "shot_rate": shot_rate,
-        "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return dict(_risley.observability(options, threads, tell))
 
@@ -637,7 +553,7 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01, anywhere: boo
         kind of sensor.
     """
     with telling(progress) as tell:
-        return dict(_risley.compare(_paths(results), false_alarm, anywhere, unlike, tell))
+        return dict(_risley.compare(paths(results), false_alarm, anywhere, unlike, tell))
 
 
 def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = None,
@@ -708,8 +624,6 @@ def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
     dict
         As in ``risley info --json``. Damage is reported under ``error``.
     """
-    options = {"input": source(file), "accuracy": os.fspath(accuracy),
-               "trajectory_topic": trajectory_topic, "device": device, "shot_rate": shot_rate,
-               "extrinsics": pose(extrinsics, extrinsics_deg)}
+    options = options_of({**locals(), "recording": file})
     with telling(progress) as tell:
         return dict(_risley.info(options, tell))

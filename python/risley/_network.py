@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: MIT
 """Sensors on the network: record them, and be one."""
 import logging
-import os
 from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._risley import Stop
-from risley._units import Path, angle, angles
+from risley._units import Path, options_of
 
 _logger = logging.getLogger("risley")
 
@@ -17,7 +16,7 @@ def _note(words: str, is_wrong: bool) -> None:
     _logger.log(logging.WARNING if is_wrong else logging.INFO, "%s", words)
 
 
-def find_sensors(interface: str = "", *, time: float = 2.5,
+def find_sensors(interface: str = "", *, find: float = 2.5,
                  progress: Progress = None) -> List[Dict[str, Any]]:
     """Find the first-generation Livox sensors on an interface. Nothing is sent to them.
 
@@ -25,7 +24,7 @@ def find_sensors(interface: str = "", *, time: float = 2.5,
     ----------
     interface : str, optional
         IPv4 address of this machine on which the sensors are; by default its only one.
-    time : float, default 2.5
+    find : float, default 2.5
         How long to listen, s. A sensor tells once a second that it is there.
     progress : bool or callable, optional
         As in `risley.read`.
@@ -41,12 +40,12 @@ def find_sensors(interface: str = "", *, time: float = 2.5,
         If the port of the broadcasts is taken, and for an address that is not of this machine.
     """
     with telling(progress) as tell:
-        found = _risley.find_sensors({"interface": interface, "find_time": time}, tell)
+        found = _risley.find_sensors(options_of({"interface": interface, "find": find}), tell)
     return list(found["sensors"])
 
 
 def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Stop] = None,
-           interface: str = "", serials: Sequence[str] = (), find_time: float = 2.5,
+           interface: str = "", serial: Sequence[str] = (), find: float = 2.5,
            passive: bool = False, data_port: int = 56001, coordinates: str = "spherical",
            return_mode: str = "as-is", imu: bool = True, optics: Path = "",
            progress: Progress = None) -> Dict[str, Any]:
@@ -66,9 +65,9 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
         but KeyboardInterrupt is raised.
     interface : str, optional
         IPv4 address of this machine on which the sensors are; by default its only one.
-    serials : sequence of str
+    serial : sequence of str
         Serial numbers (broadcast codes) of the sensors to record; by default all.
-    find_time : float, default 2.5
+    find : float, default 2.5
         How long sensors are looked for, s.
     passive : bool, default False
         Only listen to what sensors send to this address anyway.
@@ -99,30 +98,26 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
     FileError, ValueError
         If the file cannot be written, and for options that make no sense.
     """
-    options = {
-        "output": os.fspath(output), "duration": duration, "interface": interface,
-        "serials": list(serials), "find_time": find_time, "passive": passive,
-        "data_port": data_port, "coordinates": coordinates, "return_mode": return_mode,
-        "imu": imu, "optics": os.fspath(optics)}
+    options = options_of(locals())
     with telling(progress) as tell:
         return dict(_risley.record(options, _note, stop, tell))
 
 
 def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[Stop] = None,
             serial: str = "", sensor: Path = "mid-40", scene: Path = "", station: str = "",
-            recording: Path = "", speed: float = 1.0, angle_noise: Optional[float] = None,
-            angle_noise_deg: Optional[float] = None, range_noise: Optional[float] = None,
+            recording: Path = "", speed: float = 1.0, noise_angle: Optional[float] = None,
+            noise_angle_deg: Optional[float] = None, noise_range: Optional[float] = None,
             quantize: bool = True, beam_origin: bool = True, rotor: str = "constant",
             set: Mapping[str, float] = {}, reported: Mapping[str, float] = {},
             reported_nominal: bool = False, start_angles: Optional[Sequence[float]] = None,
             start_angles_deg: Optional[Sequence[float]] = None, time: str = "power-on",
-            time_from: float = 0.0, clock_drift_ppm: float = 0.0,
+            time_from: float = 0.0, clock_drift: float = 0.0,
             clock_jump: Optional[float] = None, clock_jump_by: float = 0.25, loss: float = 0.0,
             duplication: float = 0.0, disorder: float = 0.0, disorder_packets: int = 10,
             delay: float = 0.0, wrong_checksums: float = 0.0,
             heartbeat_dies: Optional[float] = None, restart: Optional[float] = None,
             restart_takes: float = 2.0, bend: Mapping[str, float] = {},
-            bend_time: Optional[float] = None, seed: int = 0, threads: int = 0,
+            bend_s: Optional[float] = None, seed: int = 0, threads: int = 0,
             progress: Progress = None) -> Dict[str, Any]:
     """Be a first-generation Livox sensor on the network, with known truth.
 
@@ -142,7 +137,7 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
         Recording of one sensor whose shots are sent instead, with its gaps, over and over.
     speed : float, default 1
         How many times faster than real time it runs.
-    sensor, station, angle_noise, angle_noise_deg, range_noise, quantize, beam_origin, rotor
+    sensor, station, noise_angle, noise_angle_deg, noise_range, quantize, beam_origin, rotor
         As in `risley.simulate`.
     set, reported, reported_nominal, start_angles, start_angles_deg, seed
         As in `risley.simulate`.
@@ -150,8 +145,8 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
         What its times count from.
     time_from : float, default 0
         When that begins, s after the first start; before, they count from power-on.
-    clock_drift_ppm : float, default 0
-        By how much its clock is faster than this machine's, ppm.
+    clock_drift : float, default 0
+        By how much its clock is faster than this machine's, s/s.
     clock_jump, clock_jump_by : float
         When its clock jumps, s after the first start; by default never. How far it jumps, s.
     loss, duplication, disorder, wrong_checksums : float
@@ -167,7 +162,7 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
         How long a restart takes, s.
     bend : mapping of str to float
         What is added to parameters of the true sensor while it runs, in the unit of the name.
-    bend_time : float, optional
+    bend_s : float, optional
         When the optics bend so, s after the start.
     threads, progress
         As in `risley.estimate`.
@@ -184,19 +179,6 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
     FileError, ValueError
         For files that cannot be read, and for options that make no sense.
     """
-    options = {
-        "interface": interface, "duration": duration, "serial": serial,
-        "sensor": os.fspath(sensor), "scene": os.fspath(scene), "station": station,
-        "recording": os.fspath(recording), "speed": speed, "time": time, "time_from": time_from,
-        "clock_drift_ppm": clock_drift_ppm, "clock_jump": clock_jump,
-        "clock_jump_by": clock_jump_by, "angle_noise": angle("angle_noise", angle_noise, angle_noise_deg),
-        "range_noise": range_noise, "quantize": quantize, "beam_origin": beam_origin,
-        "rotor": rotor, "set": list(set.items()), "reported": list(reported.items()),
-        "reported_nominal": reported_nominal,
-        "start_angles": angles("start_angles", start_angles, start_angles_deg), "loss": loss,
-        "duplication": duplication, "disorder": disorder, "disorder_packets": disorder_packets,
-        "delay": delay, "wrong_checksums": wrong_checksums, "heartbeat_dies": heartbeat_dies,
-        "restart": restart, "restart_takes": restart_takes,
-        "bend": list(bend.items()), "bend_time": bend_time, "seed": seed}
+    options = options_of(locals())
     with telling(progress) as tell:
         return dict(_risley.emulate(options, threads, _note, stop, tell))

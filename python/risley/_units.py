@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: MIT
 """Arguments of jobs: recordings, files, and angles in SI units or, under another name, in degrees."""
 import os
-from typing import List, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
 
 from risley import _risley
 
 Path = Union[str, "os.PathLike[str]"]
 Source = Union[Path, _risley.Recording]
 YawPitchRoll = Optional[Tuple[float, float, float]]
+Fixed = Union[Mapping[str, Optional[float]], Iterable[str]]
+Rate = Union[None, float, str]
 
 
 def source(recording: Source) -> Union[str, _risley.Recording]:
@@ -50,3 +52,36 @@ def pose(radians: YawPitchRoll, degrees: YawPitchRoll) -> YawPitchRoll:
     if len(given) != 3:
         raise ValueError(f"extrinsics has {len(given)} angles, expected yaw, pitch, roll")
     return given[0], given[1], given[2]
+
+
+def paths(given: Union[Path, Sequence[Path]]) -> List[str]:
+    """One path or several, as a list."""
+    if isinstance(given, (str, os.PathLike)):
+        return [os.fspath(given)]
+    return [os.fspath(path) for path in given]
+
+
+def options_of(values: Mapping[str, Any]) -> Dict[str, Any]:
+    """Keyword arguments of a job as the libraries take them: angles in radians, paths as texts."""
+    options: Dict[str, Any] = {}
+    for name, value in values.items():
+        if name in ("progress", "stop", "threads") or name.removesuffix("_deg") in options:
+            continue
+        if name == "extrinsics":
+            value = pose(value, values["extrinsics_deg"])
+        elif name == "start_angles":
+            value = angles(name, value, values["start_angles_deg"])
+        elif f"{name}_deg" in values:
+            value = angle(name, value, values[f"{name}_deg"])
+        elif name == "recordings":
+            value = sources(value)
+        elif isinstance(value, os.PathLike):
+            value = os.fspath(value)
+        elif isinstance(value, Mapping):
+            value = list(value.items())
+        elif name == "fix":
+            value = [(parameter, None) for parameter in value]
+        elif isinstance(value, Iterable) and not isinstance(value, (str, _risley.Recording)):
+            value = list(value)
+        options[name] = value
+    return options

@@ -13,6 +13,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/sensors/range_errors.hpp"
 
@@ -71,11 +72,12 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
         100.0 * all / recordings));
   }
   if (f.rolled && f.rolled->total < kWorthRolling * f.datum.total) {
-    advice.push_back(fmt::format(
-        "scan half of the time, roll the sensor by 180 degrees on the spot and scan the same walls "
-        "again (option same_walls): their shape then cancels, and directions are known to {:.2g} "
-        "instead of {:.2g} degrees",
-        degrees_from_radians(f.rolled->total), degrees_from_radians(f.datum.total)));
+    advice.push_back(
+        fmt::format("scan half of the time, roll the sensor by 180 degrees on the spot and scan "
+                    "the same walls again ({}): their shape then cancels, and directions are known "
+                    "to {:.2g} instead of {:.2g} degrees",
+                    name_of(kSetting.same_walls), degrees_from_radians(f.rolled->total),
+                    degrees_from_radians(f.datum.total)));
   }
   if (std::hypot(f.datum.sigma_pitch, f.datum.sigma_yaw) > kPoorDatum) {
     if (steep < 0.5 * all) {

@@ -14,6 +14,7 @@
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/saturating.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/trajectories/clock.hpp"
 

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/setting.hpp"
 
 #include "calibration/eigen_vectors.hpp"
 
@@ -159,8 +160,8 @@ FoundPoses poses_before_same_walls(const std::vector<FoundPlane>& found,
       }
       poses.why_not = fmt::format(
           "the walls of {} and {} fit in several ways, as in a square room: say how the sensor was "
-          "turned (option stations)",
-          recordings[r], recordings[poses.reference]);
+          "turned ({})",
+          recordings[r], recordings[poses.reference], name_of(kSetting.stations));
       return poses;
     }
     const Vector3d angles = best.turn.eulerAngles(2, 1, 0);

@@ -15,6 +15,7 @@
 #include "risley/core/chi_square.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/random.hpp"
+#include "risley/core/setting.hpp"
 
 #include "calibration/flight_words.hpp"
 
@@ -63,22 +64,24 @@ std::string tolerance_words(const JudgedError& error, double tolerance) {
 }
 
 /// Which recording would tell what these walls do not.
-constexpr const char* kBetterScan =
-    "scan walls that are tilted steeply against the sensor's axis and fill its field of view, or "
-    "more distant ones, or the same walls twice from one spot with the sensor rolled by 180 "
-    "degrees; or give what is known of walls and poses (option planes, option stations)";
+std::string better_scan() {
+  return fmt::format(
+      "scan walls that are tilted steeply against the sensor's axis and fill its field of view, or "
+      "more distant ones, or the same walls twice from one spot with the sensor rolled by 180 "
+      "degrees; or give what is known of walls and poses ({}, {})",
+      name_of(kSetting.planes), name_of(kSetting.stations));
+}
 
 CalibrationVerdict undecided_words(const Calibration& c) {
   if (std::ranges::any_of(c.prior_tests, contradicts)) {
-    return {
-        CalibrationCode::undecided, c.reason,
-        "check the normals and poses that were stated, or leave them out (option planes, option "
-        "stations)"};
+    return {CalibrationCode::undecided, c.reason,
+            fmt::format("check the normals and poses that were stated, or leave them out ({}, {})",
+                        name_of(kSetting.planes), name_of(kSetting.stations))};
   }
   if (c.unit_doubted) {
     return {CalibrationCode::undecided, c.reason, "state the unit of the ranges in the file"};
   }
-  return {CalibrationCode::undecided, c.reason, kBetterScan};
+  return {CalibrationCode::undecided, c.reason, better_scan()};
 }
 
 }  // namespace
@@ -106,8 +109,9 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
   if (!c.unobservable.empty()) {
     reason = fmt::format(
         "the walls determine {} only to {:.2g} degrees: walls tilted by 30 degrees or more against "
-        "the axis would do better, or a prior (option prior_sigma)",
-        estimation::direction_text(c.unobservable.front()), c.unobservable.front().sigma);
+        "the axis would do better, or a prior ({})",
+        estimation::direction_text(c.unobservable.front()), c.unobservable.front().sigma,
+        name_of(kSetting.prior_sigma));
   }
   const PriorTest* worst = nullptr;
   for (const PriorTest& test : c.prior_tests) {
@@ -169,7 +173,7 @@ CalibrationVerdict verdict_of(const Calibration& c) {
               fmt::format("{}, which leaves open whether it is within the tolerance of {:.3g} "
                           "degree",
                           confirmed, degrees_from_radians(c.tolerance)),
-              kBetterScan};
+              better_scan()};
     }
     return {CalibrationCode::as_believed, confirmed,
             "keep what the sensor believes: these walls leave open whether the calibration is "
@@ -189,7 +193,7 @@ CalibrationVerdict verdict_of(const Calibration& c) {
                         "better than what the sensor believes with a probability of only {:.2g}",
                         moved, plain_text(degrees_from_radians(c.datum.total), 2),
                         offset_text(c.datum.total), c.better_probability),
-            kBetterScan};
+            better_scan()};
   }
   const JudgedError error{c.pointing_error.errors.total, c.pointing_error.total_sigma};
   const std::string words = moved + tolerance_words(error, c.tolerance);
@@ -260,7 +264,7 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
   for (const HeldParameter& held : c.held) {
     if (!held.significant) continue;
     return {CalibrationCode::undecided, in_words(held, c.sensor),
-            "estimate " + held.name + " as well (option additional)"};
+            fmt::format("estimate {} as well ({})", held.name, name_of(kSetting.free))};
   }
   if (auto contradiction = contradiction_of(c)) return *contradiction;
   // Of the change of some unknowns, and how many these are.

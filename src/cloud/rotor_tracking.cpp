@@ -15,6 +15,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/estimation/parameter_agreement.hpp"
 #include "risley/sensors/prism_sizes.hpp"
 
@@ -91,13 +92,14 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
 /// Ranges and the beam's origin need the sensor's frame, and a roll cannot be found.
 [[noreturn]] void refuse_frame(const estimation::Estimate& estimate) {
   const estimation::FrameTurn& turn = estimate.frame_turn->turn;
-  throw TurnedFrame(fmt::format(
+  throw EstimationError(fmt::format(
       "the recording's frame is not the sensor's: shots lie outside the field of view, and its "
-      "axis "
-      "is found turned by {:.3f} deg in yaw and {:.3f} deg in pitch (a roll cannot be found){}; "
-      "points need the whole turn to be stated",
+      "axis is found turned by {:.3f} deg in yaw and {:.3f} deg in pitch (a roll cannot be "
+      "found){}; "
+      "points need the whole turn to be stated: say it with {} YAW,PITCH,ROLL",
       degrees_from_radians(turn.yaw), degrees_from_radians(turn.pitch),
-      estimate.converged ? "" : ", though the estimate failed: " + estimate.reason));
+      estimate.converged ? "" : ", though the estimate failed: " + estimate.reason,
+      name_of(kSetting.extrinsics)));
 }
 
 }  // namespace

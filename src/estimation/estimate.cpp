@@ -13,6 +13,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/ekf.hpp"
 #include "risley/estimation/free_parameters.hpp"
@@ -261,10 +262,11 @@ void say_verdict(Estimate& estimate, const sensors::Sensor& nominal,
       break;
     case EstimateCode::inconsistent:
       verdict.words = estimate.reason;
-      verdict.to_do =
-          "see whether sensor, times, frame and elevation are those of the recording (option "
-          "sensor, option shot_rate, option extrinsics, option mirrored), and whether the sensor "
-          "stood still";
+      verdict.to_do = fmt::format(
+          "see whether sensor, times, frame and elevation are those of the recording ({}, {}, {}, "
+          "{}), and whether the sensor stood still",
+          name_of(kSetting.sensor), name_of(kSetting.shot_rate), name_of(kSetting.extrinsics),
+          name_of(kSetting.mirror));
       break;
     case EstimateCode::undecided:
       verdict.words = estimate.reason;

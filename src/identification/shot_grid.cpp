@@ -12,6 +12,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 
 namespace risley::identification {
 namespace {
@@ -42,8 +43,9 @@ ShotGrid shot_grid(const estimation::AngleSeries& series, estimation::ShotRange 
   grid.step = upper_median(steps);
   if (!(grid.step > 0)) {
     throw EstimationError(
-        "more than half of the shots have the same time as the shot before: give their rate "
-        "(option shot_rate), so that times are counted");
+        fmt::format("more than half of the shots have the same time as the shot before: give their "
+                    "rate ({}), so that times are counted",
+                    name_of(kSetting.shot_rate)));
   }
   grid.slot.assign(stamp.size(), 0);
   double first = 0;  // time of slot 0 on the fitted grid

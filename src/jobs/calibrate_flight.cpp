@@ -10,6 +10,7 @@
 #include "risley/calibration/flight_recordings.hpp"
 #include "risley/cloud/map_projection.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/provenance.hpp"
 #include "risley/jobs/result_folder.hpp"
 #include "risley/scenes/control.hpp"
@@ -30,16 +31,17 @@ using calibration::RangedRecording;
 /// Wrong wishes are told before an hour of reading.
 void check_flight_options(const CalibrateFlightOptions& options) {
   check_ranged_input(options);
-  if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
-  if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
-  check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
-  if (options.tolerance) check_not_negative(*options.tolerance, "tolerance", "rad");
-  check_positive(options.knot_spacing, "knot_spacing", "s");
-  check_positive(options.cell_size, "cell_size", "m");
+  if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(kSetting.prior_sigma, *options.prior_sigma);
+  require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
+  if (options.tolerance) require_not_negative(kSetting.tolerance, *options.tolerance);
+  require_positive(kSetting.knot_spacing, options.knot_spacing);
+  require_positive(kSetting.cell_size, options.cell_size);
   if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
   if (!options.platform.crs.empty() || !options.platform.datum.empty()) {
     throw InvalidArgument(
-        "option crs and option datum choose a map, and a flight is calibrated without one");
+        fmt::format("{} and {} choose a map, and a flight is calibrated without one",
+                    name_of(kSetting.crs), name_of(kSetting.datum)));
   }
 }
 
@@ -47,10 +49,10 @@ cloud::MovingPlatform platform_of(const CalibrateFlightOptions& options, const P
   cloud::MovingPlatform platform = load_platform(options.platform, progress);
   if (!platform.errors) {
     throw InvalidArgument(
-        fmt::format("{} states no accuracies: give option trajectory_errors, which says how wrong "
-                    "the trajectory may be and for how long. Without it, strips that do not fit "
-                    "may be the fault of either the sensor or the trajectory",
-                    options.platform.trajectory));
+        fmt::format("{} states no accuracies: give {}, which says how wrong the trajectory may be "
+                    "and for how long. Without it, strips that do not fit may be the fault of "
+                    "either the sensor or the trajectory",
+                    options.platform.trajectory, name_of(kSetting.trajectory_errors)));
   }
   return platform;
 }

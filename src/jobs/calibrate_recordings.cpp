@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/provenance.hpp"
 #include "risley/jobs/result_folder.hpp"
 
@@ -20,24 +21,7 @@ namespace {
 
 using calibration::RangedRecording;
 
-/// Wrong wishes are told before an hour of reading.
-calibration::CalibrationOptions checked_settings(const CalibrateRecordingsOptions& options) {
-  check_ranged_input(options);
-  if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
-  if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
-  check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
-  check_not_negative(options.patch_thickness, "patch_thickness", "m");
-  if (options.tolerance) check_not_negative(*options.tolerance, "tolerance", "rad");
-  if (options.method == calibration::CalibrationMethod::paper &&
-      (options.planes || !options.stations.empty() || options.prior_sigma)) {
-    throw InvalidArgument(
-        "option method paper cannot be combined with option planes, option stations or option "
-        "prior_sigma: it uses the walls of the recordings alone");
-  }
-  if (options.same_walls == calibration::SameWalls::yes && options.recordings.size() < 2) {
-    throw InvalidArgument("option same_walls needs two recordings or more, found 1");
-  }
-  if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
+calibration::CalibrationOptions settings_of(const CalibrateRecordingsOptions& options) {
   calibration::CalibrationOptions result;
   result.method = options.method;
   result.additional = options.additional;
@@ -82,11 +66,34 @@ void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings
 
 }  // namespace
 
+void check(const CalibrateRecordingsOptions& options) {
+  check_ranged_input(options);
+  if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(kSetting.prior_sigma, *options.prior_sigma);
+  require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
+  require_not_negative(kSetting.patch_thickness, options.patch_thickness);
+  if (options.tolerance) require_not_negative(kSetting.tolerance, *options.tolerance);
+  if (options.method == calibration::CalibrationMethod::paper &&
+      (options.planes || !options.stations.empty() || options.prior_sigma)) {
+    throw InvalidArgument(fmt::format(
+        "{} paper cannot be combined with {}, {} or {}: it uses the walls of the recordings alone",
+        name_of(kSetting.method), name_of(kSetting.planes), name_of(kSetting.stations),
+        name_of(kSetting.prior_sigma)));
+  }
+  if (options.same_walls == calibration::SameWalls::yes && options.recordings.size() < 2) {
+    throw InvalidArgument(
+        fmt::format("{} needs two recordings or more, found 1", name_of(kSetting.same_walls)));
+  }
+  if (!options.truths.empty()) check_truths(options.truths, options.recordings.size());
+}
+
 std::vector<scenes::Station> stations_of(const std::string& path,
                                          const std::vector<std::string>& names,
                                          std::size_t recordings) {
   if (path.empty()) {
-    if (!names.empty()) throw InvalidArgument("option station needs option stations");
+    if (!names.empty())
+      throw InvalidArgument(
+          fmt::format("{} needs {}", name_of(kSetting.station), name_of(kSetting.stations)));
     return {};
   }
   const scenes::Scene scene = scenes::load_scene(path);
@@ -97,8 +104,8 @@ std::vector<scenes::Station> stations_of(const std::string& path,
   if (stations.size() != recordings) {
     throw InvalidArgument(
         fmt::format("{} stations for {} recordings: {} must list one per recording, in their "
-                    "order, or name them with option station",
-                    stations.size(), recordings, path));
+                    "order, or name them with {}",
+                    stations.size(), recordings, path, name_of(kSetting.station)));
   }
   return stations;
 }
@@ -106,7 +113,8 @@ std::vector<scenes::Station> stations_of(const std::string& path,
 CalibratedRecordings calibrate_recordings(const CalibrateRecordingsOptions& options,
                                           const Progress& progress) {
   const Stopwatch whole;
-  calibration::CalibrationOptions settings = checked_settings(options);
+  check(options);
+  calibration::CalibrationOptions settings = settings_of(options);
   ResultFolder folder(options.files.folder);
   std::optional<InputHashes> hashes;
   std::vector<recordings::Source> sources = held_open(options.recordings);

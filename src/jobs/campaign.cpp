@@ -12,6 +12,7 @@
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/io/folder.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/simulation/truth_file.hpp"
@@ -100,14 +101,14 @@ double bytes_of(const CampaignSetting& setting) {
 
 CampaignChunk range_of(const CampaignPlan& plan, const ChunkNumber& which) {
   if (which.count < 1 || which.number < 1 || which.number > which.count) {
-    throw InvalidArgument(fmt::format("option chunk = {}/{}, wanted I/N with I from 1 to N",
-                                      which.number, which.count));
+    throw InvalidArgument(fmt::format("{} = {}/{}, wanted I/N with I from 1 to N",
+                                      name_of(kSetting.chunk), which.number, which.count));
   }
   const std::uint64_t cells = plan.cells();
   if (which.count > cells) {
-    throw InvalidArgument(
-        fmt::format("option chunk = {}/{}: the plan has {} cells, so N is at most {}", which.number,
-                    which.count, cells, cells));
+    throw InvalidArgument(fmt::format("{} = {}/{}: the plan has {} cells, so N is at most {}",
+                                      name_of(kSetting.chunk), which.number, which.count, cells,
+                                      cells));
   }
   CampaignChunk chunk;
   // Products of two 64-bit numbers: in two steps, so that they cannot overflow.

@@ -17,6 +17,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/estimation/free_parameters.hpp"
 #include "risley/hashes/sha256.hpp"
@@ -382,7 +383,8 @@ CampaignPlan load_campaign_plan(const std::string& path, std::uint64_t seed) {
 CampaignPlan parse_campaign_plan(const std::string& text, const std::string& path,
                                  std::uint64_t seed) {
   if (seed > kLargestSeed) {
-    throw InvalidArgument(fmt::format("option seed = {}, allowed: 0 to {}", seed, kLargestSeed));
+    throw InvalidArgument(
+        fmt::format("{} = {}, allowed: 0 to {}", name_of(kSetting.seed), seed, kLargestSeed));
   }
   const YamlNode root = io::parse_yaml(text, path);
   const YamlMap map(root, path, "");

@@ -11,33 +11,22 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
+#include "risley/core/setting.hpp"
 
 namespace risley::jobs {
 
-void check_positive(double value, std::string_view option, std::string_view unit) {
-  if (!(value > 0) || !std::isfinite(value)) {
-    throw InvalidArgument(fmt::format("option {} = {} {}, allowed above 0", option, value, unit));
-  }
-}
-
-void check_not_negative(double value, std::string_view option, std::string_view unit) {
-  if (!(value >= 0) || !std::isfinite(value)) {
-    throw InvalidArgument(
-        fmt::format("option {} = {} {}, allowed 0 and above", option, value, unit));
-  }
-}
-
 void check_truth_name(const std::string& truth) {
   if (std::filesystem::path(truth).extension() != ".yaml") {
-    throw InvalidArgument(fmt::format("option truth = {}, expected OUT.truth.yaml", truth));
+    throw InvalidArgument(
+        fmt::format("{} = {}, expected OUT.truth.yaml", name_of(kSetting.truth), truth));
   }
 }
 
 void check_truths(const std::vector<std::string>& truths, std::size_t recordings) {
   if (truths.size() != recordings) {
     throw InvalidArgument(
-        fmt::format("{} truth files for {} recordings: give option truth once per recording",
-                    truths.size(), recordings));
+        fmt::format("{} truth files for {} recordings: give {} once per recording", truths.size(),
+                    recordings, name_of(kSetting.truth)));
   }
   for (const std::string& truth : truths) check_truth_name(truth);
 }
@@ -53,9 +42,9 @@ void check_truth_is_of_recording(std::span<const Vector3<double>> recorded,
   const double middle = median(apart);
   if (!(middle > kMost)) return;
   throw InvalidArgument(fmt::format(
-      "option truth = {} belongs to another recording: at the same times its beams point "
+      "{} = {} belongs to another recording: at the same times its beams point "
       "elsewhere, by {:.3g} degrees in the median, allowed {:.0f}",
-      truth, degrees_from_radians(middle), degrees_from_radians(kMost)));
+      name_of(kSetting.truth), truth, degrees_from_radians(middle), degrees_from_radians(kMost)));
 }
 
 std::string truth_columns(const std::string& truth) {

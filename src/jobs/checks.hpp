@@ -5,17 +5,11 @@
 #include <cstddef>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "risley/core/vector3.hpp"
 
 namespace risley::jobs {
-
-/// @throws InvalidArgument naming the option unless the value is finite and above 0
-void check_positive(double value, std::string_view option, std::string_view unit);
-/// The same for 0 and above.
-void check_not_negative(double value, std::string_view option, std::string_view unit);
 
 /// @throws InvalidArgument unless the file is named as a simulation names its truth
 void check_truth_name(const std::string& truth);

@@ -12,6 +12,7 @@
 
 #include "risley/cloud/map_projection.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/hashes/sha256.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/prepared_recording.hpp"
@@ -54,11 +55,13 @@ void require_same_type(const recordings::Source& recording, const CloudOfRecordi
 RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
                                   const Progress& progress) {
   cloud::CloudOptions settings = options.cloud;
-  if (settings.rate) check_positive(*settings.rate, "rate", "Hz");
-  if (settings.angle_noise) check_positive(*settings.angle_noise, "angle_noise", "rad");
-  check_positive(settings.writer.las_scale, "las_scale", "m");
+  if (settings.rate) require_positive(kSetting.rate, *settings.rate);
+  if (settings.angle_noise) require_positive(kSetting.noise_angle, *settings.angle_noise);
+  require_positive(kSetting.las_scale, settings.writer.las_scale);
   if (settings.loadings && !settings.pointing.covariance) {
-    throw InvalidArgument("option common_factors yes and option covariance no cannot be combined");
+    throw InvalidArgument(fmt::format("{} yes and {} no cannot be combined",
+                                      name_of(kSetting.common_factors),
+                                      name_of(kSetting.covariance)));
   }
   const sensors::Sensor calibration = load_result(options.calibration);
   cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read

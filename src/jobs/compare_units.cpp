@@ -16,6 +16,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/tables/table_input.hpp"
@@ -83,9 +84,9 @@ std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
   if (!anywhere && !is_below_folder_of(table, path)) {
     return LeftOut{
         name,
-        fmt::format("{} is not in the folder of {}: results elsewhere are opened on demand alone "
-                    "(option anywhere)",
-                    path, table),
+        fmt::format(
+            "{} is not in the folder of {}: results elsewhere are opened on demand alone ({})",
+            path, table, name_of(kSetting.anywhere)),
         true};
   }
   if (!fs::is_directory(path, ignored) && !fs::is_regular_file(path, ignored)) {
@@ -218,8 +219,9 @@ void leave_out_unlike(ComparedUnits& found, const std::vector<Sensor>& sensors) 
     const bool first = sensors[pair.a].reference == sensors::CalibrationReference::planes;
     return fmt::format(
         "{} is a calibration, which says where beams truly go, and {} an estimate of what the "
-        "sensor believes: they differ in a unit that never changed (option unlike compares them)",
-        found.results[first ? pair.a : pair.b], found.results[first ? pair.b : pair.a]);
+        "sensor believes: they differ in a unit that never changed ({} compares them)",
+        found.results[first ? pair.a : pair.b], found.results[first ? pair.b : pair.a],
+        name_of(kSetting.unlike));
   };
   const std::size_t before = found.pairs.size();
   std::string first;
@@ -260,7 +262,7 @@ void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Pro
 }  // namespace
 
 ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& progress) {
-  require_between("option false_alarm", options.false_alarm, 0, 1);
+  require_between(kSetting.false_alarm, options.false_alarm, 0, 1);
   ComparedUnits found;
   found.false_alarm = options.false_alarm;
   LoadedResults loaded = load(options, found.left_out, progress);

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/setting.hpp"
 #include "risley/jobs/prepared_recording.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/recordings/writer.hpp"
@@ -22,9 +23,9 @@ recordings::RecordingHeader header_of(PreparedRecording& input,
     for (recordings::Device& device : header.devices) {
       const std::string told = recordings::device_type_name(device.type);
       if (told != "unknown" && device.type != *options.sensor_type && !device.type_inferred) {
-        throw InvalidArgument(fmt::format("option sensor_type {}: the recording itself names a {}",
-                                          recordings::device_type_name(*options.sensor_type),
-                                          told));
+        throw InvalidArgument(
+            fmt::format("{} {}: the recording itself names a {}", name_of(kSetting.sensor_type),
+                        recordings::device_type_name(*options.sensor_type), told));
       }
       device.type = *options.sensor_type;
     }

@@ -15,6 +15,7 @@
 
 #include "risley/core/random.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/recordings/livox/packet_encoder.hpp"
 #include "risley/wire/sensor_session.hpp"
 #include "risley/wire/udp_socket.hpp"
@@ -104,8 +105,8 @@ class Emulator {
         damage_(options.simulation.seed, 104, options.faults.wrong_checksums) {
     identity_.code = options.serial.empty() ? scan_.device().serial : options.serial;
     if (identity_.code.empty()) {
-      throw InvalidArgument(fmt::format(
-          "option recording = {}: does not name its serial number; choose one", options.recording));
+      throw InvalidArgument(fmt::format("{} = {}: does not name its serial number; choose one",
+                                        name_of(kSetting.recording), options.recording));
     }
     identity_.device_type = scan_.device().type;
     identity_.firmware = {3, 8, 0, 0};
@@ -454,34 +455,35 @@ EmulatedSensor Emulator::run() {
 
 EmulatedSensor emulate_sensor(const EmulateOptions& options, const EmulateNote& note,
                               const Progress& progress) {
-  if (options.duration) require_above("option duration", *options.duration, 0, "s");
-  require_between("option speed", options.speed, 1 / kFastest, kFastest);
+  if (options.duration) require_positive(kSetting.duration, *options.duration);
+  require_between(kSetting.speed, options.speed, 1 / kFastest, kFastest);
   const EmulatedClock& clock = options.clock;
-  require_between("option source_from", clock.source_from, 0, 1e6, "s");
-  require_between("option drift_ppm", clock.drift_ppm, -10'000, 10'000, "ppm");
-  require_between("option jump_by", clock.jump_by, -kFarthestJump, kFarthestJump, "s");
-  if (clock.jump) require_not_below("option jump", *clock.jump, 0, "s");
+  require_between(kSetting.time_from, clock.source_from, 0, 1e6);
+  require_between(kSetting.clock_drift, 1e-6 * clock.drift_ppm, -0.01, 0.01);
+  require_between(kSetting.clock_jump_by, clock.jump_by, -kFarthestJump, kFarthestJump);
+  if (clock.jump) require_not_negative(kSetting.clock_jump, *clock.jump);
   if (clock.source == recordings::TimeReference::utc ||
       clock.source == recordings::TimeReference::relative) {
-    throw InvalidArgument(
-        fmt::format("option source = {}, allowed power-on, PTP and PPS", to_string(clock.source)));
+    throw InvalidArgument(fmt::format("{} = {}, allowed power-on, PTP and PPS",
+                                      name_of(kSetting.time), to_string(clock.source)));
   }
   const EmulatedFaults& faults = options.faults;
-  require_between("option loss", faults.loss, 0, 1);
-  require_between("option duplication", faults.duplication, 0, 1);
-  require_between("option disorder", faults.disorder, 0, 1);
-  require_between("option wrong_checksums", faults.wrong_checksums, 0, 1);
-  require_between("option farthest", faults.farthest, 1, 1000);
-  require_between("option delay", faults.delay, 0, 60, "s");
-  require_between("option restart_time", faults.restart_time, 0, 3600, "s");
+  require_between(kSetting.loss, faults.loss, 0, 1);
+  require_between(kSetting.duplication, faults.duplication, 0, 1);
+  require_between(kSetting.disorder, faults.disorder, 0, 1);
+  require_between(kSetting.wrong_checksums, faults.wrong_checksums, 0, 1);
+  require_between(kSetting.disorder_packets, faults.farthest, 1, 1000);
+  require_between(kSetting.delay, faults.delay, 0, 60);
+  require_between(kSetting.restart_takes, faults.restart_time, 0, 3600);
   if (faults.heartbeat_dies) {
-    require_not_below("option heartbeat_dies", *faults.heartbeat_dies, 0, "s");
+    require_not_negative(kSetting.heartbeat_dies, *faults.heartbeat_dies);
   }
-  if (faults.restart) require_not_below("option restart", *faults.restart, 0, "s");
-  if (faults.bend_time) require_not_below("option bend_time", *faults.bend_time, 0, "s");
+  if (faults.restart) require_not_negative(kSetting.restart, *faults.restart);
+  if (faults.bend_time) require_not_negative(kSetting.bend_time, *faults.bend_time);
   if (faults.bend_time.has_value() == faults.bend.empty()) {
     throw InvalidArgument(
-        "option bend and option bend_time need each other: which parameters change, and when");
+        fmt::format("{} and {} need each other: which parameters change, and when",
+                    name_of(kSetting.bend), name_of(kSetting.bend_time)));
   }
   return Emulator(options, note, progress).run();
 }

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/recordings/livox/packet_encoder.hpp"
 #include "risley/scenes/scene.hpp"
 
@@ -47,8 +48,8 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   const std::optional<ShotGrid> grid = grid_of(type);
   if (!grid) {
     throw InvalidArgument(fmt::format(
-        "option sensor = {}: the device type {} is none that can be emulated, allowed {}",
-        options.sensor, type, recordings::livox_types_text()));
+        "{} = {}: the device type {} is none that can be emulated, allowed {}",
+        name_of(kSetting.sensor), options.sensor, type, recordings::livox_types_text()));
   }
   settings.rate = 1e9 * grid->interval_denominator / grid->interval_numerator_ns;
   if (!settings.scene) settings.scene = scenes::parse_scene(kRoom, "the built-in room");
@@ -80,7 +81,8 @@ EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& 
   if (bend.empty()) return;
   if (recorded_) {
     throw InvalidArgument(
-        "option bend changes simulated optics: the shots of a recording are as they are");
+        fmt::format("{} changes simulated optics: the shots of a recording are as they are",
+                    name_of(kSetting.bend)));
   }
   SimulationOptions bent = options;
   for (const auto& [name, change] : bend) {

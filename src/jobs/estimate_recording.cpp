@@ -10,6 +10,7 @@
 
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/vector3.hpp"
 #include "risley/jobs/provenance.hpp"
 #include "risley/jobs/result_folder.hpp"
@@ -22,19 +23,6 @@ namespace risley::jobs {
 namespace {
 
 constexpr double kFilterRate = 1000.0;
-
-/// Wrong wishes are told before an hour of reading.
-void check(const EstimateRecordingOptions& options) {
-  if (options.rate) check_positive(*options.rate, "rate", "Hz");
-  if (options.angle_noise) check_positive(*options.angle_noise, "angle_noise", "rad");
-  if (options.files.states == StatesRows::all && options.method == estimation::Method::ekf &&
-      options.rate) {
-    throw InvalidArgument(
-        "option states all needs option rate full: the filter has states only at the shots it "
-        "uses");
-  }
-  if (!options.truth.empty()) check_truth_name(options.truth);
-}
 
 void write_files(const EstimateRecordingOptions& options, EstimatedRecording& result,
                  ResultFolder& folder, const Progress& progress) {
@@ -86,6 +74,18 @@ void check_beams(const estimation::PackedSeries& series, const recordings::Truth
 }
 
 }  // namespace
+
+void check(const EstimateRecordingOptions& options) {
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.angle_noise) require_positive(kSetting.noise_angle, *options.angle_noise);
+  if (options.files.states == StatesRows::all && options.method == estimation::Method::ekf &&
+      options.rate) {
+    throw InvalidArgument(
+        fmt::format("{} all needs {} full: the filter has states only at the shots it uses",
+                    name_of(kSetting.states), name_of(kSetting.rate)));
+  }
+  if (!options.truth.empty()) check_truth_name(options.truth);
+}
 
 std::optional<double> usual_rate(estimation::Method method) {
   if (method == estimation::Method::ekf) return kFilterRate;

@@ -14,6 +14,7 @@
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/compare_results.hpp"
 
 namespace risley::jobs {
@@ -214,7 +215,7 @@ std::string worst_words(const FleetUnit& unit, const Fleet& fleet) {
 
 Fleet fleet_of(const std::vector<Sensor>& units, double false_alarm) {
   require_at_least("number of units", static_cast<long long>(units.size()), kFewestUnitsOfFleet);
-  require_between("option false_alarm", false_alarm, 0, 1);
+  require_between(kSetting.false_alarm, false_alarm, 0, 1);
   for (const Sensor& unit : units) require_same_optics(units.front(), unit);
   Fleet fleet;
   fleet.shape = units.front().shape();

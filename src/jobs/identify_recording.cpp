@@ -10,6 +10,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/identification/soundness.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/prepared_recording.hpp"
@@ -93,8 +94,10 @@ void judge(IdentifiedRecording& result) {
             ? "export the recording again without cropping or filtering it: a small part of the "
               "field of view shows no lines; what is known of a sensor holds there, too, and is "
               "what an estimate begins with"
-            : "check the times (option shot_rate gives the rate of shots that are counted) and "
-              "that the recording is of one sensor at rest";
+            : fmt::format(
+                  "check the times ({} gives the rate of shots that are counted) and that the "
+                  "recording is of one sensor at rest",
+                  name_of(kSetting.shot_rate));
     return;
   }
   if (!found.decided) {

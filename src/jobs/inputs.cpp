@@ -15,6 +15,7 @@
 #include <fnmatch.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/hashes/sha256.hpp"
 #include "risley/io/file_identity.hpp"
@@ -275,8 +276,8 @@ std::vector<Input> find_inputs(const InputNames& wanted, const Progress& progres
       finder.add(std::string(line), false);
     }
     if (is_empty) {
-      throw InvalidArgument(
-          fmt::format("option list: {} names no recording, expected one a line", wanted.list));
+      throw InvalidArgument(fmt::format("{}: {} names no recording, expected one a line",
+                                        name_of(kSetting.list), wanted.list));
     }
   }
   return std::move(finder).inputs();
@@ -302,9 +303,8 @@ std::vector<std::string> files_behind(const std::string& path) {
   return files;
 }
 
-std::vector<std::pair<std::string, std::string>> input_hashes(const std::string& path,
-                                                              const Progress& progress) {
-  std::vector<std::pair<std::string, std::string>> hashes;
+FileHashes input_hashes(const std::string& path, const Progress& progress) {
+  FileHashes hashes;
   for (const std::string& file : recordings::recording_files(path)) {
     hashes.emplace_back(file, hashes::sha256_of_file(file, progress));
   }

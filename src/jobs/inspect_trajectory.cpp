@@ -2,10 +2,35 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/inspect_trajectory.hpp"
 
+#include <utility>
+
+#include <fmt/format.h>
+
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 namespace risley::jobs {
+
+bool is_trajectory(const InspectTrajectoryOptions& options, const recordings::ReadOptions& reading,
+                   const Progress& progress) {
+  if (options.topic.empty() &&
+      trajectories::trajectory_file_kind(options.trajectory, progress.silent()) ==
+          trajectories::TrajectoryFileKind::none) {
+    if (options.accuracy.empty()) return false;
+    throw InvalidArgument(fmt::format("{} goes with a trajectory, and {} is none",
+                                      name_of(kSetting.accuracy), options.trajectory));
+  }
+  const std::pair<bool, Setting> of_recordings[] = {
+      {reading.shot_rate.has_value(), kSetting.shot_rate},
+      {reading.extrinsics.has_value(), kSetting.extrinsics},
+      {!reading.device.empty(), kSetting.device}};
+  for (const auto& [given, setting] : of_recordings) {
+    if (!given) continue;
+    throw InvalidArgument(fmt::format("{} is for recordings, not trajectories", name_of(setting)));
+  }
+  return true;
+}
 
 InspectedTrajectory inspect_trajectory(const InspectTrajectoryOptions& options,
                                        const Progress& progress) {
@@ -22,8 +47,8 @@ InspectedTrajectory inspect_trajectory(const InspectTrajectoryOptions& options,
   };
   if (trajectories::trajectory_file_kind(options.trajectory) == TrajectoryFileKind::accuracies) {
     if (!options.accuracy.empty()) {
-      throw InvalidArgument("option accuracy: " + options.trajectory +
-                            " itself holds accuracies, expected a trajectory");
+      throw InvalidArgument(fmt::format("{}: {} itself holds accuracies, expected a trajectory",
+                                        name_of(kSetting.accuracy), options.trajectory));
     }
     take_accuracies(options.trajectory);
     return result;

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/moving_platform.hpp"
 
+#include <fmt/format.h>
+
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 namespace risley::jobs {
@@ -24,13 +27,14 @@ std::vector<std::string> paths_of(const PlatformFiles& files) {
 cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& progress) {
   if (files.trajectory.empty()) {
     throw InvalidArgument(
-        "option trajectory is missing: mount, accuracies, errors and crs are for a sensor that "
-        "moves");
+        fmt::format("{} is missing: mount, accuracies, errors and crs are for a sensor that moves",
+                    name_of(kSetting.trajectory)));
   }
   if (files.mount.empty()) {
     throw InvalidArgument(
-        "option mount is missing: a file that says how the sensor sits on the platform of the "
-        "trajectory (axes, lever arm, boresight, clock)");
+        fmt::format("{} is missing: a file that says how the sensor sits on the platform of the "
+                    "trajectory (axes, lever arm, boresight, clock)",
+                    name_of(kSetting.mount)));
   }
   cloud::MovingPlatform platform;
   platform.mount = trajectories::load_mount(files.mount);

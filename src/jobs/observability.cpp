@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/sensors/preset.hpp"
@@ -42,9 +43,9 @@ estimation::Observability of_plan(const ObservabilityOptions& options,
 
 JudgedObservability judge_observability(const ObservabilityOptions& options,
                                         const Progress& progress) {
-  check_positive(options.duration, "duration", "s");
-  if (options.rate) check_positive(*options.rate, "rate", "Hz");
-  if (options.angle_noise) check_positive(*options.angle_noise, "angle_noise", "rad");
+  require_positive(kSetting.duration, options.duration);
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.angle_noise) require_positive(kSetting.noise_angle, *options.angle_noise);
   progress.check();
   JudgedObservability result;
   if (options.recording.empty()) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/jobs/plan_calibration.hpp"
 
+#include "risley/core/setting.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -11,11 +12,11 @@ namespace risley::jobs {
 
 PlannedCalibration plan_calibration(const PlanCalibrationOptions& options,
                                     const Progress& progress) {
-  check_positive(options.duration, "duration", "s");
-  if (options.rate) check_positive(*options.rate, "rate", "Hz");
-  if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
-  if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
-  check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
+  require_positive(kSetting.duration, options.duration);
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(kSetting.prior_sigma, *options.prior_sigma);
+  require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
   calibration::CalibrationPlan plan;
   plan.scene = options.scene;
   plan.sensor = load_result(options.sensor.empty() ? kUsualSensor : options.sensor);

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/scenes/scene.hpp"
@@ -66,13 +67,15 @@ void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) 
   options.plan = trajectories::load_flight_plan(files.plan);
   if (files.mount.empty()) {
     throw InvalidArgument(
-        "option mount is missing: a file that says how the sensor sits on the platform and, with "
-        "its sigmas, how well that is known before the flight");
+        fmt::format("{} is missing: a file that says how the sensor sits on the platform and, with "
+                    "its sigmas, how well that is known before the flight",
+                    name_of(kSetting.mount)));
   }
   if (files.errors.empty()) {
     throw InvalidArgument(
-        "option trajectory_errors is missing: a file that says how wrong the trajectory of the "
-        "flight will be, and for how long");
+        fmt::format("{} is missing: a file that says how wrong the trajectory of the flight will "
+                    "be, and for how long",
+                    name_of(kSetting.trajectory_errors)));
   }
   options.mount = trajectories::load_mount(files.mount);
   options.errors = trajectories::load_error_model(files.errors);
@@ -86,12 +89,12 @@ void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) 
 }
 
 PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress& progress) {
-  if (options.rate) check_positive(*options.rate, "rate", "Hz");
-  if (options.range_noise) check_positive(*options.range_noise, "range_noise", "m");
-  if (options.prior_sigma) check_positive(*options.prior_sigma, "prior_sigma", "rad");
-  check_not_negative(options.range_offset_sigma, "range_offset_sigma", "m");
-  check_positive(options.knot_spacing, "knot_spacing", "s");
-  check_positive(options.cell_size, "cell_size", "m");
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
+  if (options.prior_sigma) require_positive(kSetting.prior_sigma, *options.prior_sigma);
+  require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
+  require_positive(kSetting.knot_spacing, options.knot_spacing);
+  require_positive(kSetting.cell_size, options.cell_size);
   for (const trajectories::ErrorTerm& term : options.errors.terms) {
     if (!term.sigma) {
       throw InvalidArgument(

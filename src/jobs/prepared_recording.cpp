@@ -52,7 +52,8 @@ std::unique_ptr<recordings::Reader> open_lidar(const recordings::Source& source,
     throw;
   } catch (const InvalidArgument& error) {
     if (!reading.extrinsics) throw;  // several sensors otherwise
-    throw InvalidArgument(fmt::format("option extrinsics, {}: {}", source.name(), error.what()));
+    throw InvalidArgument(
+        fmt::format("{}, {}: {}", name_of(kSetting.extrinsics), source.name(), error.what()));
   }
   // Columns that are called yaw and pitch may be either.
   if (reader->header().format == "named-csv") refuse_trajectory(source, progress);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 
 #include "jobs/checks.hpp"
 #include "jobs/stopwatch.hpp"
@@ -20,7 +21,7 @@ namespace {
 
 /// Each recording stands for observations of its own.
 void require_recordings(const std::vector<recordings::Source>& recordings) {
-  if (recordings.empty()) throw InvalidArgument("option recordings is empty, expected one or more");
+  if (recordings.empty()) throw InvalidArgument("no recording is given, expected one or more");
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       if (recordings[i].is_same_as(recordings[j])) {
@@ -33,8 +34,8 @@ void require_recordings(const std::vector<recordings::Source>& recordings) {
 }  // namespace
 
 void check_ranged_input(const RangedInputOptions& options) {
-  if (options.rate) check_positive(*options.rate, "rate", "Hz");
-  if (options.angle_noise) check_positive(*options.angle_noise, "angle_noise", "rad");
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.angle_noise) require_positive(kSetting.noise_angle, *options.angle_noise);
   require_recordings(options.recordings);
 }
 

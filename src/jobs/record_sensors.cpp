@@ -18,6 +18,7 @@
 #include <fmt/ranges.h>
 
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/jobs/convert_recording.hpp"
 #include "risley/jobs/sensor_choice.hpp"
@@ -185,8 +186,9 @@ void Recorder::find() {
     if (found.empty()) {
       throw wire::NetworkError(fmt::format(
           "{}: no packet came in {} s; a passive recording hears only what sensors send to this "
-          "address and port: name the port that the other host told them with option data_port",
-          to_string(passive_data_->local()), options_.find_time));
+          "address and port: name the port that the other host told them with {}",
+          to_string(passive_data_->local()), options_.find_time,
+          risley::name_of(kSetting.data_port)));
     }
   } else {
     found = search_sensors(listener_, options_, progress_.silent());
@@ -639,13 +641,13 @@ RecordedSensors Recorder::result() {
 
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,
                                const Progress& progress, const RecordWatch& watch) {
-  if (options.duration) require_above("option duration", *options.duration, 0, "s");
+  if (options.duration) require_positive(kSetting.duration, *options.duration);
   require_find_time(options);
   if (!is_converted(options.output) && !lower_case(options.output).ends_with(".lvx")) {
-    throw InvalidArgument(fmt::format(
-        "option output = {}: packets are recorded as LVX or NetCDF, expected the ending "
-        ".lvx or .nc; convert the recording afterwards",
-        options.output));
+    throw InvalidArgument(
+        fmt::format("{} = {}: packets are recorded as LVX or NetCDF, expected the ending .lvx or "
+                    ".nc; convert the recording afterwards",
+                    name_of(kSetting.output), options.output));
   }
   if (options.watch_optics)
     given_sensor(options.optics_reference);  // not after a search of seconds

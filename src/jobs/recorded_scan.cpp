@@ -10,6 +10,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/saturating.hpp"
+#include "risley/core/setting.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -31,7 +32,7 @@ RecordedScan::RecordedScan(std::string path, std::uint8_t sensor_type)
   const recordings::RecordingHeader& header = reader_->header();
   recordings::require_times(header);
   const auto refuse = [&](const std::string& problem) {
-    throw InvalidArgument(fmt::format("option recording = {}: {}", path_, problem));
+    throw InvalidArgument(fmt::format("{} = {}: {}", name_of(kSetting.recording), path_, problem));
   };
   if (!header.has_range) refuse("has no ranges, which packets cannot do without");
   if (header.devices.size() != 1) {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "risley/core/setting.hpp"
 #include "risley/jobs/prepared_recording.hpp"
 #include "risley/parallel/parallel.hpp"
 
@@ -81,10 +82,10 @@ void add_left_out_words(const estimation::SelectionCounts& counts,
         counts.out_of_order, counts.rows));
   }
   if (counts.equal_times > 0) {
-    words.push_back(fmt::format(
-        "{} of {} shots have the time of the shot before, so that nobody knows when they were "
-        "fired, and were left out: option shot_rate counts shots, where none is missing",
-        counts.equal_times, counts.rows));
+    words.push_back(
+        fmt::format("{} of {} shots have the time of the shot before, so that nobody knows when "
+                    "they were fired, and were left out: {} counts shots, where none is missing",
+                    counts.equal_times, counts.rows, name_of(kSetting.shot_rate)));
   }
 }
 

@@ -114,11 +114,7 @@ void ResultFolder::write(const std::string& name, const std::string& text) {
 }
 
 io::OutputFile& ResultFolder::output(const std::string& name) {
-  if (!is_own_result(path(name))) {
-    throw FileError(path(name), {},
-                    "is not a result of risley, and would be replaced by one: move it, or give "
-                    "another folder");
-  }
+  require_own_result(path(name));
   return files_.emplace_back(path(name));
 }
 
@@ -182,6 +178,13 @@ bool is_own_result(const std::string& file) {
   stream.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(stream.gcount()));
   return head.find("risley") != std::string::npos;
+}
+
+void require_own_result(const std::string& file) {
+  if (is_own_result(file)) return;
+  throw FileError(file, {},
+                  "is not a result of risley, and would be replaced by one: move it, or give "
+                  "another folder");
 }
 
 }  // namespace risley::jobs

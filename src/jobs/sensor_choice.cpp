@@ -15,6 +15,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/recordings/plausibility.hpp"
@@ -154,8 +155,8 @@ void call_it_a_guess(SensorChoice& choice, const std::string& why) {
   choice.chosen_by = ChosenBy::guess;
   choice.words = why;
   choice.warnings.push_back(fmt::format(
-      "the file does not say which sensor recorded it: {} is a guess, {}; option sensor decides it",
-      choice.sensor.name, why));
+      "the file does not say which sensor recorded it: {} is a guess, {}; {} decides it",
+      choice.sensor.name, why, name_of(kSetting.sensor)));
 }
 
 /// Where the values of a calibration are from; empty for other presets.
@@ -200,10 +201,10 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
   choice.fits = false;
   choice.misfits = best_two(*found, candidates);
   choice.words = "no built-in preset describes the scan: " + comparison(choice.misfits);
-  choice.warnings.push_back(fmt::format(
-      "{}; {} is assumed. Option sensor names the sensor, by a preset or a calibration file; the "
-      "prisms of an unknown sensor can be found with identify",
-      choice.words, choice.sensor.name));
+  choice.warnings.push_back(
+      fmt::format("{}; {} is assumed. {} names the sensor, by a preset or a calibration file; the "
+                  "prisms of an unknown sensor can be found with identify",
+                  choice.words, choice.sensor.name, name_of(kSetting.sensor)));
 }
 
 std::string span_text(double from, double to) {
@@ -384,9 +385,10 @@ SensorChoice choose_by_name(FirstShots& shots, const Sensor& named, Types&& type
     if (candidates[match.candidate].name != named.name) continue;
     choice.misfits.push_back({named.name, misfit_of(match)});
   }
-  choice.warnings.push_back(fmt::format(
-      "the file names a {}, but its scan is that of a {}: {}; option sensor decides which it was",
-      named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits)));
+  choice.warnings.push_back(
+      fmt::format("the file names a {}, but its scan is that of a {}: {}; {} decides which it was",
+                  named.model, candidates[found->matches.front().candidate].model,
+                  comparison(choice.misfits), name_of(kSetting.sensor)));
   return choice;
 }
 
@@ -416,10 +418,9 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
   if (device.type != recordings::kUnknownDeviceType) {
     named = preset_of_type(device.type);
     if (!named) {
-      throw InvalidArgument(
-          fmt::format("there is no built-in preset for the recording's sensor ({}): name one with "
-                      "option sensor",
-                      recordings::device_type_name(device.type)));
+      throw InvalidArgument(fmt::format(
+          "there is no built-in preset for the recording's sensor ({}): name one with {}",
+          recordings::device_type_name(device.type), name_of(kSetting.sensor)));
     }
   }
   if (named && (!has_times || !one_sensor)) {
@@ -575,11 +576,11 @@ void require_possible(const SensorChoice& choice, const std::string& recording) 
   if (!choice.impossible.empty()) throw FileError(recording, {}, choice.impossible);
   const int emitters = choice.sensor.train.emitters();
   if (choice.lines <= emitters) return;
-  throw InvalidArgument(fmt::format(
-      "{} names {} lines of emitters, but {} ({}) has {} emitter{}: option sensor names the sensor "
-      "that made it",
-      recording, choice.lines, choice.sensor.name, choice.words, emitters,
-      emitters == 1 ? "" : "s"));
+  throw InvalidArgument(
+      fmt::format("{} names {} lines of emitters, but {} ({}) has {} emitter{}: {} names the "
+                  "sensor that made it",
+                  recording, choice.lines, choice.sensor.name, choice.words, emitters,
+                  emitters == 1 ? "" : "s", name_of(kSetting.sensor)));
 }
 
 std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {
@@ -588,8 +589,8 @@ std::vector<std::string> hold(const HeldParameters& held, Sensor& sensor) {
     const ParameterInfo& parameter = find_parameter(name, sensor.shape());
     if (value) {
       if (parameter.kind != ParameterKind::train) {
-        throw InvalidArgument(
-            fmt::format("option fixed {}: only parameters of the prisms can be held", name));
+        throw InvalidArgument(fmt::format("{} {}: only parameters of the prisms can be held",
+                                          name_of(kSetting.fix), name));
       }
       sensor.set(name, *value);
     }

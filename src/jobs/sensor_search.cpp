@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -24,7 +25,7 @@ std::int64_t steady_ns() {
 }
 
 void require_find_time(const RecordOptions& options) {
-  require_between("option find_time", options.find_time, 0.1, 3600, "s");
+  require_between(kSetting.find, options.find_time, 0.1, 3600);
 }
 
 BroadcastListener::BroadcastListener(const wire::Interface& interface) {

@@ -10,6 +10,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/sensors/range_values.hpp"
@@ -25,8 +26,8 @@ void assign(sensors::Sensor& sensor, const ParameterValues& values) {
     const ParameterInfo& parameter = find_parameter(name, sensor.shape());
     check_bounds(parameter, value);
     if (parameter.kind == ParameterKind::rotation_angle) {
-      throw InvalidArgument(
-          fmt::format("{}: set the rotation angles at the start with option start_angles", name));
+      throw InvalidArgument(fmt::format("{}: set the rotation angles at the start with {}", name,
+                                        name_of(kSetting.start_angles)));
     }
     sensor.set(name, value);
   }
@@ -46,15 +47,16 @@ void assign_truth(sensors::Sensor& sensor, const ParameterValues& values) {
 }
 
 void check_moves(const SimulationOptions& options) {
-  const std::pair<bool, const char*> only_moving[] = {
-      {!options.mount.empty(), "mount"},
-      {!options.trajectory_errors.empty(), "trajectory_errors"},
-      {options.clock_drift.has_value(), "clock_drift"},
-      {options.start.has_value(), "start"},
+  const std::pair<bool, Setting> only_moving[] = {
+      {!options.mount.empty(), kSetting.mount},
+      {!options.trajectory_errors.empty(), kSetting.trajectory_errors},
+      {options.clock_drift.has_value(), kSetting.clock_drift},
+      {options.start.has_value(), kSetting.start},
   };
-  for (const auto& [given, name] : only_moving) {
+  for (const auto& [given, setting] : only_moving) {
     if (!given) continue;
-    throw InvalidArgument(fmt::format("option {} needs option trajectory or option flight", name));
+    throw InvalidArgument(fmt::format("{} needs {} or {}", name_of(setting),
+                                      name_of(kSetting.trajectory), name_of(kSetting.flight)));
   }
 }
 
@@ -66,15 +68,18 @@ std::optional<simulation::Platform> platform_from(const SimulationOptions& optio
     return std::nullopt;
   }
   if (!options.trajectory.empty() && !options.flight.empty()) {
-    throw InvalidArgument("option trajectory and option flight cannot be combined");
+    throw InvalidArgument(fmt::format("{} and {} cannot be combined", name_of(kSetting.trajectory),
+                                      name_of(kSetting.flight)));
   }
   if (options.mount.empty()) {
     throw InvalidArgument(
-        "option mount is missing: a file that says how the sensor sits on the moving platform");
+        fmt::format("{} is missing: a file that says how the sensor sits on the moving platform",
+                    name_of(kSetting.mount)));
   }
   if (!settings.scene) {
     throw InvalidArgument(
-        "option scene is missing: what the moving sensor scans, for example a terrain");
+        fmt::format("{} is missing: what the moving sensor scans, for example a terrain",
+                    name_of(kSetting.scene)));
   }
   simulation::Platform platform;
   if (!options.flight.empty()) {
@@ -91,7 +96,7 @@ std::optional<simulation::Platform> platform_from(const SimulationOptions& optio
   platform.mount = trajectories::load_mount(options.mount);
   platform.clock_drift = options.clock_drift.value_or(0.0);
   if (options.start) {
-    require_between("option start", *options.start, 0, 1e9, "s");
+    require_between(kSetting.start, *options.start, 0, 1e9);
     platform.begin_ns = platform.trajectory->time_ns.front() +
                         static_cast<std::int64_t>(std::llround(1e9 * *options.start));
   }
@@ -105,8 +110,10 @@ std::optional<simulation::Platform> platform_from(const SimulationOptions& optio
 }  // namespace
 
 simulation::SimulationSettings simulation_settings(const SimulationOptions& options) {
-  if (options.duration) check_positive(*options.duration, "duration", "s");
-  if (options.rate) check_positive(*options.rate, "rate", "Hz");
+  if (options.duration) require_positive(kSetting.duration, *options.duration);
+  if (options.rate) require_positive(kSetting.rate, *options.rate);
+  if (options.angle_noise) require_not_negative(kSetting.noise_angle, *options.angle_noise);
+  if (options.range_noise) require_not_negative(kSetting.noise_range, *options.range_noise);
   simulation::SimulationSettings settings;
   settings.truth = load_result(options.sensor);
   assign_truth(settings.truth, options.set);

@@ -14,6 +14,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/campaign.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
@@ -27,6 +28,7 @@
 #include "risley/jobs/plan_flight.hpp"
 #include "risley/jobs/simulation_settings.hpp"
 #include "risley/jobs/write_pattern.hpp"
+#include "risley/json/many_results.hpp"
 #include "risley/report/report_file.hpp"
 #include "risley/simulation/truth_file.hpp"
 
@@ -142,9 +144,7 @@ void take_rate(const Options& options, std::optional<double>& rate) {
   options.take("rate", rate);
 }
 
-std::shared_ptr<EstimatedRecording> estimate(const py::dict& values, int threads,
-                                             const py::object& tell) {
-  const Options options(values);
+jobs::EstimateRecordingOptions estimate_options(const Options& options) {
   jobs::EstimateRecordingOptions job;
   job.recording = recording_source(options, "recording");
   job.reading = read_options(options);
@@ -153,17 +153,23 @@ std::shared_ptr<EstimatedRecording> estimate(const py::dict& values, int threads
   job.method = kMethods.at(options.choice("method", {"map", "ekf"}));
   job.rate = jobs::usual_rate(job.method);
   take_rate(options, job.rate);
-  options.take("angle_noise", job.angle_noise);
+  options.take("noise_angle", job.angle_noise);
   job.fixed = held_parameters(options);
   job.additional = parameter_names(options, "free");
-  options.take("mirrored", job.mirrored);
+  options.take("mirror", job.mirrored);
   options.take("truth", job.truth);
   job.files = result_files(options, "estimate");
   job.details = !job.files.folder.empty();
   job.texts = [](const EstimatedRecording& found) { return texts_of(found); };
-  return found_by(tell, threads, [&](const Progress& progress) {
-    return jobs::estimate_recording(job, progress);
-  });
+  return job;
+}
+
+std::shared_ptr<EstimatedRecording> estimate(const py::dict& values, int threads,
+                                             const py::object& tell) {
+  return found_by(tell, threads,
+                  [job = estimate_options(Options(values))](const Progress& progress) {
+                    return jobs::estimate_recording(job, progress);
+                  });
 }
 
 /// What calibrations and plans share.
@@ -173,7 +179,7 @@ void take_model(const Options& options, Job& job) {
   job.fixed = held_parameters(options);
   job.additional = parameter_names(options, "free");
   take_rate(options, job.rate);
-  options.take("range_noise", job.range_noise);
+  options.take("noise_range", job.range_noise);
   options.take("prior_sigma", job.prior_sigma);
   options.take("range_offset_sigma", job.range_offset_sigma);
 }
@@ -184,8 +190,8 @@ void take_recordings(const Options& options, Job& job) {
   take_model(options, job);
   job.recordings = recording_sources(options, "recordings");
   job.reading = read_options(options);
-  options.take("angle_noise", job.angle_noise);
-  options.take("mirrored", job.mirrored);
+  options.take("noise_angle", job.angle_noise);
+  options.take("mirror", job.mirrored);
   options.take("seed", job.seed);
   options.take("truth", job.truths);
   options.take("tolerance", job.tolerance);
@@ -201,16 +207,14 @@ void take_grid(const Options& options, Job& job) {
   options.take("cell_size", job.cell_size);
 }
 
-std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int threads,
-                                                const py::object& tell) {
-  const Options options(values);
+jobs::CalibrateRecordingsOptions calibrate_options(const Options& options) {
   jobs::CalibrateRecordingsOptions job;
   take_recordings(options, job);
   constexpr std::array kMethods = {calibration::CalibrationMethod::adjustment,
                                    calibration::CalibrationMethod::paper};
   job.method = kMethods.at(options.choice("method", {"adjustment", "paper"}));
   options.take("beam_origin", job.beam_origin);
-  options.take("flat_walls", job.flat_walls);
+  job.flat_walls = options.choice("walls", {"uneven", "flat"}) == 1;
   options.take("patch_thickness", job.patch_thickness);
   if (std::optional<bool> same; options.take("same_walls", same), same) {
     job.same_walls = *same ? calibration::SameWalls::yes : calibration::SameWalls::no;
@@ -223,9 +227,15 @@ std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int thre
   if (!planes.empty()) job.planes = scenes::load_scene(planes);
   job.stations = jobs::stations_of(stations, station_names, job.recordings.size());
   job.texts = [](const CalibratedRecordings& found) { return texts_of(found); };
-  return found_by(tell, threads, [&](const Progress& progress) {
-    return jobs::calibrate_recordings(job, progress);
-  });
+  return job;
+}
+
+std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int threads,
+                                                const py::object& tell) {
+  return found_by(tell, threads,
+                  [job = calibrate_options(Options(values))](const Progress& progress) {
+                    return jobs::calibrate_recordings(job, progress);
+                  });
 }
 
 std::shared_ptr<CalibratedFlight> calibrate_flight(const py::dict& values, int threads,
@@ -249,7 +259,7 @@ std::shared_ptr<jobs::PlannedCalibration> plan(const py::dict& values, const py:
   options.take("plan", scene);
   job.scene = scenes::load_scene(scene);
   options.take("duration", job.duration);
-  options.take("flat_walls", job.flat_walls);
+  job.flat_walls = options.choice("walls", {"uneven", "flat"}) == 1;
   options.take("beam_origin", job.beam_origin);
   return found_by(tell, 0,
                   [&](const Progress& progress) { return jobs::plan_calibration(job, progress); });
@@ -262,7 +272,7 @@ std::shared_ptr<jobs::PlannedFlightResult> plan_flight(const py::dict& values,
   take_model(options, job);
   take_grid(options, job);
   options.take("empty_circle", job.distribution.empty_circle);
-  require_above("empty_circle", job.distribution.empty_circle, 0, "m");
+  require_positive(kSetting.empty_circle, job.distribution.empty_circle);
   options.take("seed", job.seed);
   jobs::FlightPlanFiles files;
   options.take("plan", files.plan);
@@ -282,8 +292,7 @@ void bind_planned(py::module_& module, const char* name) {
       .def("to_dict", [](const Planned& planned) { return dict_of(json::of(planned)); });
 }
 
-py::object cloud(const py::dict& values, int threads, const py::object& tell) {
-  const Options options(values);
+jobs::CloudOfRecordingOptions cloud_options(const Options& options) {
   jobs::CloudOfRecordingOptions job;
   job.recording = recording_source(options, "recording");
   job.reading = read_options(options);
@@ -299,7 +308,7 @@ py::object cloud(const py::dict& values, int threads, const py::object& tell) {
   options.take("common_factors", settings.loadings);
   settings.rate = cloud::kTrackingRate;
   take_rate(options, settings.rate);
-  options.take("angle_noise", settings.angle_noise);
+  options.take("noise_angle", settings.angle_noise);
   options.take("las_scale", settings.writer.las_scale);
   options.take("format", settings.writer.format);
   settings.writer.gps_time = options.choice("time", {"gps", "recording"}) == 0;
@@ -307,8 +316,13 @@ py::object cloud(const py::dict& values, int threads, const py::object& tell) {
   options.take("distribution", distribution);
   if (distribution) settings.distribution.emplace();
   job.provenance = provenance_of("cloud");
-  return told_by(tell, threads,
-                 [&](const Progress& progress) { return jobs::cloud_of_recording(job, progress); });
+  return job;
+}
+
+py::object cloud(const py::dict& values, int threads, const py::object& tell) {
+  return told_by(tell, threads, [job = cloud_options(Options(values))](const Progress& progress) {
+    return jobs::cloud_of_recording(job, progress);
+  });
 }
 
 py::object simulate(const py::dict& values, int threads, const py::object& tell) {
@@ -372,7 +386,7 @@ py::object pattern(const py::dict& values, int threads, const py::object& tell) 
   options.take("format", job.format);
   options.take("output", job.output);
   options.take("duration", job.duration);
-  require_above("duration", job.duration, 0, "s");
+  require_positive(kSetting.duration, job.duration);
   job.scan = scan_options(options);
   return told_by(tell, threads,
                  [&](const Progress& progress) { return jobs::write_pattern(job, progress); });
@@ -400,7 +414,7 @@ py::object observability(const py::dict& values, int threads, const py::object& 
   options.take("sensor", job.sensor);
   options.take("duration", job.duration);
   take_rate(options, job.rate);
-  options.take("angle_noise", job.angle_noise);
+  options.take("noise_angle", job.angle_noise);
   options.take("rounding", job.rounding);
   job.fixed = held_parameters(options);
   job.additional = parameter_names(options, "free");
@@ -442,28 +456,82 @@ py::object campaign(const py::dict& values, int threads, const py::object& tell)
   });
 }
 
+json::InspectEachOptions inspect_options(const Options& options) {
+  json::InspectEachOptions job;
+  job.reading = read_options(options);
+  options.take("accuracy", job.accuracy);
+  options.take("trajectory_topic", job.topic);
+  return job;
+}
+
 py::object info(const py::dict& values, const py::object& tell) {
   const Options options(values);
-  const recordings::Source input = recording_source(options, "input");
-  std::string accuracy, topic;
-  options.take("accuracy", accuracy);
-  options.take("trajectory_topic", topic);
-  bool is_trajectory = !topic.empty() || !accuracy.empty();
-  if (!is_trajectory && !input.recording()) {
-    run_job(tell, 0, [&](const Progress& progress) {
-      is_trajectory = trajectories::trajectory_file_kind(input.name(), progress.silent()) !=
-                      trajectories::TrajectoryFileKind::none;
-    });
-  }
-  if (is_trajectory) {
-    return told_by(tell, 0, [&](const Progress& progress) {
-      return jobs::inspect_trajectory({input.name(), accuracy, topic}, progress);
-    });
-  }
-  const recordings::ReadOptions reading = read_options(options);
-  return told_by(tell, 0, [&](const Progress& progress) {
-    return jobs::inspect_recording({input, reading, {}, {}}, progress);
+  const recordings::Source input = recording_source(options, "recording");
+  json::InspectEachOptions job = inspect_options(options);
+  json::Json found;
+  run_job(tell, 0, [&](const Progress& progress) {
+    const jobs::InspectTrajectoryOptions poses{input.name(), job.accuracy, job.topic};
+    found = !input.recording() && jobs::is_trajectory(poses, job.reading, progress)
+                ? json::of(jobs::inspect_trajectory(poses, progress))
+                : json::of(jobs::inspect_recording({input, job.reading, {}, {}}, progress));
   });
+  return dict_of(found);
+}
+
+/// How a job of the command is done for each of many inputs.
+jobs::InputWork work_of(const std::string& verb, const Options& options) {
+  const auto untold = [](const std::string&, bool) {};  // results have their warnings
+  if (verb == "estimate") return json::estimate_each(estimate_options(options), untold);
+  if (verb == "calibrate") return json::calibrate_each(calibrate_options(options), untold);
+  if (verb == "cloud") return json::cloud_each(cloud_options(options), {}, untold);
+  if (verb == "info") return json::inspect_each(inspect_options(options), untold);
+  json::ConvertEachOptions convert{inspect_options(options), {}, {}};
+  options.take("format", convert.format);
+  return json::convert_each(convert, untold);
+}
+
+/// Settings as text, for results that were made with the same ones.
+std::vector<std::pair<std::string, std::vector<std::string>>> settings_of(const py::dict& values) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> settings;
+  for (const auto& [name, value] : values) {
+    if (py::str(name).equal(py::str("output"))) continue;
+    settings.push_back({py::str(name), {py::str(value)}});
+  }
+  return settings;
+}
+
+/// @param many  inputs, list, table, resume
+py::object run_many(const std::string& verb, const py::dict& values, const py::dict& many,
+                    int threads, const py::object& tell) {
+  const Options options(many);
+  jobs::ManyInputsOptions wanted;
+  options.take("inputs", wanted.names);
+  options.take("list", wanted.list);
+  options.take("table", wanted.table);
+  options.take("resume", wanted.resume);
+  Options(values).take("output", wanted.output);
+  wanted.into_folder = true;
+  const jobs::InputWork work = work_of(verb, Options(values));
+  const auto settings = settings_of(values);
+  json::Json told;
+  run_job(tell, threads, [&](const Progress& progress) {
+    const jobs::InputPlan plan = jobs::plan_inputs(wanted, work, progress.silent());
+    jobs::InputRun run(
+        plan, work,
+        jobs::work_text(fmt::format("risley.{} {}", verb, RISLEY_VERSION), settings, progress),
+        wanted);
+    const bool whole = run.run(progress.stage(work.label));
+    if (!wanted.table.empty())
+      json::write_table(wanted.table, run, provenance_of(work.verb.c_str()));
+    if (!whole) throw Cancelled();
+    told = json::counts_of(run, work);
+    told["results"] = json::Json::array();
+    run.for_each([&](const jobs::InputJob& job, const jobs::InputResult& result) {
+      told["results"].push_back(json::one_of_several(job, result));
+    });
+    told["rows"] = json::rows_of(run, RISLEY_VERSION);
+  });
+  return dict_of(told);
 }
 
 }  // namespace
@@ -511,6 +579,7 @@ void bind_jobs(py::module_& module) {
              py::arg("unlike"), tell);
   module.def("campaign", &campaign, options, threads, tell);
   module.def("info", &info, options, tell);
+  module.def("run_many", &run_many, py::arg("verb"), options, py::arg("many"), threads, tell);
   module.def(
       "is_flight_plan",
       [](const std::string& path) { return unlocked([&] { return jobs::is_flight_plan(path); }); },

@@ -3,11 +3,13 @@
 #include <pybind11/numpy.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/setting.hpp"
 
 #include "python/bind.hpp"
 
 PYBIND11_MODULE(_risley, module) {
   using namespace risley::python;
+  risley::write_settings_as(risley::SettingStyle::keyword);
   py::options options;
   options.disable_function_signatures();  // the stubs have them
   module.doc() = "The libraries of risley; use the package risley, which documents them.";

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <pybind11/stl.h>
 
-#include "risley/core/require.hpp"
 #include "risley/jobs/emulate_sensor.hpp"
 #include "risley/jobs/record_sensors.hpp"
 #include "risley/json/results.hpp"
@@ -38,13 +37,11 @@ void tell_words(const py::object& note, const std::string& words, bool is_wrong)
 jobs::RecordOptions record_options(const Options& options) {
   jobs::RecordOptions job;
   options.take("interface", job.interface);
-  options.take("serials", job.serials);
-  options.take("find_time", job.find_time);
-  require_above("find_time", job.find_time, 0, "s");
+  options.take("serial", job.serials);
+  options.take("find", job.find_time);
   options.take("passive", job.passive);
   options.take("data_port", job.data_port);
   options.take("duration", job.duration);
-  if (job.duration) require_above("duration", *job.duration, 0, "s");
   if (options.has("coordinates")) {
     const std::size_t coordinates =
         options.choice("coordinates", {"spherical", "cartesian", "as-is"});
@@ -101,7 +98,7 @@ jobs::EmulatedFaults faults_of(const Options& options) {
   options.take("restart", faults.restart);
   options.take("restart_takes", faults.restart_time);
   faults.bend = parameter_values(options, "bend");
-  options.take("bend_time", faults.bend_time);
+  options.take("bend_s", faults.bend_time);
   return faults;
 }
 
@@ -111,7 +108,9 @@ jobs::EmulatedClock clock_of(const Options& options) {
   jobs::EmulatedClock clock;
   clock.source = kSources.at(options.choice("time", {"power-on", "ptp", "pps"}));
   options.take("time_from", clock.source_from);
-  options.take("clock_drift_ppm", clock.drift_ppm);
+  double drift = 0;
+  options.take("clock_drift", drift);
+  clock.drift_ppm = 1e6 * drift;
   options.take("clock_jump", clock.jump);
   options.take("clock_jump_by", clock.jump_by);
   return clock;
@@ -127,7 +126,6 @@ py::object emulate(const py::dict& values, int threads, const py::object& note, 
   options.take("recording", job.recording);
   options.take("speed", job.speed);
   options.take("duration", job.duration);
-  if (job.duration) require_above("duration", *job.duration, 0, "s");
   job.clock = clock_of(options);
   job.faults = faults_of(options);
   jobs::EmulatedSensor truth;

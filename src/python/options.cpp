@@ -86,7 +86,7 @@ recordings::ReadOptions read_options(const Options& options) {
 
 jobs::HeldParameters held_parameters(const Options& options) {
   std::vector<std::pair<std::string, std::optional<double>>> fixed;
-  options.take("fixed", fixed);
+  options.take("fix", fixed);
   for (auto& [name, value] : fixed) {
     const NamedParameter parameter = parameter_of_any_train(name);
     if (value) *value *= parameter.si_per_unit;
@@ -131,8 +131,8 @@ jobs::SimulationOptions simulation_options(const Options& options, int threads) 
   simulation.set = parameter_values(options, "set");
   options.take("reported_nominal", simulation.reported_nominal);
   simulation.reported = parameter_values(options, "reported");
-  options.take("angle_noise", simulation.angle_noise);
-  options.take("range_noise", simulation.range_noise);
+  options.take("noise_angle", simulation.angle_noise);
+  options.take("noise_range", simulation.range_noise);
   options.take("quantize", simulation.quantize);
   options.take("beam_origin", simulation.beam_origin);
   std::string rotor = to_string(simulation.rotor);

@@ -70,7 +70,7 @@ recordings::Source recording_source(const Options& options, const char* name);
 std::vector<recordings::Source> recording_sources(const Options& options, const char* name);
 /// shot_rate, Hz, extrinsics, yaw, pitch, roll in rad, and device.
 recordings::ReadOptions read_options(const Options& options);
-/// fixed: [(name, value or None)], by either name of a parameter.
+/// fix: [(name, value or None)], by either name of a parameter.
 jobs::HeldParameters held_parameters(const Options& options);
 /// A list of names, by either name of a parameter.
 std::vector<std::string> parameter_names(const Options& options, const char* name);
@@ -78,8 +78,8 @@ std::vector<std::string> parameter_names(const Options& options, const char* nam
 jobs::ParameterValues parameter_values(const Options& options, const char* name);
 /// trajectory, topic, mount, accuracy, trajectory_errors, crs, datum: paths and names.
 jobs::PlatformFiles platform_files(const Options& options);
-/// What `simulate` and `emulate` share: sensor, set, reported, reported_nominal, angle_noise,
-/// range_noise, quantize, beam_origin, rotor, start_angles, scene, station, seed.
+/// What `simulate` and `emulate` share: sensor, set, reported, reported_nominal, noise_angle,
+/// noise_range, quantize, beam_origin, rotor, start_angles, scene, station, seed.
 jobs::SimulationOptions simulation_options(const Options& options, int threads);
 /// output: the folder of results; states: knots, all or none.
 jobs::ResultFiles result_files(const Options& options, const char* job);

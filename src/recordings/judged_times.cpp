@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/saturating.hpp"
+#include "risley/core/setting.hpp"
 
 #include "recordings/reader_decorators.hpp"
 #include "recordings/time_grid.hpp"
@@ -326,13 +327,14 @@ class JudgedReader final : public Reader {
       if (device.order.order == RowOrder::begins_anew && !judgement_->counted) {
         warn(
             fmt::format("times begin anew with every message or packet and tell nothing beyond "
-                        "one: shots were counted in the order of the file, at the {:.6g} shots "
-                        "per second within messages; option shot_rate names another rate",
-                        1e9 / device.order.step_ns));
+                        "one: shots were counted in the order of the file, at the {:.6g} shots per "
+                        "second within messages; {} names another rate",
+                        1e9 / device.order.step_ns, name_of(kSetting.shot_rate)));
       } else if (device.order.order == RowOrder::constant && !judgement_->counted) {
         warn(
-            "all times are the same, and tell nothing: shots are numbered in the order of the "
-            "file; option shot_rate counts their times");
+            fmt::format("all times are the same, and tell nothing: shots are numbered in the order "
+                        "of the file; {} counts their times",
+                        name_of(kSetting.shot_rate)));
       } else if (device.order.order == RowOrder::overlapping) {
         warn(
             "pieces of the recording begin within the time of those before them: several sensors "

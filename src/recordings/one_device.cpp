@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/recordings/livox/packet.hpp"
 
 #include "recordings/reader_decorators.hpp"
@@ -32,9 +33,10 @@ std::uint8_t place_of(const RecordingHeader& header, const std::string& path,
   }
   if (found.size() == 1) return static_cast<std::uint8_t>(found.front());
   throw InvalidArgument(fmt::format(
-      "option device = \"{}\" names {} of the sensors of {}, expected the serial number, the topic "
-      "or the number of one: {}",
-      wanted, found.empty() ? "none" : std::to_string(found.size()), path, devices_words(header)));
+      "{} = \"{}\" names {} of the sensors of {}, expected the serial number, the topic or the "
+      "number of one: {}",
+      name_of(kSetting.device), wanted, found.empty() ? "none" : std::to_string(found.size()), path,
+      devices_words(header)));
 }
 
 /// Leaves the rows of one device.

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "risley/bags/bag.hpp"
+#include "risley/core/setting.hpp"
 
 #include "recordings/reader_decorators.hpp"
 #include "recordings/shared_input.hpp"
@@ -49,17 +50,17 @@ std::string devices_words(const RecordingHeader& header) {
 void require_one_device(const RecordingHeader& header, const std::string& name) {
   if (header.devices.size() == 1) return;
   throw InvalidArgument(
-      fmt::format("{} holds {} sensors, and one is needed here ({}); option device chooses one, by "
-                  "its serial number, its topic or its number in this list",
-                  name, header.devices.size(), devices_words(header)));
+      fmt::format("{} holds {} sensors, and one is needed here ({}); {} chooses one, by its serial "
+                  "number, its topic or its number in this list",
+                  name, header.devices.size(), devices_words(header), name_of(kSetting.device)));
 }
 
 void require_times(const RecordingHeader& header) {
   if (header.has_times) return;
   throw MissingTimes(
       fmt::format("this recording of format {} holds no times of single shots, which are needed "
-                  "here; expected a shot rate to count them by",
-                  header.format));
+                  "here; expected a shot rate to count them by: say it with {}",
+                  header.format, name_of(kSetting.shot_rate)));
 }
 
 Recording load_recording(const Source& source, const Progress& progress,

@@ -11,6 +11,7 @@
 
 #include "risley/core/median.hpp"
 #include "risley/core/saturating.hpp"
+#include "risley/core/setting.hpp"
 
 #include "recordings/time_order.hpp"
 
@@ -314,9 +315,9 @@ std::string TimeGrid::words() const {
   }
   return fmt::format(
       "{}, and {} of {} shots share that of the shot before, which an estimation cannot use: no "
-      "even grid of shots explains the times, as where shots are missing. Option shot_rate counts "
+      "even grid of shots explains the times, as where shots are missing. {} counts "
       "shots, where none is missing",
-      rounded, equal_times_, shots_);
+      rounded, equal_times_, shots_, name_of(kSetting.shot_rate));
 }
 
 }  // namespace risley::recordings

@@ -8,6 +8,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/direction.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/report/html.hpp"
 
 #include "report/pages.hpp"
@@ -59,9 +60,11 @@ std::string boresight_advice_html(const View& r) {
       list_html({"a wall that is steeply tilted against the axis of view, 50 to 65 degrees, and "
                  "fills the whole field of view",
                  "a longer range to the walls",
-                 "the body turned upside down against a stop between two recordings, given with "
-                 "option stations",
-                 "walls whose normals are known in the sensor's frame, given with option planes"}));
+                 fmt::format("the body turned upside down against a stop between two recordings, "
+                             "given with {}",
+                             name_of(kSetting.stations)),
+                 fmt::format("walls whose normals are known in the sensor's frame, given with {}",
+                             name_of(kSetting.planes))}));
 }
 
 std::string thickness_text(const View& r, const char* when) {
@@ -83,11 +86,11 @@ Verdict calibration_verdict(const View& r) {
                 thickness_text(r, "before"), thickness_text(r, "after"),
                 count_text(r["points"].count()), planes, planes == 1 ? "" : "s", datum_text(r),
                 sigma("sigma_roll_deg"), sigma("sigma_pitch_deg"), sigma("sigma_yaw_deg"));
-  verdict.mend =
+  verdict.mend = fmt::format(
       "check in the views below that what was taken for walls really is walls; record more walls "
       "that fill the field of view, near and far and steeply tilted; hold parameters that these "
-      "walls do not determine (option fixed); and check known normals and stations, if any were "
-      "given";
+      "walls do not determine ({}); and check known normals and stations, if any were given",
+      name_of(kSetting.fix));
   const bool poor = !(radians_from_degrees(boresight_sigma(r)) <= calibration::kPoorDatum);
   if (verdict.converged && poor) verdict.care_html = boresight_advice_html(r);
   return verdict;

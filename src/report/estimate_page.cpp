@@ -7,6 +7,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/report/html.hpp"
 
 #include "report/pages.hpp"
@@ -42,10 +43,11 @@ Verdict estimate_verdict(const View& r) {
       finite_text("{:.3g}", residual_rms(r, "azimuth_deg")),
       finite_text("{:.3g}", residual_rms(r, "zenith_deg")), noise_words(r),
       count_text(r["outliers"].count()), count_text(r["observations_used"].count()));
-  verdict.mend =
-      "check that option sensor is the instrument that made the recording, that its times are "
-      "right, and whether the elevation in the file has the opposite sign (option mirrored yes); "
-      "a longer recording, or option rate full, gives the estimate more data";
+  verdict.mend = fmt::format(
+      "check that {} is the instrument that made the recording, that its times are right, and "
+      "whether the elevation in the file has the opposite sign ({} yes); a longer recording, or {} "
+      "full, gives the estimate more data",
+      name_of(kSetting.sensor), name_of(kSetting.mirror), name_of(kSetting.rate));
   return verdict;
 }
 
@@ -159,11 +161,12 @@ std::string estimate_parameters_html(const View& r) {
 std::string estimate_unobservable_html(const View& r) {
   std::string html = "<p>The recording determines all free parameters.</p>\n";
   if (r["unobservable"].size() > 0) {
-    html =
-        "<p>The recording does not determine these combinations of the free parameters (in units "
-        "of 1 degree, or 0.01 of an index). Hold one parameter of each with <code>option "
-        "fixed</code>.</p>\n" +
-        list_html(weak_directions(r["unobservable"]));
+    html = fmt::format(
+               "<p>The recording does not determine these combinations of the free parameters "
+               "(in units of 1 degree, or 0.01 of an index). Hold one parameter of each with "
+               "<code>{}</code>.</p>\n",
+               name_of(kSetting.fix)) +
+           list_html(weak_directions(r["unobservable"]));
   }
   const std::vector<std::string> advice = r["page"]["advice"].texts();
   return advice.empty() ? html : html + list_html(advice);

@@ -12,6 +12,7 @@
 #include "risley/calibration/calibrate.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/report/html.hpp"
 
 #include "report/flight_unknowns.hpp"
@@ -94,11 +95,12 @@ Verdict flight_verdict(const View& r) {
                 boresight_text(r, "boresight_z_deg"),
                 fmt::format("{}° ({})", angle_text(datum_of(r, "sigma_total_deg")),
                             total_on_ground(r)));
-  verdict.mend =
+  verdict.mend = fmt::format(
       "check in the differences between strips below that overlapping strips are of one flight; "
       "check the axes of the mount, and that recording and trajectory use the same time; give "
       "larger sigmas to what the mount states too precisely; and hold parameters that this flight "
-      "does not determine (option fixed)";
+      "does not determine ({})",
+      name_of(kSetting.fix));
   if (!verdict.converged) return verdict;
   const double rotation = radians_from_degrees(datum_of(r, "sigma_rotation_deg"));
   if (!(rotation <= calibration::kPoorDatum)) verdict.care_html = poor_rotation_html(r);

@@ -10,6 +10,7 @@
 
 #include "risley/bags/bag.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/file_head.hpp"
 
@@ -95,9 +96,8 @@ Trajectory load_trajectory(const std::string& path, const Progress& progress,
   const Format* format = format_of(head);
   if (format == &kRosBagFormat) return read_ros_bag(path, topic, progress);
   if (!topic.empty()) {
-    throw InvalidArgument(
-        fmt::format("option trajectory_topic = {}: {} is not a ROS bag, and only bags have topics",
-                    topic, path));
+    throw InvalidArgument(fmt::format("{} = {}: {} is not a ROS bag, and only bags have topics",
+                                      name_of(kSetting.trajectory_topic), topic, path));
   }
   if (format != nullptr) return format->read(path, progress);
   if (is_smrmsg(head)) {

@@ -18,6 +18,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "risley/core/setting.hpp"
+
 #include "wire/system_address.hpp"
 
 namespace risley::wire {
@@ -91,16 +93,15 @@ Interface interface_of(const std::string& address) {
     std::ranges::copy_if(all, std::back_inserter(real),
                          [](const Interface& one) { return !one.is_loopback; });
     if (real.size() == 1) return real.front();
-    throw InvalidArgument(fmt::format(
-        "option interface: which interface the sensors are at cannot be told, this machine has "
-        "{}; name the address of one",
-        list_of(real.empty() ? all : real)));
+    throw InvalidArgument(
+        fmt::format("{}: which interface the sensors are at cannot be told, this machine has {}; "
+                    "name the address of one",
+                    name_of(kSetting.interface_address), list_of(real.empty() ? all : real)));
   }
   const auto wanted = address_from(address);
   if (!wanted) {
-    throw InvalidArgument(
-        fmt::format("option interface = {}, expected an IPv4 address of this machine: {}", address,
-                    list_of(all)));
+    throw InvalidArgument(fmt::format("{} = {}, expected an IPv4 address of this machine: {}",
+                                      name_of(kSetting.interface_address), address, list_of(all)));
   }
   for (const Interface& one : all) {
     if (one.address == *wanted) return one;
@@ -112,9 +113,8 @@ Interface interface_of(const std::string& address) {
     return found;
   }
   throw InvalidArgument(
-      fmt::format("option interface = {}: no interface of this machine has this address, there "
-                  "are {}",
-                  address, list_of(all)));
+      fmt::format("{} = {}: no interface of this machine has this address, there are {}",
+                  name_of(kSetting.interface_address), address, list_of(all)));
 }
 
 struct UdpSocket::Batch {

@@ -330,7 +330,7 @@ TEST_F(MakeCloud, ATurnedFrameIsRefusedByNameAndLeavesNothing) {
   SimulatedReader reader(wall_settings(1.0, 5000.0), [yaw](recordings::Observations& rows) {
     for (double& azimuth : rows.azimuth) azimuth += yaw;
   });
-  EXPECT_THAT(refusal<TurnedFrame>([&] { make_cloud(reader, type_, path(), {}); }),
+  EXPECT_THAT(refusal<EstimationError>([&] { make_cloud(reader, type_, path(), {}); }),
               AllOf(::testing::ContainsRegex("(39\\.9|40\\.0)[0-9]* deg in yaw"),
                     ::testing::ContainsRegex("-?0\\.0[0-9]* deg in pitch")));
   EXPECT_EQ(files(), 0U);

@@ -41,7 +41,7 @@ void read_value(const std::string& word) {
   } catch (const InvalidArgument&) {  // refused
   }
   try {
-    const double value = app::positive_number(word, "--rate-hz", "Hz");
+    const double value = app::rate_from(word).value_or(1);
     require(std::isfinite(value) && value > 0, "a rate is positive");
   } catch (const InvalidArgument&) {  // refused
   }

@@ -12,3 +12,9 @@ def command(*words, status=0):
                           capture_output=True, text=True, check=False)
     assert done.returncode == status, done.stderr
     return json.loads(done.stdout)
+
+
+def help_of(verb):
+    """All options of a verb."""
+    return subprocess.run([os.environ["RISLEY_COMMAND"], verb, "--help"],
+                          capture_output=True, text=True, check=True).stdout

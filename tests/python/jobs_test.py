@@ -1,17 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Every job of Python gives what its verb of the command prints, to the last digit."""
+import csv
+import inspect
 import math
 import os
 import pathlib
 import pickle
 import re
+import shutil
 
 import numpy as np
 import pytest
 
 import risley
-from command import command
+from command import command, help_of
 
 DATA = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"]) / "data"
 OF_A_RUN = {"command", "inputs", "seconds"}
@@ -24,18 +27,21 @@ strips: [{headings_deg: [90, 270, 0, 180], length_m: 55}]
 """
 
 
-def without_names_of_options(value):
-    """Where libraries say "option planes", the command says "--planes"."""
+def with_names_of_python(value):
+    """Where Python says "shot_rate", the command says "--shot-rate-hz"."""
     if isinstance(value, dict):
-        return {key: without_names_of_options(one) for key, one in value.items()}
+        return {key: with_names_of_python(one) for key, one in value.items()}
     if isinstance(value, list):
-        return [without_names_of_options(one) for one in value]
-    return re.sub(r"option \w+|--[a-z-]+", "OPTION", value) if isinstance(value, str) else value
+        return [with_names_of_python(one) for one in value]
+    if not isinstance(value, str):
+        return value
+    return re.sub(r"--([a-z]+(?:-[a-z]+)*)",
+                  lambda flag: re.sub("-(deg|hz|m|s)$", "", flag[1]).replace("-", "_"), value)
 
 
 def assert_same(ours, theirs):
     """Every key and every number is alike, except what belongs to a run."""
-    ours, theirs = ({key: without_names_of_options(value) for key, value in one.items()
+    ours, theirs = ({key: with_names_of_python(value) for key, value in one.items()
                      if key not in OF_A_RUN} for one in (ours, theirs))
     assert ours.keys() == theirs.keys()
     for key, value in ours.items():
@@ -93,8 +99,8 @@ def test_info(hall):
 def test_estimate(estimate, hall, truth):
     assert_same(estimate.to_dict(),
                 command("estimate", hall, "--truth", truth, "--rate-hz", 5000))
-    held = risley.estimate(hall, rate=5000, fixed={"bearing_tilt_a_horizontal": math.radians(0.1)},
-                           angle_noise_deg=0.004)
+    held = risley.estimate(hall, rate=5000, fix={"bearing_tilt_a_horizontal": math.radians(0.1)},
+                           noise_angle_deg=0.004)
     assert_same(held.to_dict(),
                 command("estimate", hall, "--rate-hz", 5000, "--fix",
                         "bearing_tilt_a_horizontal_deg=0.1", "--noise-angle-deg", 0.004))
@@ -117,7 +123,7 @@ def test_calibrate(calibration, hall, truth):
         calibration.pointing
     assert calibration.names[-1] == "range_offset" and calibration.units[-1] == "m"
     assert calibration.covariance.shape == (len(calibration.free),) * 2
-    held = risley.calibrate(hall, rate=2000, fixed=["refractive_index"], beam_origin=False,
+    held = risley.calibrate(hall, rate=2000, fix=["refractive_index"], beam_origin=False,
                             range_offset_sigma=0.0, prior_sigma_deg=0.2)
     assert_same(held.to_dict(),
                 command("calibrate", hall, "--rate-hz", 2000, "--fix", "refractive_index",
@@ -126,7 +132,7 @@ def test_calibrate(calibration, hall, truth):
 
 
 def test_plan():
-    planned = risley.plan(DATA / "hall.yaml", duration=5.0, range_noise=0.01)
+    planned = risley.plan(DATA / "hall.yaml", duration=5.0, noise_range=0.01)
     assert_same(planned.to_dict(), command("calibrate", "--plan", DATA / "hall.yaml",
                                            "--duration-s", 5, "--noise-range-m", 0.01))
     assert np.all(planned.sigmas > 0) and "<td>" in planned._repr_html_()
@@ -298,15 +304,45 @@ def test_results_become_datasets(calibration):
     assert data["covariance"].shape == calibration.covariance.shape
 
 
+def test_many_recordings(folder, hall):
+    scans = folder / "scans" / "deep"
+    scans.mkdir(parents=True)
+    shutil.copy(hall, scans / "one.nc")
+    risley.simulate(scans.parent / "two.lvx", rate=20000.0, duration=0.3, seed=2)
+    (scans / "bad.lvx").write_bytes(b"no recording")
+    wanted = {"output": folder / "each", "table": folder / "each.csv", "resume": True, "rate": 5000}
+    found = risley.estimate_many(scans.parent, **wanted)
+    assert (found.done, found.skipped, found.failed, len(found)) == (2, 0, 1, 3)
+    assert [one["status"] for one in found] == [3, 0, 0]
+    assert sorted(path.parent.name for path in (folder / "each").rglob("calibration.yaml")) == ["one", "two"]
+    alone = risley.estimate(scans / "one.nc", rate=5000).to_dict()
+    assert found[1]["parameters"] == alone["parameters"]
+    assert found.rows[1]["prism_tilt_a_vertical_deg"] == alone["parameters"]["prism_tilt_a_vertical_deg"]["value"]
+    with open(folder / "each.csv", newline="", encoding="utf-8") as table:
+        assert len(list(csv.DictReader(table))) == 3
+    again = risley.estimate_many([scans / "*.nc", scans / "bad.lvx", scans.parent / "two.lvx"], **wanted)
+    assert (again.done, again.skipped, again.failed) == (0, 2, 1)
+    assert risley.estimate_many(scans.parent, **{**wanted, "rate": 4000}).skipped == 0
+    assert [row["observations"] for row in risley.info_many(scans.parent).rows][1] == 40000
+    made = risley.cloud_many([str(scans / "*.nc")], "mid-40", folder / "clouds/")
+    assert made.done == 1 and (folder / "clouds/one.las").exists()
+    assert risley.convert_many(scans.parent, folder / "converted", "netcdf").done == 2
+    assert risley.calibrate_many([scans / "one.nc"], rate=2000)[0]["converged"]
+    with pytest.raises(ValueError, match="rate = -1 Hz"):
+        risley.estimate_many(scans.parent, rate=-1)
+    with pytest.raises(TypeError, match="colour"):
+        risley.info_many(scans.parent, colour=1)
+
+
 @pytest.mark.parametrize("call, words", [
     (lambda hall: risley.calibrate(hall, method="guess"), "method = 'guess', allowed adjustment"),
     (lambda hall: risley.calibrate(hall, mount="m.yaml"), "mount is not for a calibration with no"),
-    (lambda hall: risley.calibrate(hall, range_noise=0.0), "range_noise = 0 m"),
+    (lambda hall: risley.calibrate(hall, noise_range=0.0), "noise_range = 0 m"),
     (lambda hall: risley.calibrate(hall, planes="no.yaml"), "no.yaml"),
     (lambda hall: risley.cloud(hall, "mid-40", "x.ply", time="now"), "time = 'now', allowed gps"),
     (lambda hall: risley.cloud(hall, "mid-40", "x.xyz1"), "x.xyz1"),
     (lambda hall: risley.simulate("x.nc", set={"colour": 1.0}), "unknown parameter \"colour\""),
-    (lambda hall: risley.simulate("x.nc", mount="m.yaml"), "option mount needs option trajectory"),
+    (lambda hall: risley.simulate("x.nc", mount="m.yaml"), "mount needs trajectory or flight"),
     (lambda hall: risley.identify(hall, fastest=-1.0), "fastest = -1 rad/s"),
     (lambda hall: risley.pattern("mid-40", "bmp", "x.bmp"), "bmp"),
     (lambda hall: risley.plan(DATA / "hall.yaml", cell_size=2.0), "cell_size goes with a flight"),
@@ -316,6 +352,24 @@ def test_wrong_options_are_named(hall, call, words):
         call(hall)
 
 
+def test_every_setting_has_one_name():
+    """The command has an option of every setting, and Python a keyword of all but the command's own."""
+    header = (DATA.parent / "include/risley/core/setting.hpp").read_text(encoding="utf-8")
+    flags = re.findall(r'\{"([a-z-]+)"\}', header)
+    assert len(flags) > 70
+    verbs = ["calibrate", "campaign", "cloud", "compare", "convert", "emulate", "estimate", "identify", "info",
+             "pattern", "record", "simulate"]
+    options = set()
+    for verb in verbs:
+        options |= set(re.findall(r"--([a-z-]+)", help_of(verb)))
+    assert set(flags) - options == {"from"}  # of preset new
+    keywords = {name for public in risley.__all__ if inspect.isfunction(getattr(risley, public))
+                for name in inspect.signature(getattr(risley, public)).parameters}
+    of_python = {"bend_s" if flag == "bend-s" else re.sub("-(deg|hz|ms|m|ppm|s)$", "", flag).replace("-", "_")
+                 for flag in flags}
+    assert of_python - keywords == {"from", "process_noise", "sensor_type"}
+
+
 def test_a_wrong_type_is_named(hall):
-    with pytest.raises(TypeError, match="range_noise = 'loud'"):
-        risley.calibrate(hall, range_noise="loud")
+    with pytest.raises(TypeError, match="noise_range = 'loud'"):
+        risley.calibrate(hall, noise_range="loud")

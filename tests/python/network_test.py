@@ -55,7 +55,7 @@ def test_record_writes_what_was_sent(sensors, tmp_path):
     start("127.0.0.62", serial="PYTHON000000021", sensor="avia", seed=4)
     path = tmp_path / "live.lvx"
     wanted = ["PYTHON000000011", "PYTHON000000021"]
-    recorded = risley.record(path, interface=HOST, duration=2.0, serials=wanted)
+    recorded = risley.record(path, interface=HOST, duration=2.0, serial=wanted)
     truths = [truth["sensors"][0] for truth in end()]
     assert recorded["output"] == str(path) and recorded["duration_s"] == pytest.approx(2.0, abs=0.5)
     for truth in truths:
@@ -72,9 +72,9 @@ def test_a_recording_is_sent_again_with_a_clock_that_is_faster(sensors, tmp_path
     risley.simulate(tmp_path / "made.lvx", duration=0.5, seed=8, scene=DATA / "room.yaml")
     start, end = sensors
     start("127.0.0.70", serial="PYTHON000000071", recording=tmp_path / "made.lvx",
-          clock_drift_ppm=400.0, time="ptp")
+          clock_drift=400e-6, time="ptp")
     recorded = risley.record(tmp_path / "again.nc", interface=HOST, duration=6.0,
-                             serials=["PYTHON000000071"])["sensors"][0]
+                             serial=["PYTHON000000071"])["sensors"][0]
     assert recorded["rows"] == end()[0]["sensors"][0]["rows"] == len(risley.read(tmp_path / "again.nc"))
     clock = recorded["clocks"][0]
     assert clock["source"].upper() == "PTP"
@@ -83,11 +83,11 @@ def test_a_recording_is_sent_again_with_a_clock_that_is_faster(sensors, tmp_path
 
 def test_a_bend_while_recording_is_told(sensors, tmp_path, caplog):
     start, end = sensors
-    start("127.0.0.72", serial="PYTHON000000081", bend_time=6.0,
+    start("127.0.0.72", serial="PYTHON000000081", bend_s=6.0,
           bend={"prism_tilt_b_vertical_deg": 0.1})
     with caplog.at_level(logging.WARNING, logger="risley"):
         recorded = risley.record(tmp_path / "bent.lvx", interface=HOST, duration=12.0,
-                                 serials=["PYTHON000000081"], optics="own")
+                                 serial=["PYTHON000000081"], optics="own")
     assert end()[0]["sensors"][0]["bends"] == 1
     assert recorded["sensors"][0]["optics"]["alarm"]["kind"] == "changed"
     assert any("optics have changed" in record.getMessage() for record in caplog.records)
@@ -102,7 +102,7 @@ def test_stop_ends_a_recording_and_words_are_logged(sensors, tmp_path, caplog):
     timer.start()
     with caplog.at_level(logging.INFO, logger="risley"):
         recorded = risley.record(tmp_path / "live.lvx", interface=HOST, stop=stop,
-                                 serials=["PYTHON000000031"])
+                                 serial=["PYTHON000000031"])
     timer.join()
     assert stop.is_set() and recorded["sensors"][0]["rows"] > 0
     assert any("PYTHON000000031" in record.getMessage() and record.levelno == logging.WARNING
@@ -125,7 +125,7 @@ def test_keys_are_those_of_the_command(sensors, tmp_path):
     words = ("--interface", HOST, "--serial", "PYTHON000000051", "--duration-s", 0.5)
     by_command = command("record", "-o", tmp_path / "command.lvx", *words)
     by_python = risley.record(tmp_path / "python.lvx", interface=HOST, duration=0.5,
-                              serials=["PYTHON000000051"])
+                              serial=["PYTHON000000051"])
     assert by_command.keys() - by_python.keys() <= {"command", "inputs", "seconds"}
     assert by_command["sensors"][0].keys() == by_python["sensors"][0].keys()
     emulated = command("emulate", "--interface", "127.0.0.66", "--duration-s", 0.2)
@@ -141,7 +141,7 @@ def test_an_interrupt_leaves_a_whole_recording(sensors, tmp_path):
     child = subprocess.Popen([sys.executable, "-c", """
 import logging, sys, risley
 logging.basicConfig(level=logging.INFO, stream=sys.stdout)
-risley.record(sys.argv[1], interface=sys.argv[2], serials=["PYTHON000000061"],
+risley.record(sys.argv[1], interface=sys.argv[2], serial=["PYTHON000000061"],
               progress=lambda *_: None)
 """, str(path), HOST], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     unfinished = tmp_path / "live.lvx.unfinished"
@@ -160,7 +160,7 @@ risley.record(sys.argv[1], interface=sys.argv[2], serials=["PYTHON000000061"],
 
 def test_errors_are_those_of_the_network_and_of_arguments(tmp_path):
     with pytest.raises(risley.NetworkError, match="no sensor"):
-        risley.record(tmp_path / "none.lvx", interface="127.0.0.68", find_time=0.3, duration=1)
+        risley.record(tmp_path / "none.lvx", interface="127.0.0.68", find=0.3, duration=1)
     assert issubclass(risley.NetworkError, OSError)
     with pytest.raises(ValueError, match="203.0.113.9"):
         risley.find_sensors("203.0.113.9")

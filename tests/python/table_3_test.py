@@ -20,9 +20,9 @@ def ratios(errors, bounds):
 
 
 def from_python(recording, seed):
-    unit = {"sensor": "mid-40-table3", "duration": 30.0, "rate": 1000.0, "angle_noise_deg": 0.01}
+    unit = {"sensor": "mid-40-table3", "duration": 30.0, "rate": 1000.0, "noise_angle_deg": 0.01}
     risley.simulate(recording, quantize=False, rotor="sinusoidal", seed=seed, **unit)
-    found = risley.estimate(recording, sensor="mid-40", angle_noise_deg=0.01, rate="full",
+    found = risley.estimate(recording, sensor="mid-40", noise_angle_deg=0.01, rate="full",
                             truth=f"{recording}.truth.yaml")
     assert found.converged, found.reason
     return ratios(found.to_dict()["truth"]["parameters"],

@@ -74,8 +74,8 @@ struct CloudSummary {
 /// file does not depend on the number of threads. Nothing appears at `path` unless all went well.
 /// @throws InvalidArgument for a recording of several sensors or a calibration of another one, a
 ///         rate or angle noise that is not above 0, and as create_cloud();
-///         TurnedFrame for a recording that does not stand in its sensor's frame, where rotation
-///         angles are needed; EstimationError when the rotors' motion cannot be found; FileError
+///         EstimationError for a recording that does not stand in its sensor's frame, where
+///         rotation angles are needed, and when the rotors' motion cannot be found; FileError
 CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calibration,
                         const std::string& path, const CloudOptions& options,
                         const Progress& progress = {});

@@ -19,13 +19,6 @@
 
 namespace risley::cloud {
 
-/// A recording's directions do not stand in its sensor's frame: its points would be put together
-/// from two frames.
-class TurnedFrame : public EstimationError {
- public:
-  using EstimationError::EstimationError;
-};
-
 /// What a recording says of the sensor that made it.
 struct SensorBelief {
   sensors::Sensor sensor;  ///< with the parameters that its reported directions are computed with
@@ -44,9 +37,9 @@ struct SensorBelief {
 /// Finds out from the beginning of a recording.
 /// @param calibration  start values, and which parameters are free
 /// @param angle_noise  rad; empty: the calibration's
-/// @throws TurnedFrame naming yaw and pitch when shots lie outside the sensor's field of view;
-///         EstimationError when its directions do not fit the calibration's sensor;
-///         InvalidArgument for angle noise that is not above 0
+/// @throws EstimationError naming yaw and pitch when shots lie outside the sensor's field of view,
+///         as points would be put together from two frames, and when its directions do not fit the
+///         calibration's sensor; InvalidArgument for angle noise that is not above 0
 SensorBelief sensor_belief(const estimation::AngleSeries& beginning,
                            const estimation::AngleSeries& head, const sensors::Sensor& calibration,
                            std::optional<double> angle_noise, const Progress& progress = {});

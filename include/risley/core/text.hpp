@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,5 +26,8 @@ std::string did_you_mean(std::string_view word, std::span<const std::string> nam
 /// UTF-8 as `\x9b`. Tabs stay.
 /// @param lines  whether line feeds stay, too
 std::string printable(std::string_view text, bool lines);
+
+/// 1234567 as "1 234 567".
+std::string grouped(std::uint64_t number);
 
 }  // namespace risley

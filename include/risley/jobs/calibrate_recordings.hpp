@@ -47,6 +47,9 @@ struct CalibrateRecordingsOptions : RangedInputOptions {  ///< recordings of pla
   std::function<std::vector<NamedText>(const CalibratedRecordings&)> texts;
 };
 
+/// Wrong wishes are told before an hour of reading. @throws InvalidArgument
+void check(const CalibrateRecordingsOptions& options);
+
 /// The stations of recordings, in their order.
 /// @param path   of a scene with stations; empty: none
 /// @param names  which of them, one per recording; empty: all, which are as many

@@ -32,7 +32,7 @@ struct RecordingCloud {
 };
 
 /// Turns a recording into points with covariance; the output appears when it is whole.
-/// @throws cloud::TurnedFrame, EstimationError, InvalidArgument, FileError, Cancelled
+/// @throws EstimationError, InvalidArgument, FileError, Cancelled
 RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
                                   const Progress& progress = {});
 

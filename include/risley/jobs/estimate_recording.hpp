@@ -43,6 +43,9 @@ struct EstimateRecordingOptions {
   std::function<std::vector<NamedText>(const EstimatedRecording&)> texts;
 };
 
+/// Wrong wishes are told before an hour of reading. @throws InvalidArgument
+void check(const EstimateRecordingOptions& options);
+
 /// What came of it.
 struct EstimatedRecording {
   ReadRecording recording;

@@ -50,8 +50,10 @@ std::vector<Input> find_inputs(const InputNames& wanted, const Progress& progres
 /// and of a truth the columns and the mount beside it. Only what there is.
 std::vector<std::string> files_behind(const std::string& path);
 
-/// SHA-256 of every file of a recording, by path. @throws FileError, Cancelled
-std::vector<std::pair<std::string, std::string>> input_hashes(const std::string& path,
-                                                              const Progress& progress = {});
+/// Files and their SHA-256.
+using FileHashes = std::vector<std::pair<std::string, std::string>>;
+
+/// Of every file of a recording. @throws FileError, Cancelled
+FileHashes input_hashes(const std::string& path, const Progress& progress = {});
 
 }  // namespace risley::jobs

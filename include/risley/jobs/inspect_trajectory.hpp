@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/recordings/reader.hpp"
 #include "risley/trajectories/trajectory.hpp"
 #include "risley/trajectories/trajectory_audit.hpp"
 
@@ -18,6 +19,13 @@ struct InspectTrajectoryOptions {
   std::string accuracy;    ///< path of the accuracies of the trajectory; empty: those that it holds
   std::string topic;       ///< of a bag of ROS; empty: its only one with poses
 };
+
+/// Whether an input that may be a recording, too, is to be read as a trajectory: a file of one, or
+/// a bag whose topic of poses is named.
+/// @param reading  options that only recordings have
+/// @throws InvalidArgument for options of the other kind; FileError
+bool is_trajectory(const InspectTrajectoryOptions& options, const recordings::ReadOptions& reading,
+                   const Progress& progress = {});
 
 /// What a file of poses or accuracies holds.
 struct InspectedTrajectory {

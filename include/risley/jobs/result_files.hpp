@@ -48,6 +48,8 @@ void require_settled(const std::string& result);
 /// Whether risley wrote a file, which says so at its beginning; a trajectory, which does not, where
 /// the mount that it came with stands beside it. Also true where there is no file.
 bool is_own_result(const std::string& file);
+/// @throws FileError unless it is_own_result(), as a new result would replace it
+void require_own_result(const std::string& file);
 
 /// The file that marks a folder whose files may be of different runs.
 inline constexpr const char* kIncomplete = "INCOMPLETE";

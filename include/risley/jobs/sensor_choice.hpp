@@ -14,8 +14,6 @@
 
 namespace risley::jobs {
 
-// Messages of jobs name an option by its field, as in "option shot_rate".
-
 /// The preset of a calibration or plan where nothing names another.
 inline constexpr const char* kUsualSensor = "mid-40";
 

@@ -54,7 +54,7 @@ using Json = nlohmann::ordered_json;
 inline constexpr int kFormatVersion = 1;
 
 // What every job found, in the keys, units and codes that docs/schemas describe: angles in degrees,
-// numbers that are not finite as null. Messages say "option NAME".
+// numbers that are not finite as null.
 
 /// Of `risley estimate`.
 Json of(const jobs::EstimatedRecording& found);

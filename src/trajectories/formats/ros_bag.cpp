@@ -15,6 +15,7 @@
 #include "risley/bags/bag.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 
 #include "trajectories/formats/format.hpp"
 #include "trajectories/formats/pose_rows.hpp"
@@ -45,9 +46,9 @@ std::size_t chosen_topic(const bags::Bag& bag, const std::string& name) {
                     bags::words_of(bag.topics())));
   }
   if (name.empty() && poses.size() > 1) {
-    throw InvalidArgument(
-        fmt::format("option trajectory_topic is missing: {} holds {} topics of poses, {}",
-                    bag.path(), poses.size(), bags::words_of(poses)));
+    throw InvalidArgument(fmt::format("{} is missing: {} holds {} topics of poses, {}",
+                                      name_of(kSetting.trajectory_topic), bag.path(), poses.size(),
+                                      bags::words_of(poses)));
   }
   const auto is_meant = [&](const bags::Topic& topic) {
     return is_pose_topic(topic) && (name.empty() || topic.name == name);
@@ -55,8 +56,9 @@ std::size_t chosen_topic(const bags::Bag& bag, const std::string& name) {
   const auto& topics = bag.topics();
   const auto found = std::ranges::find_if(topics, is_meant);
   if (found == topics.end()) {
-    throw InvalidArgument(fmt::format("option trajectory_topic = {}: {} holds the poses of {}",
-                                      name, bag.path(), bags::words_of(poses)));
+    throw InvalidArgument(fmt::format("{} = {}: {} holds the poses of {}",
+                                      name_of(kSetting.trajectory_topic), name, bag.path(),
+                                      bags::words_of(poses)));
   }
   if (std::find_if(found + 1, topics.end(), is_meant) != topics.end()) {
     bag.fail(fmt::format("the topic {} has poses of several types, expected one: {}", name,
