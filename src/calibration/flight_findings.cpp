@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "risley/algebra/rotation_vector.hpp"
+#include "risley/core/setting.hpp"
 
 #include "calibration/flight_words.hpp"
 #include "calibration/verdict.hpp"
@@ -139,8 +140,8 @@ void judge_held(HeldParameter held, const sensors::Sensor& sensor, FlightCalibra
   if (held.significant) {
     c.warnings.push_back(fmt::format(
         "the strips contradict what is held: {}; the results are off by more than their "
-        "sigmas. Estimate it as well (option additional)",
-        in_words(held, sensor)));
+        "sigmas. Estimate it as well ({})",
+        in_words(held, sensor), name_of(kSetting.free)));
   }
   c.held.push_back(std::move(held));
 }

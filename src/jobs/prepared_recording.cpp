@@ -12,6 +12,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/setting.hpp"
 #include "risley/estimation/shot_slips.hpp"
 #include "risley/estimation/stored_pose.hpp"
 #include "risley/recordings/plausibility.hpp"
@@ -324,11 +325,12 @@ void turn_back(PreparedRecording& recording, const Progress& progress) {
     recording.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
   } else if (!decided) {
     recording.warnings.push_back(fmt::format(
-        "{}: that does not show whether the pose was applied to them; {}. Option extrinsics "
-        "decides it: give the pose, or 0,0,0 for shots in the sensor's frame",
+        "{}: that does not show whether the pose was applied to them; {}. {} decides it: give the "
+        "pose, or 0,0,0 for shots in the sensor's frame",
         found,
         recording.turned_back ? "they were turned back, because a hub recorded them"
-                              : "they were taken as they are"));
+                              : "they were taken as they are",
+        name_of(kSetting.extrinsics)));
   }
 }
 
