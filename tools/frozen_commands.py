@@ -161,7 +161,7 @@ def settled(value):
 
 
 def cleaned(text, folder):
-    text = text.replace(str(folder), "FOLDER")
+    text = text.replace(str(folder), "FOLDER").replace(str(ROOT), "ROOT")
     text = re.sub(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(\.\d+)?Z?", "DATE", text)
     text = re.sub(r"\b(read|solved|rotation angles|total) [\d.]+ s\b", r"\1 TIME", text)
     text = re.sub(r"/tmp/[A-Za-z0-9_.]+", "TMP", text)

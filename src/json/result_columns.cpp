@@ -51,7 +51,8 @@ std::string unit_of(std::string_view name) {
 }  // namespace
 
 ResultColumns::ResultColumns() {
-  for (const auto& [name, words] : Json::parse(columns_schema())["properties"].items()) {
+  const Json schema = Json::parse(columns_schema());
+  for (const auto& [name, words] : schema["properties"].items()) {
     if (name == "parameters") {
       parameters_at_ = columns_.size();
       continue;

@@ -39,10 +39,14 @@ ValueTable table_of(const Json& result) {
   };
   const char* const values = result.contains("unknowns") ? "unknowns" : "parameters";
   for (const auto& [name, one] : result.at(values).items()) add(name, one);
-  for (const auto& [name, one] : result.value("ranges", Json::object()).items()) {
+  const Json none = Json::object();
+  const auto part = [&](const char* name) -> const Json& {
+    return result.contains(name) ? result.at(name) : none;
+  };
+  for (const auto& [name, one] : part("ranges").items()) {
     add(name == "constant_m" ? "range_offset_m" : "range_" + name, one);
   }
-  for (const auto& [name, one] : result.value("sizes", Json::object()).items()) add(name, one);
+  for (const auto& [name, one] : part("sizes").items()) add(name, one);
   return table;
 }
 
