@@ -162,11 +162,9 @@ std::string correlation_html(const std::vector<CorrelationHead>& heads, const Vi
   }
   html += "</tr></thead><tbody>\n";
   const std::vector<View> rows = matrix.list();
-  for (std::size_t i = 0; i < std::min(rows.size(), heads.size()); ++i) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
     html += fmt::format("<tr>{}", heads[i].row_html);
-    std::vector<double> row = rows[i].numbers();
-    row.resize(heads.size(), kUnknown);
-    for (double r : row) {
+    for (double r : rows[i].numbers()) {
       if (!std::isfinite(r)) {
         html += "<td>–</td>";
         continue;

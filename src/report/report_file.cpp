@@ -37,6 +37,19 @@ void check_columns(const View& chart) {
   }
 }
 
+/// Nor that a matrix has a row and a column for each of its names.
+void check_matrix(const View& correlation) {
+  const std::size_t size = correlation["names"].size();
+  const View matrix = correlation["matrix"];
+  const auto check = [size](const View& part, const char* what) {
+    if (part.size() == size) return;
+    throw FileError(part.file(), {},
+                    fmt::format("{}: {} {}, expected {}", part.place(), part.size(), what, size));
+  };
+  check(matrix, "rows");
+  for (const View& row : matrix.list()) check(row, "values");
+}
+
 void check_version(const Json& report, const std::string& path) {
   if (report.is_object() && report.value("format", Json()) == kFormat &&
       report.value("format_version", Json()) != kFormatVersion) {
@@ -83,6 +96,7 @@ Report parse_report(const std::string& text, const std::string& path) {
   for (const auto& [name, charts] : View(report)["charts"].entries()) {
     for (const View& chart : charts.list()) check_columns(chart);
   }
+  check_matrix(View(report)["page"]["correlation"]);
   return report;
 }
 

@@ -160,7 +160,7 @@ class FilesTest(CommandTest):
                 self.assertIn(words, self.expect(3, "info", hostile / name).stderr)
                 self.assertLess(time.monotonic() - started, 5)
         done = self.expect(3, "report", hostile / "report-covariance", "-o", "page.html")
-        self.assertIn("covariance: 60 rows", done.stderr)
+        self.assertIn("page.correlation.matrix: 40 rows, expected 8", done.stderr)
         self.assertNotIn("page.html", self.names())
 
     def test_every_hostile_file_has_its_test(self):
