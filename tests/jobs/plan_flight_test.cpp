@@ -76,7 +76,7 @@ TEST(PlanFlight, RefusesWhatMakesNoSense) {
     return refusal([&] { plan_flight(options); });
   };
   EXPECT_THAT(refused([](auto& o) { o.rate = 0; }), HasSubstr("rate"));
-  EXPECT_THAT(refused([](auto& o) { o.range_noise = -1; }), HasSubstr("range_noise"));
+  EXPECT_THAT(refused([](auto& o) { o.range_noise = -1; }), HasSubstr("noise_range"));
   EXPECT_THAT(refused([](auto& o) { o.prior_sigma = 0; }), HasSubstr("prior_sigma"));
   EXPECT_THAT(refused([](auto& o) { o.range_offset_sigma = -1; }), HasSubstr("range_offset_sigma"));
   EXPECT_THAT(refused([](auto& o) { o.knot_spacing = 0; }), HasSubstr("knot_spacing"));

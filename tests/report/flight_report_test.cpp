@@ -505,7 +505,11 @@ TEST(FlightPage, LongFlightsAreThinned) {
 
 TEST(FlightPage, AFailureSaysWhyAndWhatToDo) {
   Flight flight;
-  flight.calibration = FlightCalibration();
+  FlightCalibration failed;
+  failed.unknowns = flight.calibration.unknowns;  // every result has them
+  failed.covariance.setZero(flight.calibration.covariance.rows(),
+                            flight.calibration.covariance.cols());
+  flight.calibration = failed;
   flight.calibration.sensor = sensors::load_sensor("mid-40");
   flight.calibration.reason = "the adjustment had not converged & more";
   flight.calibration.rms_before = flight.calibration.rms_after = kNaN;
@@ -531,7 +535,7 @@ TEST(FlightPage, APoorResultAsksForCare) {
   flight = {};
   flight.calibration.warnings = {"one"};
   flight.warnings = {"two"};
-  EXPECT_THAT(visible(flight.html()), HasSubstr("<li>one</li><li>two</li>"));
+  EXPECT_THAT(visible(flight.html()), HasSubstr("<li>two</li><li>one</li>"));
 }
 
 TEST(FlightPage, NumbersThatAreNotFiniteAreDashes) {
