@@ -33,7 +33,7 @@ folder.mkdir(parents=True, exist_ok=True)
 
 # %%
 recording = folder / "table-3.nc"
-plan = {"sensor": "mid-40-table3", "duration": 30.0, "rate": 1000.0, "angle_noise_deg": options.noise}
+plan = {"sensor": "mid-40-table3", "duration": 30.0, "rate": 1000.0, "noise_angle_deg": options.noise}
 risley.simulate(recording, seed=1, **plan)
 result = risley.estimate(recording, truth=f"{recording}.truth.yaml")
 if not result.converged:

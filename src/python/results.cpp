@@ -43,10 +43,10 @@ ValueTable table_of(const Json& result) {
   const auto part = [&](const char* name) -> const Json& {
     return result.contains(name) ? result.at(name) : none;
   };
+  for (const auto& [name, one] : part("sizes").items()) add(name, one);
   for (const auto& [name, one] : part("ranges").items()) {
     add(name == "constant_m" ? "range_offset_m" : "range_" + name, one);
   }
-  for (const auto& [name, one] : part("sizes").items()) add(name, one);
   return table;
 }
 

@@ -17,7 +17,8 @@ TEST(Sha256, ErrorsNeverGiveAHash) {
   const io::TestFolder folder;
   EXPECT_THROW(sha256_of_file(folder.path().string()), FileError);
   EXPECT_THROW(sha256_of_file(folder.file("missing")), FileError);
-  EXPECT_THROW(sha256_of_file(std::string("/proc/self/mem")), FileError);  // opens, every read of it fails
+  EXPECT_THROW(sha256_of_file(std::string("/proc/self/mem")),
+               FileError);  // opens, every read of it fails
 }
 
 TEST(Sha256, InBase64AsBrowsersTakeIt) {

@@ -58,9 +58,9 @@ def test_the_calibrated_sensor_is_a_preset(result, tmp_path):
 @pytest.mark.parametrize("options, words", [
     ({"method": "guess"}, "method = 'guess'"),
     ({"rate": 0}, "rate = 0"),
-    ({"angle_noise": 1e-4, "angle_noise_deg": 0.01}, "angle_noise and angle_noise_deg"),
-    ({"fixed": ["colour"]}, "colour"),
-    ({"fixed": {"wedge_angle_a_deg": 90}}, "wedge_angle_a"),
+    ({"noise_angle": 1e-4, "noise_angle_deg": 0.01}, "noise_angle and noise_angle_deg"),
+    ({"fix": ["colour"]}, "colour"),
+    ({"fix": {"wedge_angle_a_deg": 90}}, "wedge_angle_a"),
     ({"threads": -1}, "threads = -1"),
     ({"sensor": "mid-41"}, "mid-41"),
 ])

@@ -308,7 +308,7 @@ def test_many_recordings(folder, hall):
     scans = folder / "scans" / "deep"
     scans.mkdir(parents=True)
     shutil.copy(hall, scans / "one.nc")
-    risley.simulate(scans.parent / "two.lvx", rate=20000.0, duration=0.3, seed=2)
+    risley.simulate(scans.parent / "two.lvx", scene=DATA / "room.yaml", rate=20000.0, duration=0.3, seed=2)
     (scans / "bad.lvx").write_bytes(b"no recording")
     wanted = {"output": folder / "each", "table": folder / "each.csv", "resume": True, "rate": 5000}
     found = risley.estimate_many(scans.parent, **wanted)

@@ -110,9 +110,9 @@ class LineSearch {
   std::vector<Complex> value_;
 };
 
-/// Speeds of a sensor's rotors are looked for so near to what is usual, as a share of it, and so
-/// many minima are tried.
+/// Speeds of a sensor's rotors are looked for so near to what is usual, as a share of it.
 inline constexpr double kUsualShare = 0.06;
+/// So many minima of a search for speeds are tried.
 inline constexpr std::size_t kMostMinima = 4;
 
 /// Duration of the shortest window that tells the rotors of a sensor apart, s.
