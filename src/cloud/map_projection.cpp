@@ -234,7 +234,7 @@ MapProjection& MapProjection::operator=(MapProjection&&) noexcept = default;
 Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
   const std::lock_guard lock(state_->mutex);
   PJ* operation = state_->operation.get();
-  const Vector3d mapped = transformed(operation, PJ_FWD, geocentric_m);
+  Vector3d mapped = transformed(operation, PJ_FWD, geocentric_m);
   if (!mapped.allFinite()) {
     throw InvalidArgument(
         fmt::format("{} is not defined at the place x = {:.3f}, y = {:.3f}, z = {:.3f} m "
@@ -249,7 +249,7 @@ Vector3d MapProjection::project(const Vector3d& geocentric_m) const {
 
 Vector3d MapProjection::unproject(const Vector3d& on_map_m) const {
   const std::lock_guard lock(state_->mutex);
-  const Vector3d place = transformed(state_->operation.get(), PJ_INV, on_map_m);
+  Vector3d place = transformed(state_->operation.get(), PJ_INV, on_map_m);
   if (!place.allFinite()) {
     throw InvalidArgument(fmt::format("{} has no place with the coordinates {:.3f}, {:.3f}, {:.3f}",
                                       state_->name, on_map_m.x(), on_map_m.y(), on_map_m.z()));

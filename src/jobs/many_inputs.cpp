@@ -173,18 +173,19 @@ InputPlan plan_inputs(const ManyInputsOptions& options, const InputWork& work,
 }
 
 std::string work_text(const std::string& program,
-                      std::vector<std::pair<std::string, std::vector<std::string>>> settings,
+                      const std::vector<std::pair<std::string, std::vector<std::string>>>& settings,
                       const Progress& progress) {
   std::vector<std::string> lines;
-  for (auto& [name, values] : settings) {
-    for (std::string& value : values) {
+  for (const auto& [name, values] : settings) {
+    std::string line = name + "=";
+    for (const std::string& value : values) {
       std::string contents;
       for (const std::string& file : files_behind(value)) {
         contents += " sha256:" + hashes::sha256_of_file(file, progress);
       }
-      if (!contents.empty()) value = contents;
+      line += " " + (contents.empty() ? value : contents);
     }
-    lines.push_back(fmt::format("{}={}", name, fmt::join(values, " ")));
+    lines.push_back(std::move(line));
   }
   std::sort(lines.begin(), lines.end());
   return fmt::format("{}\n{}\n", program, fmt::join(lines, "\n"));

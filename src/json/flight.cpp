@@ -132,7 +132,8 @@ Json errors_json(const Value& value) {
 
 Json trajectory_fit_json(const FlightCalibration& c) {
   const calibration::TrajectoryFit& fit = c.trajectory_fit;
-  const std::int64_t begin_ns = c.model.knots.time_ns.front();
+  const auto& times = c.model.knots.time_ns;
+  const std::int64_t begin_ns = times.empty() ? 0 : times.front();
   Json jumps = Json::array();
   for (const calibration::TrajectoryJump& jump : fit.jumps) {
     const auto since = [&](std::int64_t time_ns) { return 1e-9 * double(time_ns - begin_ns); };

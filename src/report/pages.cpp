@@ -41,6 +41,7 @@ Json correlation_json(const std::vector<std::string>& names, const Eigen::Matrix
 Json correlation_json(const std::vector<estimation::FreeParameter>& free,
                       const Eigen::MatrixXd& covariance) {
   std::vector<std::string> names;
+  names.reserve(free.size());
   for (const estimation::FreeParameter& one : free) names.push_back(one.name);
   return correlation_json(names, covariance);
 }

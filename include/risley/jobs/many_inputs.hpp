@@ -109,7 +109,7 @@ InputPlan plan_inputs(const ManyInputsOptions& options, const InputWork& work,
 /// existing files are replaced by the SHA-256 of what they hold.
 /// @param program  that does it, with its version and verb  @throws FileError, Cancelled
 std::string work_text(const std::string& program,
-                      std::vector<std::pair<std::string, std::vector<std::string>>> settings,
+                      const std::vector<std::pair<std::string, std::vector<std::string>>>& settings,
                       const Progress& progress = {});
 
 /// Runs all jobs, several at a time. One that fails does not stop the rest. What comes of them

@@ -93,7 +93,7 @@ class NetcdfWriter final : public CloudWriter {
   template <class T, class Column>
   tables::NetcdfVariable define(const Description& what, Column column, double scale = 1,
                                 const tables::NetcdfDimension* inner = nullptr) {
-    const auto value = [scale](auto number) {
+    const auto value = [=](auto number) {
       if constexpr (std::is_floating_point_v<T>) {
         return static_cast<T>(scale * static_cast<double>(number));
       } else {

@@ -185,7 +185,8 @@ namespace risley::recordings::las {
 std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& /*header*/,
                                                     std::vector<ReadWarning>& /*warnings*/) {
-  throw FileError(input.path(), {kPointFormatAt, {}},
+  const io::BlockInput own = std::move(input);
+  throw FileError(own.path(), {kPointFormatAt, {}},
                   "is compressed by LASzip, and this build has no LASzip, because Debian 12 has no "
                   "package of it. Build with liblaszip-dev (Debian 13), or convert the file to LAS "
                   "with another program (laszip, PDAL, laspy)");

@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <ranges>
+#include <cstddef>
+#include <iterator>
 #include <string_view>
 
 #include <Eigen/Core>
@@ -27,7 +28,10 @@ bool is_kitti_row(std::string_view line) {
 
 bool is_kitti(const FileHead& head) {
   const std::vector<std::string_view> lines = lines_of(head.bytes);
-  return !lines.empty() && std::ranges::all_of(lines | std::views::take(3), is_kitti_row);
+  constexpr std::ptrdiff_t kRows = 3;
+  return !lines.empty() &&
+         std::all_of(lines.begin(), lines.begin() + std::min(std::ssize(lines), kRows),
+                     is_kitti_row);
 }
 
 Trajectory refuse_kitti(const std::string& path, const Progress& /*progress*/) {
