@@ -38,8 +38,8 @@ std::string settings_text(const CLI::App& verb, const CommonOptions& common) {
     if (values.empty()) values.push_back(option->get_default_str());
     if (!values.front().empty()) settings.emplace_back(name, std::move(values));
   }
-  return jobs::work_text(fmt::format("risley {} {}", RISLEY_VERSION, common.verb),
-                         std::move(settings), cancellable());
+  return jobs::work_text(fmt::format("risley {} {}", RISLEY_VERSION, common.verb), settings,
+                         cancellable());
 }
 
 std::string summary(const InputRun& run, const jobs::InputPlan& plan, const jobs::InputWork& work) {
