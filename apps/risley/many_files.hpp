@@ -21,7 +21,8 @@ bool are_several(const jobs::ManyInputsOptions& wishes);
 /// The same for a verb that makes one file of each input, whose output may be an existing folder.
 bool output_is_folder(const jobs::ManyInputsOptions& wishes);
 
-/// For what is told while inputs are worked through.
+/// Logs a message about an input while others are still being read.
+/// @param is_wrong  an error; otherwise a warning
 void log_words(const std::string& words, bool is_wrong);
 
 /// Runs all jobs and prints what came of them. One alone is as if there were no others: its JSON is

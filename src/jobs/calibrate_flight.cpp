@@ -28,7 +28,7 @@ namespace {
 using calibration::CalibrationCode;
 using calibration::RangedRecording;
 
-/// Wrong wishes are told before an hour of reading.
+/// Checks the options before anything is read.
 void check_flight_options(const CalibrateFlightOptions& options) {
   check_ranged_input(options);
   if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);

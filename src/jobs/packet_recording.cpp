@@ -56,7 +56,7 @@ std::optional<PacketRecording> PacketRecording::open(const PreparedRecording& re
       }
       progress.check();
     }
-  } catch (const FileError&) {  // who reads on is told of it
+  } catch (const FileError&) {  // a later pass reports it
   }
   if (!result.lacks_points()) return std::nullopt;
   return result;

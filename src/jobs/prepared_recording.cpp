@@ -141,7 +141,7 @@ std::optional<estimation::CountedShots> counted_shots(const recordings::Source& 
       named = named || std::any_of(beam.begin(), beam.end(), [](auto one) { return one != 0; });
       progress.check();
     }
-  } catch (const FileError&) {  // who reads on is told of it
+  } catch (const FileError&) {  // a later pass reports it
   }
   const std::optional<double> rate = options.shot_rate ? options.shot_rate : even.rate();
   if (!rate) return std::nullopt;
@@ -155,7 +155,7 @@ std::optional<estimation::CountedShots> counted_shots(const recordings::Source& 
 estimation::ShotCount count_of(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
                                const Progress& progress) {
   for (const std::uint8_t beam : shots.series.beam) {
-    if (beam >= sensor.train.emitters()) return {};  // who reads on is told of it
+    if (beam >= sensor.train.emitters()) return {};  // a later pass reports it
   }
   return estimation::find_slips(shots, sensor, progress);
 }
@@ -382,7 +382,7 @@ std::string PreparedRecording::removed_shots_words(const Progress& progress) con
     const auto own = recordings::open_recording(source, reading, progress);
     recordings::Chunk chunk;
     while (selector.rows().size() < kMost && own->read(chunk)) selector.add(chunk.observations);
-  } catch (const FileError&) {  // who reads on is told of it
+  } catch (const FileError&) {  // a later pass reports it
   }
   const estimation::CountedShots shots{selector.take_series(), selector.rows(), 0, false};
   return words_of_removed(shots, estimation::emitters_in_turn(shots));

@@ -534,7 +534,7 @@ AngleSeries first_second(const recordings::Source& source, const recordings::Rea
       selector.add(chunk.observations);
       progress.check();
     }
-  } catch (const FileError&) {  // who reads on is told of it
+  } catch (const FileError&) {  // a later pass reports it
   }
   return selector.head();
 }

@@ -91,11 +91,15 @@ void require_own_results(const InputJob& job) {
   }
 }
 
-/// The outcome of a job whose numbers have a verdict.
-/// @param words  what it was made from
-template <class Solution>
-InputOutcome judged(const InputJob& job, Json json, const Solution& solution, std::string words) {
-  const std::string& reason = solution.converged ? "" : solution.reason;
+/// The outcome of a job whose numbers have a verdict, once its warnings are told.
+/// @param solution  of what was found  @param words  what it was made from
+template <class Found, class Solution>
+InputOutcome judged(const InputJob& job, const Found& found, const Solution& solution,
+                    const Tell& tell, const std::string& words) {
+  tell_all(tell, job.input, found.warnings);
+  tell_all(tell, job.input, solution.warnings);
+  Json json = of(found);
+  const std::string reason = solution.converged ? "" : solution.reason;
   json["input"] = job.input;
   if (!job.output.empty()) json["output"] = job.output;
   json["message"] = reason;
@@ -103,6 +107,26 @@ InputOutcome judged(const InputJob& job, Json json, const Solution& solution, st
   if (!solution.converged) text += fmt::format(", not converged: {}", reason);
   return {solution.converged ? jobs::kDone : jobs::kNumbersFailed, text_of(json),
           fmt::format("{}; {}", text, words)};
+}
+
+/// A verb that makes a folder of results of every input.
+/// @param solve  called with the job, its own options and the progress
+template <class Options, class Solve>
+InputWork work_into_folders(std::string verb, std::string label, Options options, Solve solve) {
+  jobs::check(options);
+  InputWork work = work_of(std::move(verb), std::move(label));
+  work.into_folders = true;
+  work.files = result_files_of;
+  work.run = [options = std::move(options), solve = std::move(solve)](const InputJob& job,
+                                                                      const Progress& progress) {
+    Options own = options;
+    own.reading = reading_of(own.reading, job);
+    own.files.folder = job.output;
+    own.details = own.details && !job.output.empty();
+    require_own_results(job);
+    return solve(job, own, progress);
+  };
+  return work;
 }
 
 bool is_trajectory(const InspectEachOptions& options, const InputJob& job,
@@ -292,50 +316,31 @@ Json with_status(Json result, const std::optional<FileError>& damage) {
 }
 
 InputWork estimate_each(jobs::EstimateRecordingOptions options, const Tell& tell) {
-  jobs::check(options);
-  InputWork work = work_of("estimate", "estimating");
-  work.into_folders = true;
-  work.files = result_files_of;
-  work.run = [options = std::move(options), tell](const InputJob& job, const Progress& progress) {
-    jobs::EstimateRecordingOptions own = options;
-    own.recording = job.input;
-    own.reading = reading_of(own.reading, job);
-    own.files.folder = job.output;
-    own.details = own.details && !job.output.empty();
-    require_own_results(job);
-    const jobs::EstimatedRecording found = jobs::estimate_recording(own, progress);
-    const estimation::Estimate& e = found.estimate;
-    tell_all(tell, job.input, found.warnings);
-    tell_all(tell, job.input, e.warnings);
-    return judged(job, of(found), e,
-                  fmt::format("{}, {} shots, {} of them outliers", jobs::sensor_name(found.choice),
-                              grouped(e.series.size()), grouped(e.outliers)));
-  };
-  return work;
+  return work_into_folders(
+      "estimate", "estimating", std::move(options),
+      [tell](const InputJob& job, jobs::EstimateRecordingOptions& own, const Progress& progress) {
+        own.recording = job.input;
+        const jobs::EstimatedRecording found = jobs::estimate_recording(own, progress);
+        const estimation::Estimate& e = found.estimate;
+        return judged(
+            job, found, e, tell,
+            fmt::format("{}, {} shots, {} of them outliers", jobs::sensor_name(found.choice),
+                        grouped(e.series.size()), grouped(e.outliers)));
+      });
 }
 
 InputWork calibrate_each(jobs::CalibrateRecordingsOptions options, const Tell& tell) {
   options.recordings.assign(1, recordings::Source("each recording"));
-  jobs::check(options);
-  InputWork work = work_of("calibrate", "calibrating");
-  work.into_folders = true;
-  work.files = result_files_of;
-  work.run = [options = std::move(options), tell](const InputJob& job, const Progress& progress) {
-    jobs::CalibrateRecordingsOptions own = options;
-    own.recordings = {job.input};
-    own.reading = reading_of(own.reading, job);
-    own.files.folder = job.output;
-    own.details = own.details && !job.output.empty();
-    require_own_results(job);
-    const jobs::CalibratedRecordings found = jobs::calibrate_recordings(own, progress);
-    const calibration::Calibration& c = found.calibration;
-    tell_all(tell, job.input, found.warnings);
-    tell_all(tell, job.input, c.warnings);
-    return judged(job, of(found), c,
-                  fmt::format("{}, {} points on {} planes", jobs::sensor_name(found.choice),
-                              grouped(c.points), c.planes.size()));
-  };
-  return work;
+  return work_into_folders(
+      "calibrate", "calibrating", std::move(options),
+      [tell](const InputJob& job, jobs::CalibrateRecordingsOptions& own, const Progress& progress) {
+        own.recordings = {job.input};
+        const jobs::CalibratedRecordings found = jobs::calibrate_recordings(own, progress);
+        const calibration::Calibration& c = found.calibration;
+        return judged(job, found, c, tell,
+                      fmt::format("{}, {} points on {} planes", jobs::sensor_name(found.choice),
+                                  grouped(c.points), c.planes.size()));
+      });
 }
 
 InputWork cloud_each(jobs::CloudOfRecordingOptions options, const CloudPages& pages,

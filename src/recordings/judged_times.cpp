@@ -92,7 +92,7 @@ class TimesJudge {
         rows.append(chunk.observations);
         progress.check();
       }
-    } catch (const FileError&) {  // who reads on is told of it
+    } catch (const FileError&) {  // a later pass reports it
       ended_ = true;
     }
   }

@@ -140,8 +140,8 @@ class Bag {
 /// @throws FileError when it is no bag, is cut off or damaged
 std::unique_ptr<Bag> open_bag(const io::InputFile& file, BagKind kind,
                               const Progress& progress = {});
-/// The same of the kind that the bytes tell of a file, or of a folder as files_of_bag_folder()
-/// takes it, by its path.
+/// Opens a bag, recognising its kind from its first bytes.
+/// @param path  file, or folder as files_of_bag_folder() takes it
 std::unique_ptr<Bag> open_bag(const std::string& path, const Progress& progress = {});
 
 /// The topics of a bag, from its index alone.

@@ -47,7 +47,7 @@ struct CalibrateRecordingsOptions : RangedInputOptions {  ///< recordings of pla
   std::function<std::vector<NamedText>(const CalibratedRecordings&)> texts;
 };
 
-/// Wrong wishes are told before an hour of reading. @throws InvalidArgument
+/// Checks the options before anything is read. @throws InvalidArgument
 void check(const CalibrateRecordingsOptions& options);
 
 /// The stations of recordings, in their order.

@@ -43,7 +43,7 @@ struct EstimateRecordingOptions {
   std::function<std::vector<NamedText>(const EstimatedRecording&)> texts;
 };
 
-/// Wrong wishes are told before an hour of reading. @throws InvalidArgument
+/// Checks the options before anything is read. @throws InvalidArgument
 void check(const EstimateRecordingOptions& options);
 
 /// What came of it.

@@ -93,8 +93,7 @@ struct InputWork {
 /// All of them.
 struct InputPlan {
   std::vector<InputJob> jobs;
-  /// Whether they are told as several are: by what was asked for, not by how many inputs that came
-  /// to.
+  /// Whether results are shown as a list. What was asked for decides, not how many inputs matched.
   bool many = false;
   std::string folder;   ///< that all results go to; empty: none, or each into one of its own
   std::string journal;  ///< file that says what was made; empty: none is kept
