@@ -96,7 +96,7 @@ BeamBundle::BeamBundle(const PrismTrain& train, const std::vector<estimation::Fr
   for (const auto& column : rotation_angles) {
     require_length("rotation angles of a prism", column.size(), rotation_angles.front().size());
   }
-  with_prism_count(prisms_, [&]<int N>() {
+  with_layout(train.layout(), [&]<TrainLayout N>() {
     check_beams(train, emitter, rotation_angles.front().size());
     add_beams<N>(train, free, rotation_angles, emitter, held);
   });
@@ -111,7 +111,7 @@ BeamBundle::BeamBundle(const PrismTrain& train, const std::vector<estimation::Fr
   turn_ = algebra::SymmetricSolver(normal_).solve_columns(right);
 }
 
-template <int N>
+template <TrainLayout N>
 void BeamBundle::add_beams(const PrismTrain& train,
                            const std::vector<estimation::FreeParameter>& free,
                            const std::vector<std::vector<double>>& rotation_angles,

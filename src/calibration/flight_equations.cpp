@@ -202,7 +202,7 @@ class FlightCalls {
     FlightArguments& a = all_;
     a.parameters = model.train.parameters().data();
     a.face_order = model.train.face_order().data();
-    a.prisms = model.train.prisms();
+    a.prisms = model.train.layout();
     a.emitters = model.train.emitters();
     a.face_position = face_position_.data();
     a.places = places_.data();

@@ -42,7 +42,7 @@ Matrix rotation(const Batch& w, const Batch& x, const Batch& y, const Batch& z) 
 Vector broadcast(const double* v) { return {Batch(v[0]), Batch(v[1]), Batch(v[2])}; }
 
 /// One group of shots, gathered: a lane each. Lanes behind the last one repeat it.
-template <int N>
+template <TrainLayout N>
 struct Gathered {
   std::array<Batch, N> rotation_angle;
   Batch range, knot_weight;  ///< of the knot behind
@@ -78,7 +78,7 @@ struct Gathered {
 };
 
 /// Everything of a call that is the same for all shots.
-template <int N>
+template <TrainLayout N>
 struct FlightConstants {
   std::uint8_t beam[kLanes] = {};
   EmitterLanes<Batch, N> emitters;
@@ -106,7 +106,7 @@ struct FlightConstants {
   }
 };
 
-template <int N>
+template <TrainLayout N>
 constexpr std::size_t most_columns() {
   return kMountColumns + EmitterLanes<Batch, N>::kPlaces + 2 + 2 * kKnot + 1;
 }
@@ -136,7 +136,7 @@ class RowWriter {
 
 /// Writes the row of one group: the columns of the products, padding, the plane's columns.
 /// @return which lanes are of no use, and why
-template <int N>
+template <TrainLayout N>
 FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
                              const FlightPlane& plane, const std::uint32_t* shots,
                              std::size_t count, Batch* row, Batch* plane_row, double* rows_out) {
@@ -294,7 +294,7 @@ FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
 }
 
 /// Rows of the products and of the plane, and the sums of a plane's own.
-template <int N>
+template <TrainLayout N>
 class FlightSums {
  public:
   explicit FlightSums(std::size_t main)
@@ -357,7 +357,7 @@ class FlightSums {
   Batch plane_[kPlaneColumns][kStride];
 };
 
-template <int N>
+template <TrainLayout N>
 FlightCounts accumulate_runs(const FlightArguments& a) {
   FlightConstants<N> constants(a);
   FlightSums<N> sums(constants.main);
@@ -396,7 +396,7 @@ FlightCounts accumulate_runs(const FlightArguments& a) {
 }  // namespace
 
 FlightCounts accumulate_flight(const FlightArguments& a) {
-  return with_prism_count(a.prisms, [&]<int N>() { return accumulate_runs<N>(a); });
+  return with_layout(a.prisms, [&]<TrainLayout N>() { return accumulate_runs<N>(a); });
 }
 
 }  // namespace risley::calibration::RISLEY_KERNEL_NAMESPACE

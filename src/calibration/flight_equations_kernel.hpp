@@ -31,7 +31,8 @@ inline constexpr int kPlaneColumns = 3;
 struct FlightArguments {
   const double* parameters = nullptr;     ///< whole flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
-  int prisms = 0, emitters = 1;
+  TrainLayout prisms;
+  int emitters = 1;
   const double* face_position = nullptr;  ///< [2 prisms]
   /// Free parameter j is in places[place_begin[j]] ... places[place_begin[j + 1] - 1].
   const int* places = nullptr;

@@ -53,7 +53,7 @@ struct Sums {
   }
 };
 
-template <int N>
+template <TrainLayout N>
 class View {
  public:
   View(const PlanarProblem& p, const RangedShots& shots) : p_(p), shots_(shots) {
@@ -162,7 +162,7 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
     double squares = 0;
     for (std::size_t v = 0; v < problem.views.size(); ++v) {
       WallView& view = problem.views[v];
-      const auto [plane, sums] = with_prism_count(problem.train.prisms(), [&]<int N>() {
+      const auto [plane, sums] = with_layout(problem.train.layout(), [&]<TrainLayout N>() {
         const View<N> one(problem, *view.shots);
         const Cloud cloud = one.cloud();
         return std::pair{cloud.plane, one.sums(cloud)};

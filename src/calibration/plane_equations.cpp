@@ -99,7 +99,7 @@ PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
   PlaneArguments all;
   all.parameters = view.train.parameters().data();
   all.face_order = view.train.face_order().data();
-  all.prisms = layout.prisms;
+  all.prisms = view.train.layout();
   all.emitters = view.train.emitters();
   if (!shots.beam.empty()) all.beam = shots.beam.data();
   all.face_position = face_position.data();

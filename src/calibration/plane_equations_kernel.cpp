@@ -25,7 +25,7 @@ constexpr std::size_t kGroups = 16;
 constexpr std::size_t kBlock = kGroups * kLanes;
 
 /// Rows of columns and the sums of their products.
-template <int N>
+template <TrainLayout N>
 class Products {
  public:
   /// @param columns  residual included
@@ -57,7 +57,7 @@ class Products {
 };
 
 /// Everything of a call that is the same for all shots, but for the emitters of a group.
-template <int N>
+template <TrainLayout N>
 struct Constants {
   EmitterLanes<Batch, N> emitters;
   PreparedTrain<Batch, N> train;
@@ -100,7 +100,7 @@ struct Constants {
 };
 
 /// The columns of one block of shots. Behind the last shot of a call follow some that are lost.
-template <int N>
+template <TrainLayout N>
 class ShotBlock {
  public:
   static constexpr std::size_t kPairs = N * (N + 1) / 2;
@@ -165,7 +165,7 @@ struct BlockResiduals {
 
 /// The groups of a block on their way to the plane and back, which take each step of the model
 /// together: see AngleLinearisations.
-template <int N>
+template <TrainLayout N>
 class Walks {
  public:
   /// Writes the rows of all groups.
@@ -185,7 +185,7 @@ class Walks {
       }
     }
 #pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
       for (std::size_t g = 0; g < groups; ++g) {
         pass_prism(c.train, k, trace_[g]);
         set_inside(c.train, k, trace_[g]);
@@ -193,7 +193,7 @@ class Walks {
     }
     for (std::size_t g = 0; g < groups; ++g) meet_plane(c, g);
 #pragma GCC unroll 4
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
       for (std::size_t g = 0; g < groups; ++g) {
         reverse_prism(c.train, c.derivatives, trace_[g], N - 1 - k, pass_[g]);
       }
@@ -301,7 +301,7 @@ class Walks {
 /// Adds the products of a block's shots to those of their cells.
 /// @param first  shot of the call's columns
 /// @param cell   of the shot before, moved on
-template <int N>
+template <TrainLayout N>
 void add_to_cells(const PlaneArguments& a, const Products<N>& products, std::size_t columns,
                   std::size_t first, std::size_t shots, std::size_t& cell) {
   for (std::size_t i = 0; i < shots; ++i) {
@@ -319,7 +319,7 @@ void add_to_cells(const PlaneArguments& a, const Products<N>& products, std::siz
   }
 }
 
-template <int N>
+template <TrainLayout N>
 std::size_t accumulate_shots(const PlaneArguments& a) {
   Constants<N> constants(a);
   const auto columns =
@@ -350,7 +350,7 @@ std::size_t accumulate_shots(const PlaneArguments& a) {
 }  // namespace
 
 std::size_t accumulate_plane(const PlaneArguments& a) {
-  return with_prism_count(a.prisms, [&]<int N>() { return accumulate_shots<N>(a); });
+  return with_layout(a.prisms, [&]<TrainLayout N>() { return accumulate_shots<N>(a); });
 }
 
 }  // namespace risley::calibration::RISLEY_KERNEL_NAMESPACE

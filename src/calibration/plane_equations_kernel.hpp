@@ -25,7 +25,8 @@ inline constexpr int kMostSizes = 2 * kMaxPrisms;
 struct PlaneArguments {
   const double* parameters = nullptr;     ///< whole flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
-  int prisms = 0, emitters = 1;
+  TrainLayout prisms;
+  int emitters = 1;
   const double* face_position = nullptr;  ///< [2 prisms]
   const int* places = nullptr;            ///< of the flat vector, at most all of them
   int place_count = 0;

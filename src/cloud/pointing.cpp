@@ -220,11 +220,10 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     return;
   }
   const Faces faces(model);
-  const int prisms = model.train.prisms();
   const auto& kernel = RISLEY_KERNEL_COPIES(compute_points).at(set);
   const auto square = [](double x) { return x * x; };
   PointArguments a;
-  a.prisms = prisms;
+  a.prisms = model.train.layout();
   a.emitters = model.train.emitters();
   a.face_order = model.train.face_order().data();
   a.parameters = model.train.parameters().data();

@@ -283,7 +283,7 @@ class Points {
 };
 
 /// Everything of a call that is the same for all shots, but for the emitters of a group.
-template <int N>
+template <TrainLayout N>
 class Kernel : public Points {
  public:
   static constexpr std::size_t kFaces = 2 * N;
@@ -321,7 +321,7 @@ class Kernel : public Points {
       }
     }
 #pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
       for (std::size_t g = 0; g < groups; ++g) {
         pass_prism(train_, k, trace_[g]);
         set_inside(train_, k, trace_[g]);
@@ -336,7 +336,7 @@ class Kernel : public Points {
 
     for (std::size_t g = 0; g < groups; ++g) turn_back(g);
 #pragma GCC unroll 4
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
       for (std::size_t g = 0; g < groups; ++g) {
         reverse_prism(train_, derivatives_, trace_[g], N - 1 - k, pass_[g],
                       [&origin = origin_[g]](std::size_t face, std::size_t r, Vector3<Batch>& beam,
@@ -536,7 +536,7 @@ void compute_points(const PointArguments& a) {
     for (std::size_t at = 0; at < a.shots; at += kLanes) points.compute_reported(at);
     return;
   }
-  with_prism_count(a.prisms, [&]<int N>() {
+  with_layout(a.prisms, [&]<TrainLayout N>() {
     Kernel<N> kernel(a);
     for (std::size_t at = 0; at < a.shots; at += kBlock) {
       kernel.compute(at, a.shots - at < kBlock ? a.shots : at + kBlock);

@@ -30,7 +30,8 @@ inline constexpr double kLeastCosine = 0.17364817766693033;
 inline constexpr std::size_t kPointPadding = 8;
 
 struct PointArguments {
-  int prisms = 0, emitters = 1;
+  TrainLayout prisms;
+  int emitters = 1;
   const FaceOrder* face_order = nullptr;        ///< [prisms]
   const double* parameters = nullptr;           ///< whole flat vector: where the beam truly goes
   const double* believed_parameters = nullptr;  ///< what directions are reported with; may be equal

@@ -32,13 +32,13 @@ constexpr std::size_t whole_rows(std::size_t states) {
 }
 
 /// Free parameters at most: one per place.
-template <int N>
+template <TrainLayout N>
 constexpr auto kMostFree = static_cast<std::size_t>(parameter_count(TrainShape{N, kMaxEmitters}));
 
 /// The paper's choice of free parameters for one emitter and one glass, default_free_names(). A
 /// number of states that the compiler knows, and derivatives of which it knows that nobody wants
 /// them, take 12 % off a step, the latter 7 % of these.
-template <int N>
+template <TrainLayout N>
 struct UsualParameters {
   static constexpr int kCount = 3 * N + 2;
   /// As prepare_derivatives() asks.
@@ -48,7 +48,7 @@ struct UsualParameters {
 /// Mean and covariance. Angle and speed of each rotor come first, so that they are neighbours in a
 /// batch, then the free parameters, then zeros up to whole rows.
 /// @tparam Free  number of free parameters, or -1: known when it runs
-template <int N, int Free>
+template <TrainLayout N, int Free>
 class FilterStates {
  public:
   static constexpr std::size_t kRotors = 2 * N;  ///< states of the rotors
@@ -100,7 +100,7 @@ Batch exchanged_pairs(const Batch& value, std::index_sequence<Lane...>) {
 }
 
 /// What the rotors do between two shots.
-template <int N>
+template <TrainLayout N>
 class RotorStep {
  public:
   static constexpr std::size_t kBatches = (2 * N + kLanes - 1) / kLanes;  ///< of the rotors' rows
@@ -139,7 +139,7 @@ class RotorStep {
 };
 
 /// Where the derivatives by the free parameters are among those by places, for one emitter.
-template <int N>
+template <TrainLayout N>
 struct FreeDerivatives {
   static constexpr std::size_t kNone = parameter_count(N);  ///< holds 0
   std::size_t first[kMostFree<N>];
@@ -181,7 +181,7 @@ struct SinesInAllLanes {
 };
 
 /// The filter on its way through the shots.
-template <int N, int Free>
+template <TrainLayout N, int Free>
 class FilterPass {
  public:
   explicit FilterPass(const FilterArguments& a) : a_(a), states_(a), step_(a.process) {
@@ -273,7 +273,7 @@ class FilterPass {
     }
     const Batch seconds(step_.seconds());
 #pragma GCC unroll 4
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
       double* const angle = states_.column(2 * k);
       double* const speed = angle + rows;
       for (std::size_t i = 0; i < rows; i += kLanes) {
@@ -328,7 +328,7 @@ class FilterPass {
     forward.beam[0] = leaning_direction<Batch>(sines[leaning::incident_horizontal()],
                                                sines[leaning::incident_vertical()]);
 #pragma GCC unroll 4
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
       prepare_prism(parameters, sines, k, train);
       forward.sine[k] = Batch(sine_[leaning::count(N) + k]);
       forward.cosine[k] = Batch(cosine_[leaning::count(N) + k]);
@@ -349,7 +349,7 @@ class FilterPass {
       return Free < 0 ? wanted_[place] : UsualParameters<N>::wanted(place);
     };
 #pragma GCC unroll 4
-    for (std::size_t i = 0; i < N; ++i) {
+    for (std::size_t i = 0; i < kElements<N>; ++i) {
       const std::size_t k = N - 1 - i;
       prepare_prism_derivatives(parameters, order[k], sines, wanted, k, derivatives);
       reverse_prism(train, derivatives, forward, k, pass);
@@ -377,7 +377,7 @@ class FilterPass {
 #pragma GCC unroll 32
     for (std::size_t i = 0; i < angles.size(); ++i) angle[i] = angles[i];
 #pragma GCC unroll 4
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
       angle[angles.size() + k] =
           a_.reference_angle ? a_.reference_angle[shot * N + k] : states_.mean[2 * k];
     }
@@ -406,7 +406,8 @@ class FilterPass {
       sum.store_aligned(by_place_[free.to[i]]);
     }
 #pragma GCC unroll 4
-    for (std::size_t k = 0; k < N; ++k) gradient.rotation_angles[k].store_aligned(by_angle_[k]);
+    for (std::size_t k = 0; k < kElements<N>; ++k)
+      gradient.rotation_angles[k].store_aligned(by_angle_[k]);
   }
 
   /// Calls take(state, derivative) for every state on which the angles depend, so not for speeds.
@@ -417,7 +418,7 @@ class FilterPass {
       take(States::kRotors + i, by_place_[free.first[i]]);
     }
 #pragma GCC unroll 4
-    for (std::size_t k = 0; k < N; ++k) take(2 * k, by_angle_[k]);
+    for (std::size_t k = 0; k < kElements<N>; ++k) take(2 * k, by_angle_[k]);
   }
 
   /// How far the state is from the reference, in azimuth and zenith.
@@ -515,7 +516,7 @@ class FilterPass {
   alignas(64) double by_angle_[N][kLanes];
 };
 
-template <int N>
+template <TrainLayout N>
 bool are_usual(const FilterArguments& a) {
   const int* const end = a.places + a.place_begin[a.free];
   for (const int* place = a.places; place != end; ++place) {
@@ -531,7 +532,7 @@ bool are_usual(const FilterArguments& a) {
 }  // namespace
 
 std::size_t run_filter(const FilterArguments& a) {
-  return with_prism_count(a.prisms, [&]<int N>() {
+  return with_layout(a.prisms, [&]<TrainLayout N>() {
     if (are_usual<N>(a)) return FilterPass<N, UsualParameters<N>::kCount>(a).run();
     return FilterPass<N, -1>(a).run();
   });

@@ -30,6 +30,14 @@ std::vector<std::string> default_free_names(TrainShape shape, bool one_glass) {
   for (const ParameterInfo& info : parameter_list(shape)) {
     if (info.name.starts_with("incident_beam")) names.push_back(info.name);
   }
+  if (shape.prisms.reflects()) {
+    // Four emitters fix these; other tilts of the body cannot be told from its glass and mirror.
+    for (const ParameterInfo& info : parameter_list(shape)) {
+      if (info.name.find("_face_") != std::string::npos) names.push_back(info.name);
+    }
+    names.push_back(fmt::format("prism_tilt_{}_horizontal_deg", prism_letter(prisms - 1)));
+    return names;
+  }
   for (int i = 0; i + 1 < prisms; ++i) {
     names.push_back(fmt::format("bearing_tilt_{}_horizontal_deg", prism_letter(i)));
     names.push_back(fmt::format("bearing_tilt_{}_vertical_deg", prism_letter(i)));

@@ -15,7 +15,8 @@ namespace risley::estimation {
 struct TrainArguments {
   const double* parameters = nullptr;     ///< whole flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
-  int prisms = 0, emitters = 1;
+  TrainLayout prisms;
+  int emitters = 1;
   int free = 0;                      ///< number of free parameters, at most one per place
   const int* place_begin = nullptr;  ///< [free + 1], into places
   const int* places = nullptr;       ///< of the flat vector

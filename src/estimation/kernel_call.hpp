@@ -28,7 +28,7 @@ struct FreePlaces {
 inline TrainArguments arguments_of(const PrismTrain& train, const FreePlaces& free) {
   return {train.parameters().data(),
           train.face_order().data(),
-          train.prisms(),
+          train.layout(),
           train.emitters(),
           static_cast<int>(free.begin.size()) - 1,
           free.begin.data(),

@@ -143,17 +143,17 @@ class Weights {
 constexpr std::size_t kGroups = 8;
 
 /// Columns of a row at most: a free parameter per place, and the residual.
-template <int N>
+template <TrainLayout N>
 constexpr std::size_t kMostColumns = EmitterLanes<Batch, N>::kPlaces + 1;
 
 /// Squares of 3 x 3 also with eight lanes: rows have some nine columns, and in squares of four as
 /// many products of padding as of columns.
-template <int N>
+template <TrainLayout N>
 using Products = ColumnProducts<Batch, kMostColumns<N>, 3>;
 
 /// The columns that the shots of one emitter have: the free parameters that they depend on, then
 /// the residual, which counts as one parameter more.
-template <int N>
+template <TrainLayout N>
 struct OwnColumns {
   std::size_t count = 0;                       ///< residual included
   std::size_t number[kMostColumns<N>];         ///< among all free ones, ascending
@@ -191,7 +191,7 @@ struct OwnColumns {
 };
 
 /// Two rows per group, azimuth and zenith: residual and derivatives, all divided by sigma.
-template <int N>
+template <TrainLayout N>
 struct Rows {
   static constexpr std::size_t kRows = 2 * kGroups;
   std::size_t stride = 0;
@@ -261,7 +261,7 @@ struct Times {
 };
 
 /// Sums over the shots of one knot.
-template <int N>
+template <TrainLayout N>
 struct KnotSums {
   static constexpr std::size_t kPairs = N * (N + 1) / 2;
   static constexpr std::size_t kTile = Products<N>::kTile;
@@ -286,9 +286,9 @@ struct KnotSums {
   void add(const Rows<N>& rows, const Times* times, std::size_t groups, const OwnColumns<N>& own) {
     std::size_t pair = 0;
 #pragma GCC unroll 4
-    for (std::size_t k = 0; k < N; ++k) {
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
 #pragma GCC unroll 4
-      for (std::size_t l = k; l < N; ++l, ++pair) {
+      for (std::size_t l = k; l < kElements<N>; ++l, ++pair) {
         Batch* const sums = curvature[pair];
         Batch s0 = sums[0], s1 = sums[1], s2 = sums[2], s3 = sums[3], s4 = sums[4];
         for (std::size_t g = 0; g < groups; ++g) {
@@ -356,7 +356,7 @@ struct KnotSums {
 };
 
 /// All sums of one call.
-template <int N>
+template <TrainLayout N>
 class Accumulation {
  public:
   explicit Accumulation(const NormalEquationArguments& a)
@@ -544,11 +544,11 @@ class Accumulation {
   void add_turn(std::size_t g) {
     constexpr auto kYaw = static_cast<std::size_t>(place::frame_yaw(N));
     constexpr auto kPitch = static_cast<std::size_t>(place::frame_pitch(N));
-    const TurnDerivatives<Batch> turn = turn_derivatives(model_.direction(g));
+    const TurnDerivatives<Batch> turn = turn_derivatives<N>(model_.direction(g));
     auto& azimuth = model_.azimuth(g).parameters;
     auto& zenith = model_.zenith(g).parameters;
-    azimuth[kYaw] = scale_[g].azimuth;
-    zenith[kYaw] = Batch(0.0);
+    azimuth[kYaw] = scale_[g].azimuth * turn.azimuth_by_yaw;
+    zenith[kYaw] = scale_[g].zenith * turn.zenith_by_yaw;
     azimuth[kPitch] = scale_[g].azimuth * turn.azimuth_by_pitch;
     zenith[kPitch] = scale_[g].zenith * turn.zenith_by_pitch;
   }
@@ -585,7 +585,7 @@ class Accumulation {
   Batch static_sums_[kMostColumns<N> * (kMostColumns<N> + 1) / 2];
 };
 
-template <int N>
+template <TrainLayout N>
 NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
   Accumulation<N> accumulation(a);
   for (std::size_t knot = a.knot_begin; knot < a.knot_end; ++knot) accumulation.add_knot(knot);
@@ -595,7 +595,7 @@ NormalEquationCounts accumulate_knots(const NormalEquationArguments& a) {
 }  // namespace
 
 NormalEquationCounts accumulate(const NormalEquationArguments& a) {
-  return with_prism_count(a.prisms, [&]<int N>() { return accumulate_knots<N>(a); });
+  return with_layout(a.prisms, [&]<TrainLayout N>() { return accumulate_knots<N>(a); });
 }
 
 }  // namespace risley::estimation::RISLEY_KERNEL_NAMESPACE

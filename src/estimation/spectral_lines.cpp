@@ -351,7 +351,7 @@ std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ord
                                             std::size_t most) const {
   constexpr std::ptrdiff_t kApart = 4;  // bins: lines nearer to each other or to 0 are one line
   if (bins.empty()) return {};
-  return with_prism_count(static_cast<int>(bins.size()), [&]<int Lines>() {
+  return with_layout(static_cast<int>(bins.size()), [&]<int Lines>() {
     std::vector<Candidate> all;
     Candidate candidate;
     // Every choice of bins, one loop inside the other.

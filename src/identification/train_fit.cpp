@@ -186,12 +186,13 @@ class TrainEquations {
   /// not null
   double cost(const TrainModel& model, std::vector<double>* azimuth = nullptr,
               std::vector<double>* zenith = nullptr) const {
-    return with_prism_count(model.train.prisms(),
-                            [&]<int N>() { return sweep<N>(model, nullptr, azimuth, zenith); });
+    return with_layout(model.train.layout(),
+                       [&]<TrainLayout N>() { return sweep<N>(model, nullptr, azimuth, zenith); });
   }
   double linearise(const TrainModel& model, NormalEquations& equations) const {
-    return with_prism_count(model.train.prisms(),
-                            [&]<int N>() { return sweep<N>(model, &equations, nullptr, nullptr); });
+    return with_layout(model.train.layout(), [&]<TrainLayout N>() {
+      return sweep<N>(model, &equations, nullptr, nullptr);
+    });
   }
   /// Priors weigh as if the shots had this variance.
   void set_variance(double variance) { variance_ = variance; }
@@ -208,7 +209,7 @@ class TrainEquations {
   }
 
  private:
-  template <int N>
+  template <TrainLayout N>
   double sweep(const TrainModel& model, NormalEquations* equations, std::vector<double>* azimuth,
                std::vector<double>* zenith) const {
     const int emitters = model.train.emitters();
@@ -349,7 +350,7 @@ class TrainEquations {
   }
 
   /// One row of the design: how an angle of one shot follows constants and motion.
-  template <int N, class Column>
+  template <TrainLayout N, class Column>
   void fill(const Gradient<double, N>& gradient, const PrismTrain& train, int emitter,
             const std::array<double, N>& speeds, const CurveWeights& weights, int degree,
             Column&& row) const {

@@ -35,7 +35,7 @@ struct KernelColumns {
     arguments.rotation_angles = angle_columns.data();
     arguments.parameters = train.parameters().data();
     arguments.face_order = train.face_order().data();
-    arguments.prisms = train.prisms();
+    arguments.prisms = train.layout();
     arguments.emitters = train.emitters();
     check_beams(train, beam, arguments.shots);
     if (!beam.empty()) arguments.beam = beam.data();

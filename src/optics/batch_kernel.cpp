@@ -69,7 +69,7 @@ class ShotBlock {
 };
 
 /// Blocks of shots on their way through a train, step by step.
-template <int N>
+template <TrainLayout N>
 class Directions {
  public:
   explicit Directions(const BatchArguments& a)
@@ -88,7 +88,7 @@ class Directions {
       trace_with_origins(block);
     } else {
 #pragma GCC unroll 4
-      for (std::size_t prism = 0; prism < N; ++prism) {
+      for (std::size_t prism = 0; prism < kElements<N>; ++prism) {
         for (std::size_t g = 0; g < block.groups(); ++g) {
           Trace<Batch, N> trace;
           set_up(prism, g, trace);
@@ -99,6 +99,7 @@ class Directions {
     }
     std::size_t invalid = 0;
     for (std::size_t g = 0; g < block.groups(); ++g) {
+      if constexpr (N.axis_up) beam_[g] = in_sensor_frame<N>(beam_[g]);
       invalid += block.count_invalid(beam_[g].x, g);
       if (a_.direction[0]) block.store(beam_[g].x, a_.direction[0], g);
       if (a_.direction[1]) block.store(beam_[g].y, a_.direction[1], g);
@@ -138,7 +139,7 @@ class Directions {
     for (std::size_t g = 0; g < block.groups(); ++g) {
       Trace<Batch, N> trace;
 #pragma GCC unroll 4
-      for (std::size_t prism = 0; prism < N; ++prism) {
+      for (std::size_t prism = 0; prism < kElements<N>; ++prism) {
         set_up(prism, g, trace);
         pass_prism(train_, prism, trace);
         set_inside(train_, prism, trace);
@@ -159,7 +160,7 @@ class Directions {
   Vector3<Batch> beam_[kGroups];
 };
 
-template <int N>
+template <TrainLayout N>
 std::size_t observe_shots(const BatchArguments& a) {
   Directions<N> directions(a);
   std::size_t invalid = 0;
@@ -170,7 +171,7 @@ std::size_t observe_shots(const BatchArguments& a) {
 }
 
 /// As Directions, and back again.
-template <int N>
+template <TrainLayout N>
 class Linearisations {
  public:
   explicit Linearisations(const BatchArguments& a)
@@ -236,7 +237,7 @@ class Linearisations {
   AngleLinearisations<Batch, N, kGroups> shots_;
 };
 
-template <int N>
+template <TrainLayout N>
 std::size_t linearise_shots(const BatchArguments& a) {
   Linearisations<N> linearisations(a);
   std::size_t invalid = 0;
@@ -249,11 +250,11 @@ std::size_t linearise_shots(const BatchArguments& a) {
 }  // namespace
 
 std::size_t observe(const BatchArguments& a) {
-  return with_prism_count(a.prisms, [&]<int N>() { return observe_shots<N>(a); });
+  return with_layout(a.prisms, [&]<TrainLayout N>() { return observe_shots<N>(a); });
 }
 
 std::size_t linearise(const BatchArguments& a) {
-  return with_prism_count(a.prisms, [&]<int N>() { return linearise_shots<N>(a); });
+  return with_layout(a.prisms, [&]<TrainLayout N>() { return linearise_shots<N>(a); });
 }
 
 }  // namespace risley::RISLEY_KERNEL_NAMESPACE

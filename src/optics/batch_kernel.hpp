@@ -15,7 +15,8 @@ namespace risley {
 struct BatchArguments {
   const double* parameters = nullptr;     ///< whole flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
-  int prisms = 0, emitters = 1;
+  TrainLayout prisms;
+  int emitters = 1;
   std::size_t shots = 0;
   const double* const* rotation_angles = nullptr;  ///< [prisms][shots]
   const std::uint8_t* beam = nullptr;  ///< [shots], each below emitters, or nullptr: all the first

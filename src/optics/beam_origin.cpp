@@ -17,7 +17,7 @@ std::vector<PrismSize> shared_prism_sizes() {
 }
 
 std::vector<PrismSize> own_prism_sizes(int prisms) {
-  if (prisms < 1 || prisms > kMaxPrisms) refuse_prism_count(prisms);
+  if (prisms < 1 || prisms > kMaxPrisms) refuse_layout(prisms);
   std::vector<PrismSize> sizes;
   sizes.reserve(2 * static_cast<std::size_t>(prisms));
   const auto unit = [](int count, int at) {
@@ -47,10 +47,16 @@ std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
         fmt::format("{} has {} values, allowed none, 1 or {}", name, values.size(), count));
   };
   const std::size_t prisms = face_order.size();
-  check_shape({static_cast<int>(prisms)});
+  const TrainLayout layout = layout_of(face_order);
   const auto thickness = one_each("thickness", geometry.thickness, prisms);
   const auto spacing = one_each("spacing", geometry.spacing, prisms - 1);
   std::vector<double> positions(2 * prisms);
+  if (layout.reflects()) {
+    for (const double size :
+         {*std::ranges::max_element(thickness), *std::ranges::max_element(spacing)})
+      require_between("thickness or spacing of elements that reflect", size, 0, 0);
+    return positions;
+  }
   double perpendicular = 0;
   for (std::size_t prism = prisms; prism-- > 0;) {
     if (prism + 1 < prisms) perpendicular -= spacing[prism];
@@ -64,7 +70,7 @@ std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
 Ray emergent_ray(const PrismTrain& train, const PrismGeometry& geometry,
                  std::span<const double> rotation_angles, int beam) {
   check_beam(train, beam);
-  return with_prism_count(train.prisms(), [&]<int N>() -> Ray {
+  return with_layout(train.layout(), [&]<TrainLayout N>() -> Ray {
     require_length("rotation_angles", rotation_angles.size(), N);
     std::array<double, N> angles;
     std::copy_n(rotation_angles.begin(), N, angles.begin());

@@ -28,14 +28,14 @@ constexpr double kHit = 1e-12;
 constexpr int kSamples = 144;
 
 /// The optics around the gap before the last prism, with one moving prism on either side.
-template <int N>
+template <TrainLayout N>
 class Gap {
  public:
   Gap(const PrismTrain& train, int beam, std::span<const double> fixed_angles,
       const Vector& direction)
       : train_(prepare<double, N>(parameter_array<N>(train, beam), face_order_array<N>(train))),
         entering_(train_.incident),
-        direction_(direction) {
+        direction_(in_train_frame<N>(direction)) {
     for (std::size_t prism = 0; prism + 2 < N; ++prism) {
       entering_ = through(prism, entering_, fixed_angles[prism]);
     }
@@ -60,9 +60,9 @@ class Gap {
   Vector backward(double angle) const {
     const double sine = std::sin(angle), cosine = std::cos(angle);
     Vector beam = direction_;
-    for (std::size_t face = 2 * N; face-- > 2 * N - 2;) {
+    for (std::size_t face = N.surfaces(); face-- > 2 * N - 2;) {
       const auto& f = train_.faces[face];
-      beam = refract(beam, f.normal.at(sine, cosine), 1.0 / f.index_ratio);
+      beam = at_surface(face, beam, f.normal.at(sine, cosine), 1.0 / f.index_ratio);
     }
     return beam;
   }
@@ -90,11 +90,17 @@ class Gap {
  private:
   Vector through(std::size_t prism, Vector beam, double angle) const {
     const double sine = std::sin(angle), cosine = std::cos(angle);
-    for (std::size_t face = 2 * prism; face < 2 * prism + 2; ++face) {
+    for (std::size_t face = 2 * prism; face < 2 * prism + N.surfaces(prism); ++face) {
       const auto& f = train_.faces[face];
-      beam = refract(beam, f.normal.at(sine, cosine), f.index_ratio);
+      beam = at_surface(face, beam, f.normal.at(sine, cosine), f.index_ratio);
     }
     return beam;
+  }
+
+  static Vector at_surface(std::size_t face, const Vector& beam, const Vector& normal,
+                           double index_ratio) {
+    const bool mirror = N.reflects() && face + 2 == N.surfaces();
+    return mirror ? reflect(beam, normal) : refract(beam, normal, index_ratio);
   }
 
   double azimuth(const Vector& beam) const {
@@ -128,7 +134,7 @@ double root_between(const Miss& miss, double a, double miss_a, double b, double 
   return std::abs(miss_a) < std::abs(miss_b) ? a : b;
 }
 
-template <int N>
+template <TrainLayout N>
 InverseSolution solve(const PrismTrain& train, int beam, const Vector& direction,
                       std::span<const double> fixed_angles) {
   const Gap<N> gap(train, beam, fixed_angles, direction);
@@ -203,7 +209,7 @@ InverseSolution rotation_angles_for(const PrismTrain& train, const Vector3<doubl
   check_beam(train, beam);
   require_unit_length("direction", norm(direction));
   const Vector3<double> unit = normalized(direction);
-  return with_prism_count(train.prisms(), [&]<int N>() -> InverseSolution {
+  return with_layout(train.layout(), [&]<TrainLayout N>() -> InverseSolution {
     if constexpr (N < 2) return {};  // refused above
     if constexpr (N >= 2) return solve<N>(train, beam, unit, fixed_angles);
   });

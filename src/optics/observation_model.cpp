@@ -13,7 +13,7 @@ Observation observe(const PrismTrain& train, std::span<const double> rotation_an
   require_length("rotation_angles", rotation_angles.size(),
                  static_cast<std::size_t>(train.prisms()));
   check_beam(train, beam);
-  return with_prism_count(train.prisms(), [&]<int N>() -> Observation {
+  return with_layout(train.layout(), [&]<TrainLayout N>() -> Observation {
     const auto prepared =
         prepare<double, N>(parameter_array<N>(train, beam), face_order_array<N>(train));
     std::array<double, N> angles;

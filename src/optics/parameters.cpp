@@ -21,7 +21,28 @@ namespace {
 // around the prisms, any optical glass, and errors that still let the beam through.
 constexpr double kLargestError = radians_from_degrees(10.0);
 constexpr double kLargestWedge = radians_from_degrees(60.0);
+constexpr double kLargestFace = radians_from_degrees(80.0);
 constexpr double kFastest = radians_from_degrees(1e6);
+
+/// The letter in symbols of an angle between two faces or of a face from the axis.
+struct ShapeAngle {
+  const char* name;   ///< before the element's letter
+  const char* words;  ///< before "of prism A"
+  const char* symbol;
+};
+
+/// What place::wedge_angle() is of an element.
+ShapeAngle shape_angle(ElementKind kind) {
+  switch (kind) {
+    case ElementKind::wedge:
+      return {"exit_face", "angle from the axis of the second face", "β"};
+    case ElementKind::reflector:
+      return {"mirror_face", "angle from the axis of the mirror", "μ"};
+    case ElementKind::prism:
+      break;
+  }
+  return {"wedge_angle", "wedge angle", "α"};
+}
 
 std::vector<ParameterInfo> build_list(TrainShape shape) {
   const int prisms = shape.prisms;
@@ -45,8 +66,10 @@ std::vector<ParameterInfo> build_list(TrainShape shape) {
       {place::refractive_index_air()});
   add("refractive_index", "refractive index of all prisms", "n_prism", "1", 1.0, 1.0, 4.0,
       every_index);
-  add("wedge_angle_deg", "wedge angle of all prisms", "α", "deg", kRadiansPerDegree, 0.0,
-      kLargestWedge, every_wedge);
+  if (same_layout(shape.prisms, TrainLayout(prisms))) {
+    add("wedge_angle_deg", "wedge angle of all prisms", "α", "deg", kRadiansPerDegree, 0.0,
+        kLargestWedge, every_wedge);
+  }
   if (shape.emitters == 1) {
     add_error("incident_beam_horizontal", "horizontal incident beam direction error", "Δφ_L0",
               place::incident_beam_horizontal());
@@ -76,15 +99,26 @@ std::vector<ParameterInfo> build_list(TrainShape shape) {
     add_error(fmt::format("prism_tilt_{}_horizontal", letter),
               fmt::format("horizontal tilt of prism {}", capital), fmt::format("Δφ_{}", capital),
               place::prism_tilt_horizontal(i));
-    add_error(fmt::format("prism_tilt_{}_vertical", letter),
-              fmt::format("vertical tilt of prism {}", capital), fmt::format("Δθ_{}", capital),
-              place::prism_tilt_vertical(i));
+    const ElementKind kind = shape.prisms.kind[i];
+    if (kind == ElementKind::wedge) {
+      add(fmt::format("entrance_face_{}_deg", letter),
+          fmt::format("angle from the axis of the first face of prism {}", capital),
+          fmt::format("ε_{}", capital), "deg", kRadiansPerDegree, -kLargestFace, kLargestFace,
+          {place::prism_tilt_vertical(i)});
+    } else {
+      add_error(fmt::format("prism_tilt_{}_vertical", letter),
+                fmt::format("vertical tilt of prism {}", capital), fmt::format("Δθ_{}", capital),
+                place::prism_tilt_vertical(i));
+    }
     add(fmt::format("refractive_index_{}", letter),
         fmt::format("refractive index of prism {}", capital), fmt::format("n_{}", capital), "1",
         1.0, 1.0, 4.0, {place::refractive_index(i)});
-    add(fmt::format("wedge_angle_{}_deg", letter), fmt::format("wedge angle of prism {}", capital),
-        fmt::format("α_{}", capital), "deg", kRadiansPerDegree, 0.0, kLargestWedge,
-        {place::wedge_angle(i)});
+    const ShapeAngle angle = shape_angle(kind);
+    add(fmt::format("{}_{}_deg", angle.name, letter),
+        fmt::format("{} of prism {}", angle.words, capital),
+        fmt::format("{}_{}", angle.symbol, capital), "deg", kRadiansPerDegree,
+        kind == ElementKind::wedge ? -kLargestFace : 0.0,
+        kind == ElementKind::prism ? kLargestWedge : kLargestFace, {place::wedge_angle(i)});
   }
   for (int i = 0; i < prisms; ++i) {
     const char letter = prism_letter(i);
@@ -119,7 +153,7 @@ std::vector<ParameterInfo> build_list(TrainShape shape) {
 }  // namespace
 
 void check_shape(TrainShape shape) {
-  if (shape.prisms < 1 || shape.prisms > kMaxPrisms) refuse_prism_count(shape.prisms);
+  if (shape.prisms < 1 || shape.prisms > kMaxPrisms) refuse_layout(shape.prisms);
   if (shape.emitters < 1 || shape.emitters > kMaxEmitters) {
     throw InvalidArgument(
         fmt::format("number of emitters = {}, allowed 1 to {}", shape.emitters, kMaxEmitters));
@@ -131,10 +165,11 @@ const std::vector<ParameterInfo>& parameter_list(TrainShape shape) {
     std::once_flag built;
     std::vector<ParameterInfo> list;
   };
-  static std::array<Entry, std::size_t{kMaxPrisms} * kMaxEmitters> entries;
+  // One row for each layout, that of an upright axis before the others.
+  static std::array<std::array<Entry, kMaxEmitters>, kMaxPrisms + 1> entries;
   check_shape(shape);
-  Entry& entry =
-      entries[static_cast<std::size_t>((shape.prisms - 1) * kMaxEmitters + shape.emitters - 1)];
+  Entry& entry = entries[static_cast<std::size_t>(shape.prisms.axis_up ? 0 : int{shape.prisms})]
+                        [static_cast<std::size_t>(shape.emitters - 1)];
   std::call_once(entry.built, [&] { entry.list = build_list(shape); });
   return entry.list;
 }
@@ -156,8 +191,9 @@ double in_file_unit(std::string_view name, double value, TrainShape shape) {
 }
 
 const ParameterInfo* find_parameter_of_any_train(std::string_view name) {
-  // Only emitters' names differ: one alone has no number.
-  for (const TrainShape shape : {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}}) {
+  // One emitter alone has no number, and faces have names of their own.
+  for (const TrainShape shape :
+       {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}, {kWedgeAndReflector, 1}}) {
     for (const ParameterInfo& parameter : parameter_list(shape)) {
       if (parameter.name == name) return &parameter;
     }

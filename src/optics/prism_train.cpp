@@ -21,12 +21,19 @@ const ParameterInfo& find_train_parameter(std::string_view name, TrainShape shap
 }  // namespace
 
 PrismTrain::PrismTrain(std::vector<FaceOrder> face_order, int emitters)
-    : face_order_(std::move(face_order)), emitters_(emitters) {
+    : face_order_(std::move(face_order)), layout_(layout_of(face_order_)), emitters_(emitters) {
   check_shape(shape());
   parameters_.assign(static_cast<std::size_t>(parameter_count(shape())), 0.0);
   set("refractive_index_air", 1.0);
-  set("refractive_index", 1.51);
-  set("wedge_angle_deg", radians_from_degrees(18.0));
+  if (layout_.reflects()) {
+    set("refractive_index", 1.9682);
+    set("entrance_face_a_deg", radians_from_degrees(10.0));
+    set("exit_face_a_deg", radians_from_degrees(29.0));
+    set("mirror_face_b_deg", radians_from_degrees(50.0));
+  } else {
+    set("refractive_index", 1.51);
+    set("wedge_angle_deg", radians_from_degrees(18.0));
+  }
 }
 
 double PrismTrain::get(std::string_view name) const {
@@ -45,6 +52,9 @@ PrismTrain PrismTrain::without_errors() const {
   for (int i = 0; i < prisms(); ++i) {
     ideal.set_place(place::refractive_index(i), (*this)[place::refractive_index(i)]);
     ideal.set_place(place::wedge_angle(i), (*this)[place::wedge_angle(i)]);
+    if (layout_.kind[i] == ElementKind::wedge) {
+      ideal.set_place(place::prism_tilt_vertical(i), (*this)[place::prism_tilt_vertical(i)]);
+    }
   }
   if (emitters_ > 1) {
     for (int i = 0; i < emitters_; ++i) {

@@ -24,7 +24,7 @@ Json page_of(TrainShape shape, const std::vector<jobs::ReadRecording>& recording
     list.push_back({{"name", file_name(one.path)}});
     list.back().update(json::of(one));
   }
-  return {{"prisms", shape.prisms}, {"emitters", shape.emitters}, {"recordings", list}};
+  return {{"prisms", int{shape.prisms}}, {"emitters", shape.emitters}, {"recordings", list}};
 }
 
 Json correlation_json(const std::vector<std::string>& names, const Eigen::MatrixXd& covariance) {

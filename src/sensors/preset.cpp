@@ -354,17 +354,29 @@ void read_combinations(const YamlMap& root, Sensor& sensor) {
   sensor.combination = root.integer("combination", 1, static_cast<int>(sensor.combinations.size()));
 }
 
-/// The start of the scan: rotation angles, first_shot and firing.
+std::string swing_name(int prism) { return fmt::format("swing_{}_deg_per_s", prism_letter(prism)); }
+
+constexpr int kMostSwings = 1000;
+
+/// The start of the scan: rotation angles, swings, first_shot and firing.
 void read_sequence(const YamlMap& root, Sensor& sensor) {
   const YamlMap map = root.section("sequence");
   ScanSequence sequence;
-  std::vector<std::string> known{"first_shot", "firing"};
+  std::vector<std::string> known{"first_shot", "firing", "swings_per_beat"};
   for (int i = 0; i < sensor.prisms(); ++i) {
     known.push_back(rotation_angle_name(i));
     const Quantity quantity = read_quantity(map, known.back(), "deg", sensor, -360, 360);
     sequence.rotation_angle.push_back(si_from_file(quantity.value, scale_of("deg")));
+    known.push_back(swing_name(i));
+    if (map.find(known.back()) == nullptr) continue;
+    const Quantity swing = read_quantity(map, known.back(), "deg/s", sensor, -1e6, 1e6);
+    sequence.swing.resize(static_cast<std::size_t>(sensor.prisms()), 0.0);
+    sequence.swing[static_cast<std::size_t>(i)] = si_from_file(swing.value, scale_of("deg/s"));
   }
   map.allow_only(known);
+  if (!sequence.swing.empty()) {
+    sequence.swings_per_beat = map.integer("swings_per_beat", 1, kMostSwings);
+  }
   sequence.first_shot = map.integer("first_shot", 0, 1);
   const std::string firing = map.text("firing");
   if (firing == to_string(Firing::together)) {
@@ -505,11 +517,21 @@ std::string range_text(const Sensor& sensor) {
 std::string sequence_text(const Sensor& sensor, const ScanSequence& sequence) {
   require_length("rotation_angle of the sequence", sequence.rotation_angle.size(),
                  static_cast<std::size_t>(sensor.prisms()));
+  require_length_or_none("swing of the sequence", sequence.swing.size(),
+                         static_cast<std::size_t>(sensor.prisms()));
   require_between("first_shot", sequence.first_shot, 0, 1);
   std::string text = "sequence:\n";
   for (int i = 0; i < sensor.prisms(); ++i) {
     text += quantity_text(sensor, rotation_angle_name(i),
                           sequence.rotation_angle[static_cast<std::size_t>(i)], "deg", nullptr);
+  }
+  for (std::size_t i = 0; i < sequence.swing.size(); ++i) {
+    text +=
+        quantity_text(sensor, swing_name(static_cast<int>(i)), sequence.swing[i], "deg/s", nullptr);
+  }
+  if (!sequence.swing.empty()) {
+    require_between("swings_per_beat", sequence.swings_per_beat, 1, kMostSwings);
+    text += fmt::format("  swings_per_beat: {}\n", sequence.swings_per_beat);
   }
   return text + fmt::format("  first_shot: {}\n  firing: {}\n", sequence.first_shot,
                             to_string(sequence.firing));

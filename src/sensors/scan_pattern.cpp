@@ -14,6 +14,34 @@ namespace {
 
 constexpr long double kTurn = 2.0L * std::numbers::pi_v<long double>;
 
+/// What speeds that swing by 1 rad/s add to the angles: see ScanSequence.
+class Swing {
+ public:
+  /// @param interval  at which speeds are added up, s
+  Swing(const Sensor& sensor, const ScanSequence& sequence, double interval)
+      : interval_(sequence.swing.empty() ? 0 : interval) {
+    require_length_or_none("swing of the sequence", sequence.swing.size(),
+                           static_cast<std::size_t>(sensor.prisms()));
+    if (sequence.swing.empty()) return;
+    require_at_least("prisms of a sensor that swings", sensor.prisms(), 2);
+    half_step_ = 0.5 * sequence.swings_per_beat *
+                 std::abs(sensor.angular_velocity[1] - sensor.angular_velocity[0]) * interval;
+  }
+
+  /// After a number of steps. @return rad per rad/s
+  double at(std::uint64_t step) const {
+    if (interval_ == 0) return 0;
+    // The sum of cos(2 j x) for j = 0 ... step.
+    const double x = half_step_;
+    if (std::abs(std::sin(x)) < 1e-12) return interval_ * static_cast<double>(step + 1);
+    const auto last = static_cast<double>(2 * step + 1);
+    return interval_ * (std::sin(last * x) + std::sin(x)) / (2 * std::sin(x));
+  }
+
+ private:
+  double interval_, half_step_ = 0;  // s, rad
+};
+
 }  // namespace
 
 std::vector<double> start_angles(const Sensor& sensor, const ScanPatternOptions& options) {
@@ -43,6 +71,8 @@ ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::siz
   const std::uint64_t group = options.whole_groups ? emitters : 1;
   const auto first_shot = static_cast<std::uint64_t>(sequence.first_shot);
   const bool together = options.firing.value_or(sequence.firing) == Firing::together;
+  const std::uint64_t together_shots = together ? emitters : 1;
+  const Swing swing(sensor, sequence, static_cast<double>(together_shots) / rate);
   ScanPattern pattern;
   pattern.time.resize(rows);
   pattern.azimuth.resize(rows);
@@ -54,12 +84,14 @@ ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::siz
     const std::uint64_t shot = (options.every * (row / group + 1) - 1) * group + row % group;
     pattern.time[i] = static_cast<double>(first_shot + shot) / rate;
     pattern.emitter[i] = static_cast<std::uint8_t>(shot % emitters);
-    const std::uint64_t of_rotors =
-        together ? (first_shot + shot / emitters) * emitters : first_shot + shot;
+    const std::uint64_t step = first_shot + (together ? shot / emitters : shot);
     // Hundreds of turns in, double precision would cost the last printed digit.
-    const long double time = static_cast<long double>(of_rotors) / static_cast<long double>(rate);
+    const long double time =
+        static_cast<long double>(step * together_shots) / static_cast<long double>(rate);
+    const double swung = swing.at(step);
     for (std::size_t k = 0; k < prisms; ++k) {
-      const long double angle = start[k] + sensor.angular_velocity[k] * time;
+      long double angle = start[k] + sensor.angular_velocity[k] * time;
+      if (!sequence.swing.empty()) angle += sequence.swing[k] * swung;
       angles[k][i] = static_cast<double>(angle - kTurn * std::floor(angle / kTurn));
     }
   }

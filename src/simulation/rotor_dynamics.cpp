@@ -60,7 +60,7 @@ const std::vector<std::string>& rotor_kind_names() {
 }
 
 RotorSettings rotor_settings(RotorKind kind, int prisms) {
-  if (prisms < 1 || prisms > kMaxPrisms) refuse_prism_count(prisms);
+  if (prisms < 1 || prisms > kMaxPrisms) refuse_layout(prisms);
   RotorSettings settings;
   switch (kind) {
     case RotorKind::constant:

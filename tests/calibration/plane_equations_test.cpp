@@ -92,11 +92,11 @@ struct Reference {
   std::vector<double> residual, variance;
 
   Reference(const RangedShots& shots, const PlaneView& view) {
-    with_prism_count(view.train.prisms(), [&]<int N>() { fill<N>(shots, view); });
+    with_layout(view.train.layout(), [&]<TrainLayout N>() { fill<N>(shots, view); });
   }
 
  private:
-  template <int N>
+  template <TrainLayout N>
   void fill(const RangedShots& shots, const PlaneView& view) {
     constexpr int kParameters = parameter_count(N);
     // Parameters, rotation angles, normal towards both tangents, distance.

@@ -119,7 +119,7 @@ struct Linearised {
   Linearised(const PrismTrain& train, const std::vector<FreeParameter>& free,
              const std::vector<double>& rotation_angles, int beam)
       : by_parameters(2, free.size()), by_angles(2, train.prisms()) {
-    with_prism_count(train.prisms(), [&]<int N>() {
+    with_layout(train.layout(), [&]<TrainLayout N>() {
       const auto parameters = parameter_array<N>(train, beam);
       const auto faces = face_order_array<N>(train);
       std::array<double, N> rotation;

@@ -80,7 +80,7 @@ struct Reference {
   std::vector<double> azimuth_residual, zenith_residual;
   std::vector<unsigned char> outlier;
 
-  template <int N>
+  template <TrainLayout N>
   void fill(const Recording& r, const PrismTrain& train, const std::vector<FreeParameter>& free,
             const ShotWeights& weights) {
     const auto order = face_order_array<N>(train);
@@ -149,7 +149,7 @@ struct Reference {
 
   Reference(const Recording& r, const PrismTrain& train, const std::vector<FreeParameter>& free,
             const ShotWeights& weights) {
-    with_prism_count(train.prisms(), [&]<int N>() { fill<N>(r, train, free, weights); });
+    with_layout(train.layout(), [&]<TrainLayout N>() { fill<N>(r, train, free, weights); });
   }
 };
 
@@ -175,7 +175,7 @@ void expect_equal(const NormalEquations& found, const Reference& expected, const
   ASSERT_EQ(found.knots(), r.knots.size());
   EXPECT_EQ(found.shots, r.series.size());
   EXPECT_EQ(found.outliers, expected.outliers);
-  with_prism_count(found.prisms, [&]<int N>() {
+  with_layout(found.prisms, [&]<TrainLayout N>() {
     constexpr int kD = 3 * N;
     using RowMajor = Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>;
     Eigen::MatrixXd statics = Eigen::MatrixXd::Zero(n, n), statics_size = statics;

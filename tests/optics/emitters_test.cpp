@@ -119,7 +119,7 @@ TEST_P(EveryEmitter, SeesTheTrainWithItsOwnBeam) {
     const Observation found = observe(train_, angles, beam), expected = observe(own, angles);
     EXPECT_EQ(found.azimuth, expected.azimuth);
     EXPECT_EQ(found.zenith, expected.zenith);
-    const PrismGeometry geometry{{0.007}, {0.03}};
+    const PrismGeometry geometry = testing::some_geometry(train_);
     const Ray ray = emergent_ray(train_, geometry, angles, beam);
     const Ray own_ray = emergent_ray(own, geometry, angles);
     EXPECT_EQ(ray.origin.y, own_ray.origin.y);
@@ -133,7 +133,7 @@ TEST_P(EveryEmitter, SeesTheTrainWithItsOwnBeam) {
 TEST_P(EveryEmitter, HasDerivativesByItsOwnPlacesAlone) {
   const auto angles = testing::random_angles(prisms_, generator_);
   for (int beam = 0; beam < train_.emitters(); ++beam) {
-    with_prism_count(prisms_, [&]<int N>() {
+    with_layout(train_.layout(), [&]<TrainLayout N>() {
       std::array<double, N> rotation;
       std::copy_n(angles.begin(), N, rotation.begin());
       const auto parameters = parameter_array<N>(train_, beam);
@@ -183,7 +183,7 @@ TEST_P(EveryEmitter, IsItselfInBatchesOfEveryInstructionSet) {
     directions.origin_x = x;
     directions.origin_y = y;
     directions.origin_z = z;
-    directions.geometry = {{0.007}, {0.03}};
+    directions.geometry = testing::some_geometry(train_);
     EXPECT_EQ(observe_batch(train_, angles, directions, beam, set), 0u);
     std::vector<std::vector<double>> d_azimuth(places + rotors, std::vector<double>(kShots, 7.0));
     auto d_zenith = d_azimuth;
@@ -200,7 +200,7 @@ TEST_P(EveryEmitter, IsItselfInBatchesOfEveryInstructionSet) {
       const Ray ray = emergent_ray(own, directions.geometry, shot_angles);
       EXPECT_NEAR(y[i], ray.origin.y, 1e-15);
       EXPECT_NEAR(z[i], ray.origin.z, 1e-15);
-      with_prism_count(prisms_, [&]<int N>() {
+      with_layout(train_.layout(), [&]<TrainLayout N>() {
         std::array<double, N> rotation;
         std::copy_n(shot_angles.begin(), N, rotation.begin());
         const auto order = face_order_array<N>(own);

@@ -7,14 +7,24 @@
 #include <vector>
 
 #include "risley/core/angle.hpp"
+#include "risley/optics/beam_origin.hpp"
+#include "risley/optics/observation_model.hpp"
 #include "risley/optics/prism_train.hpp"
 
 namespace risley::testing {
 
-/// All four configurations of Fig. 3 and all eight trains of three prisms.
+/// All four configurations of Fig. 3, all eight trains of three prisms, and a wedge with a
+/// reflector.
 inline std::vector<std::string> all_face_orders() {
-  return {"PA-PA",    "PA-AP",    "AP-AP",    "AP-PA",    "PA-PA-PA", "PA-PA-AP",
-          "PA-AP-PA", "PA-AP-AP", "AP-PA-PA", "AP-PA-AP", "AP-AP-PA", "AP-AP-AP"};
+  return {"PA-PA",    "PA-AP",    "AP-AP",    "AP-PA",    "PA-PA-PA", "PA-PA-AP", "PA-AP-PA",
+          "PA-AP-AP", "AP-PA-PA", "AP-PA-AP", "AP-AP-PA", "AP-AP-AP", "AA-PMU"};
+}
+
+/// Those whose beams start elsewhere than at the origin.
+inline std::vector<std::string> refracting_face_orders() {
+  std::vector<std::string> orders = all_face_orders();
+  orders.pop_back();
+  return orders;
 }
 
 /// A train with every parameter off its ideal value: errors N(0, sigma), and each prism its own
@@ -44,6 +54,16 @@ inline PrismTrain imperfect_train(const std::string& face_order, double error_si
     train.set_place(at, train[at] + radians_from_degrees(0.9 * j));
   }
   return train;
+}
+
+/// Where a shot points in the train's frame, whose X is the axis of rotation.
+inline Vector3<double> along_axis(const PrismTrain& train, const Vector3<double>& direction) {
+  return train.layout().axis_up ? in_train_frame<kWedgeAndReflector>(direction) : direction;
+}
+
+/// Thickness and spacing, none where an element reflects.
+inline PrismGeometry some_geometry(const PrismTrain& train) {
+  return train.layout().reflects() ? PrismGeometry{} : PrismGeometry{{0.007}, {0.03}};
 }
 
 /// The train that one emitter sees.

@@ -159,6 +159,10 @@ TEST(PrismSizes, AreStatedByEveryPreset) {
   for (const std::string& name : builtin_preset_names()) {
     SCOPED_TRACE(name);
     const Sensor sensor = load_sensor(name);
+    if (sensor.train.layout().reflects()) {  // beams start at one point
+      EXPECT_EQ(sensor.geometry, (PrismGeometry{{0}, {0}}));
+      continue;
+    }
     EXPECT_EQ(sensor.geometry, (PrismGeometry{{0.007}, {0.030}}));
     const bool paper = name.starts_with("mid-40");
     for (const PrismSize& size : shared_prism_sizes()) {

@@ -88,7 +88,7 @@ class BeamBundle {
     Eigen::Matrix<double, 2, Eigen::Dynamic> of_angles;  ///< of azimuth and zenith [2, free + held]
   };
 
-  template <int N>
+  template <TrainLayout N>
   void add_beams(const PrismTrain& train, const std::vector<estimation::FreeParameter>& free,
                  const std::vector<std::vector<double>>& rotation_angles,
                  std::span<const std::uint8_t> emitter, const HeldMovement& held);

@@ -17,7 +17,7 @@ namespace risley {
 /// AVX2 than with one, the same with AVX-512 (Zen 4); directions, with less to do per step, 47 and
 /// 33 %. The steps in their order: start() and turn() every group, trace(), begin() every group,
 /// reverse(), end() every group.
-template <class Batch, int N, std::size_t Groups>
+template <class Batch, TrainLayout N, std::size_t Groups>
 class AngleLinearisations {
  public:
   /// The beam of a group's emitters.
@@ -31,12 +31,12 @@ class AngleLinearisations {
   /// Sends the beams of the first groups through all prisms.
   void trace(const PreparedTrain<Batch, N>& train, std::size_t groups) {
 #pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
-    for (std::size_t prism = 0; prism < N; ++prism) {
+    for (std::size_t prism = 0; prism < kElements<N>; ++prism) {
       for (std::size_t group = 0; group < groups; ++group) pass_prism(train, prism, trace_[group]);
     }
   }
   /// The emergent beam, after trace().
-  const Vector3<Batch>& direction(std::size_t group) const { return trace_[group].direction(); }
+  decltype(auto) direction(std::size_t group) const { return trace_[group].direction(); }
 
   /// Begins the way back. @param seeds  as angle_seeds(), maybe times some factor
   void begin(std::size_t group, const AngleSeeds<Batch>& seeds) {
@@ -47,7 +47,7 @@ class AngleLinearisations {
   void reverse(const PreparedTrain<Batch, N>& train,
                const PreparedDerivatives<Batch, N>& derivatives, std::size_t groups) {
 #pragma GCC unroll 4
-    for (std::size_t i = 0; i < N; ++i) {
+    for (std::size_t i = 0; i < kElements<N>; ++i) {
       for (std::size_t group = 0; group < groups; ++group) {
         reverse_prism(train, derivatives, trace_[group], N - 1 - i, pass_[group]);
       }

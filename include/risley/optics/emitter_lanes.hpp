@@ -12,7 +12,7 @@
 namespace risley {
 
 /// The flat vector of a kernel's plain arguments, every value in all lanes.
-template <class Batch, int N>
+template <class Batch, TrainLayout N>
 std::array<Batch, parameter_count(N)> parameter_batches(const double* parameters) {
   std::array<Batch, parameter_count(N)> result;
   for (std::size_t i = 0; i < parameter_count(N); ++i) result[i] = Batch(parameters[i]);
@@ -21,7 +21,7 @@ std::array<Batch, parameter_count(N)> parameter_batches(const double* parameters
 
 /// Face orders of plain arguments, without a std::array function of FaceOrder: its name would not
 /// say the instruction set.
-template <class Batch, int N>
+template <class Batch, TrainLayout N>
 std::array<FaceOrder, N> face_orders(const FaceOrder* order) {
   std::array<FaceOrder, N> result;
   __builtin_memcpy(&result, order, sizeof(result));
@@ -29,13 +29,13 @@ std::array<FaceOrder, N> face_orders(const FaceOrder* order) {
 }
 
 /// prepare() from a kernel's plain arguments.
-template <class Batch, int N>
+template <class Batch, TrainLayout N>
 PreparedTrain<Batch, N> prepared_train(const double* parameters, const FaceOrder* order) {
   return prepare<Batch, N>(parameter_batches<Batch, N>(parameters), face_orders<Batch, N>(order));
 }
 
 /// prepare_derivatives() from a kernel's plain arguments.
-template <class Batch, int N, class Wanted>
+template <class Batch, TrainLayout N, class Wanted>
 PreparedDerivatives<Batch, N> prepared_derivatives(const double* parameters, const FaceOrder* order,
                                                    const Wanted& wanted) {
   return prepare_derivatives<Batch, N>(parameter_batches<Batch, N>(parameters),
@@ -45,7 +45,7 @@ PreparedDerivatives<Batch, N> prepared_derivatives(const double* parameters, con
 /// The emitters of a kernel's shots. With several, every lane has an emitter of its own: incident
 /// beam and its derivatives are taken from a small table, lane by lane. With one, nothing is done
 /// at all, and everything stays as prepare() made it.
-template <class Batch, int N>
+template <class Batch, TrainLayout N>
 class EmitterLanes {
  public:
   /// Shots that are computed at once.

@@ -11,14 +11,14 @@
 namespace risley {
 
 /// Derivatives of one result with respect to the flat parameter vector and the rotation angles.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 struct Gradient {
   std::array<T, parameter_count(N)> parameters;
   std::array<T, N> rotation_angles;
 };
 
 /// The derivative by one place of the whole flat vector, for a shot of one emitter.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 T derivative_by(const Gradient<T, N>& gradient, int at, int beam) {
   const int emitter = place::emitter(at, N);
   if (emitter < 0) return gradient.parameters[static_cast<std::size_t>(at)];
@@ -28,16 +28,17 @@ T derivative_by(const Gradient<T, N>& gradient, int at, int beam) {
 }
 
 /// What the derivatives need of a train, computed once for all shots.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 struct PreparedDerivatives {
   /// A small turn of both normals about an axis w changes a result by w times its torque: see
   /// reverse_prism(). Each of these is such an axis, per unit of the parameter.
   struct Prism {
     Vector3<T> rotation;  ///< of the rotation angle
     TurningVector<T> tilt_horizontal, tilt_vertical, bearing_vertical;
-    TurningVector<T> wedge;                   ///< d normal of the angled face / d wedge angle
-    T wedge_by_other{};                       ///< that times the normal of the other face: constant
-    T first_is_angled{}, second_is_angled{};  ///< one is 1, the other 0
+    TurningVector<T> wedge;  ///< d normal of the angled face or mirror / d its angle
+    T wedge_by_other{};      ///< that times the normal of the other of the first two: constant
+    T wedge_by_exit{};       ///< that times the normal of a reflector's last face: constant
+    T first_is_angled{}, second_is_angled{};        ///< one is 1, the other 0
     std::array<T, 2> ratio_by_glass, ratio_by_air;  ///< d index ratio / d refractive indices
     /// Whether anybody wants these derivatives, which otherwise are zero.
     bool wedge_wanted = true, tilt_horizontal_wanted = true;
@@ -53,7 +54,7 @@ struct AllWanted {
 
 /// One prism of prepare_derivatives().
 /// @param parameters,sines  as prepare_prism()
-template <ModelScalar T, int N, class Parameters, class Sines, class Wanted>
+template <ModelScalar T, TrainLayout N, class Parameters, class Sines, class Wanted>
 void prepare_prism_derivatives(const Parameters& parameters, FaceOrder order, const Sines& sines,
                                const Wanted& wanted, std::size_t prism,
                                PreparedDerivatives<T, N>& derivatives) {
@@ -77,7 +78,9 @@ void prepare_prism_derivatives(const Parameters& parameters, FaceOrder order, co
     out.bearing_vertical = turning_about(axis.direction, level - bearing_level);
     out.bearing_vertical.along = out.bearing_vertical.along + bearing_level;
   }
-  out.wedge_wanted = wanted(place::wedge_angle(number));
+  const bool wedge_kind = N.kind[prism] == ElementKind::wedge;
+  out.wedge_wanted = wanted(place::wedge_angle(number)) ||
+                     (wedge_kind && wanted(place::prism_tilt_vertical(number)));
   if (out.wedge_wanted) {
     const std::size_t angled = wedge_sign(order, 0) != 0 ? 0 : 1, other = 1 - angled;
     const T sign(wedge_sign(order, static_cast<int>(angled)));
@@ -86,6 +89,13 @@ void prepare_prism_derivatives(const Parameters& parameters, FaceOrder order, co
     out.wedge = turning_about(axis.direction, wedge);
     out.wedge_by_other =
         dot(wedge, leaning_direction<T>(horizontal, sines[leaning::vertical(prism, other)]));
+    if constexpr (N.reflects()) {
+      if (N.is_reflector(prism)) {
+        const SinePair<T> first = sines[leaning::vertical(prism, 0)];
+        out.wedge_by_exit =
+            dot(wedge, leaning_direction<T>(horizontal, SinePair<T>{-first.second, first.first}));
+      }
+    }
     out.first_is_angled = T(angled == 0 ? 1.0 : 0.0);
     out.second_is_angled = T(angled == 0 ? 0.0 : 1.0);
   }
@@ -98,7 +108,7 @@ void prepare_prism_derivatives(const Parameters& parameters, FaceOrder order, co
 }
 
 /// The incident beam of prepare_derivatives(). @param sines  as prepare_prism()
-template <ModelScalar T, int N, class Sines>
+template <ModelScalar T, TrainLayout N, class Sines>
 void prepare_incident_derivatives(const Sines& sines, PreparedDerivatives<T, N>& derivatives) {
   auto&& horizontal = sines[leaning::incident_horizontal()];
   auto&& vertical = sines[leaning::incident_vertical()];
@@ -109,7 +119,7 @@ void prepare_incident_derivatives(const Sines& sines, PreparedDerivatives<T, N>&
 /// @copydoc prepare
 /// @param wanted  called with a place of the flat vector of a train with one emitter: where it says
 ///                false, the dearest derivatives are left out, which then are zero
-template <ModelScalar T, int N, class Wanted = AllWanted>
+template <ModelScalar T, TrainLayout N, class Wanted = AllWanted>
 PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_count(N)>& parameters,
                                               const std::array<FaceOrder, N>& face_order,
                                               const Wanted& wanted = {}) {
@@ -117,7 +127,7 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
   PreparedDerivatives<T, N> derivatives;
   prepare_incident_derivatives(sines, derivatives);
 #pragma GCC unroll 4
-  for (std::size_t prism = 0; prism < N; ++prism) {
+  for (std::size_t prism = 0; prism < kElements<N>; ++prism) {
     prepare_prism_derivatives(parameters, face_order[prism], sines, wanted, prism, derivatives);
   }
   return derivatives;
@@ -130,24 +140,24 @@ struct NothingAtFaces {
 };
 
 /// How far the reverse passes of some results have come, from the last prism to the first.
-template <ModelScalar T, int N, std::size_t Results>
+template <ModelScalar T, TrainLayout N, std::size_t Results>
 struct ReversePass {
   std::array<Gradient<T, N>, Results> gradients;
-  std::array<Vector3<T>, Results> beam;    ///< d result / d beam before the prism that is next
+  std::array<Vector3<T>, Results> beam;    ///< d result / d beam before the element that is next
   std::array<Vector3<T>, Results> torque;  ///< that beam x d result / d beam
   std::array<T, Results> air;              ///< d result / d refractive index of the air, so far
 };
 
-/// @param direction  the emergent beam
+/// @param direction  the emergent beam, sensor frame
 /// @param seeds      d result / d direction [results][3]
-template <int N, ModelScalar T, std::size_t Results>
+template <TrainLayout N, ModelScalar T, std::size_t Results>
 ReversePass<T, N, Results> begin_reverse(const Vector3<T>& direction,
                                          const std::array<Vector3<T>, Results>& seeds) {
   ReversePass<T, N, Results> pass;
 #pragma GCC unroll 3
   for (std::size_t r = 0; r < Results; ++r) {
-    pass.beam[r] = seeds[r];
-    pass.torque[r] = cross(direction, seeds[r]);
+    pass.beam[r] = in_train_frame<N>(seeds[r]);
+    pass.torque[r] = cross(in_train_frame<N>(direction), pass.beam[r]);
     pass.air[r] = T(0.0);
     // No bearing leans behind the last prism.
     pass.gradients[r].parameters[static_cast<std::size_t>(place::frame_yaw(N))] = T(0.0);
@@ -156,39 +166,42 @@ ReversePass<T, N, Results> begin_reverse(const Vector3<T>& direction,
   return pass;
 }
 
-/// One prism of trace_adjoint(): the adjoint of pass_prism(). With g = d result / d L'':
-///   g2 = N2.g dk2/dc2,  g1 = (N1.g / m + N1.N2 g2) dk1/dc1,  d result / d L = g + g1 N1 + m g2 N2.
-/// Whoever turns beam and faces together turns L'' with them: so the torque of both normals, the
-/// sum of N x d result / d N, is L'' x g less L x d result / d L. Every angle but the wedge's turns
-/// both normals about some axis w, and w times the torque is its derivative.
+/// One element of trace_adjoint(): the adjoint of pass_prism(). With g = d result / d L'' and K its
+/// last face:
+///   in_K' = N_K.g dk_K/din_K,  in_i' = (N_i.g / m + sum_(j > i) N_i.N_j in_j') dk_i/din_i,
+///   d result / d L = g + in_1' N_1 + m sum_(j > 1) in_j' N_j.
+/// Whoever turns beam and surfaces together turns L'' with them: so the torque of all normals, the
+/// sum of N x d result / d N, is L'' x g less L x d result / d L. Every angle but those of single
+/// surfaces turns all normals about some axis w, and w times the torque is its derivative.
 /// Derivation: docs/theory/derivatives.md
-template <ModelScalar T, int N, std::size_t Results, class AtFace = NothingAtFaces>
+/// @param at_face  not called where an element reflects: see beam_path()
+template <ModelScalar T, TrainLayout N, std::size_t Results, class AtFace = NothingAtFaces>
 void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T, N>& derivatives,
                    const Trace<T, N>& forward, std::size_t prism, ReversePass<T, N, Results>& pass,
                    const AtFace& at_face = {}) {
-  constexpr bool kAtFaces = !std::is_same_v<AtFace, NothingAtFaces>;
+  constexpr bool kAtFaces = !std::is_same_v<AtFace, NothingAtFaces> && !N.reflects();
   const bool last = prism == N - 1;
   const int number = static_cast<int>(prism);
-  const std::size_t first = 2 * prism, second = first + 1;
+  const std::size_t first = 2 * prism, surfaces = surfaces_of<N>(prism), exit = surfaces - 1;
   const auto& d = derivatives.prisms[prism];
   const T& sine = forward.sine[prism];
   const T& cosine = forward.cosine[prism];
   const T& into = train.faces[first].index_ratio;
-  const T& out_of = train.faces[second].index_ratio;
+  const T& out_of = train.faces[first + exit].index_ratio;
   const Vector3<T>& beam = forward.beam[prism];
-  const Vector3<T>& n1 = forward.normal[first];
-  const Vector3<T>& n2 = forward.normal[second];
-  const T& in1 = forward.cosine_in[first];
-  const T& in2 = forward.cosine_in[second];
-  // k = out - ratio in, out^2 = 1 - ratio^2 (1 - in^2)
   const T one(1.0);
-  const T scaled1 = into / forward.cosine_out[first], scaled2 = out_of / forward.cosine_out[second];
-  const T k1 = forward.cosine_out[first] - into * in1;
-  const T k2 = forward.cosine_out[second] - out_of * in2;
-  const T k1_by_in = into * (scaled1 * in1 - one), k2_by_in = out_of * (scaled2 * in2 - one);
-  const T k1_by_ratio = -(scaled1 * (one - in1 * in1) + in1);
-  const T k2_by_ratio = -(scaled2 * (one - in2 * in2) + in2);
-  const T beam_on_n2 = dot(beam, n2);
+  std::array<T, 3> k, k_by_in, k_by_ratio, beam_on;
+#pragma GCC unroll 3
+  for (std::size_t i = 0; i < surfaces; ++i) {
+    // k = out - ratio in, out^2 = 1 - ratio^2 (1 - in^2)
+    const T& ratio = train.faces[first + i].index_ratio;
+    const T& in = forward.cosine_in[first + i];
+    const T scaled = ratio / forward.cosine_out[first + i];
+    k[i] = forward.cosine_out[first + i] - ratio * in;
+    k_by_in[i] = ratio * (scaled * in - one);
+    k_by_ratio[i] = -(scaled * (one - in * in) + in);
+    if (i > 0) beam_on[i] = dot(beam, forward.normal[first + i]);
+  }
   const Vector3<T> tilt_vertical = d.tilt_vertical.at(sine, cosine);
   const T zero(0.0);
   Vector3<T> tilt_horizontal{zero, zero, zero}, wedge{zero, zero, zero};
@@ -197,7 +210,8 @@ void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T
   if (d.wedge_wanted) {
     wedge = d.wedge.at(sine, cosine);
     wedge_on_beam = dot(wedge, beam);
-    wedge_k = d.first_is_angled * (out_of * k1) + d.second_is_angled * k2;
+    wedge_k = d.first_is_angled * (out_of * k[0]) +
+              d.second_is_angled * (exit == 1 ? k[1] : T(out_of * k[1]));
   }
   Vector3<T> bearing_vertical;
   if (!last) bearing_vertical = d.bearing_vertical.at(sine, cosine);
@@ -208,38 +222,59 @@ void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T
       return gradient.parameters[static_cast<std::size_t>(where)];
     };
     const Vector3<T> behind = pass.beam[r];
-    const T along1 = dot(n1, behind), along2 = dot(n2, behind);
-    const T in2_bar = along2 * k2_by_in;
-    T k1_bar = out_of * along1 + train.cosine_between[prism] * in2_bar;
-    T into_bar = beam_on_n2 * in2_bar;
     Vector3<T> inside, at_second, before, at_first;
     if constexpr (kAtFaces) {
       inside = at_second = before = at_first = Vector3<T>{zero, zero, zero};
-      at_face(second, r, inside, at_second);
+      at_face(first + 1, r, inside, at_second);
       at_face(first, r, before, at_first);
-      k1_bar = k1_bar + dot(n1, inside);  // L' = m L + k1 N1
-      into_bar = into_bar + dot(beam, inside);
     }
-    into_bar = into_bar + k1_bar * k1_by_ratio;
-    const T out_of_bar = along1 * k1 + along2 * k2_by_ratio;
-    const T in1_bar = k1_bar * k1_by_in;
-    const T on_n2_bar = into * in2_bar;
+    std::array<T, 3> along, in_bar;
+#pragma GCC unroll 3
+    for (std::size_t i = 0; i < surfaces; ++i) along[i] = dot(forward.normal[first + i], behind);
+    in_bar[exit] = along[exit] * k_by_in[exit];
+    T k_bar = zero;  // of the first face after the loop
+#pragma GCC unroll 2
+    for (std::size_t step = 1; step <= exit; ++step) {
+      const std::size_t i = exit - step;
+      k_bar = out_of * along[i];
+#pragma GCC unroll 2
+      for (std::size_t j = i + 1; j < surfaces; ++j) {
+        k_bar = k_bar + train.cosine_between[pair_of_surfaces<N>(prism, i, j)] * in_bar[j];
+      }
+      if constexpr (kAtFaces)
+        k_bar = k_bar + dot(forward.normal[first], inside);  // L' = m L + k1 N1
+      in_bar[i] = k_bar * k_by_in[i];
+    }
+    T into_bar = beam_on[1] * in_bar[1];
+    T out_of_bar = along[0] * k[0];
     Vector3<T>& ahead = pass.beam[r];
-    ahead = behind + in1_bar * n1 + on_n2_bar * n2;
+    ahead = behind + in_bar[0] * forward.normal[first];
+#pragma GCC unroll 2
+    for (std::size_t i = 1; i < surfaces; ++i) {
+      ahead = ahead + T(into * in_bar[i]) * forward.normal[first + i];
+      if (i == exit) continue;
+      into_bar = into_bar + beam_on[i + 1] * in_bar[i + 1];
+      out_of_bar = out_of_bar + along[i] * k[i];
+    }
+    if constexpr (kAtFaces) into_bar = into_bar + dot(beam, inside);
+    into_bar = into_bar + k_bar * k_by_ratio[0];
+    out_of_bar = out_of_bar + along[exit] * k_by_ratio[exit];
     if constexpr (kAtFaces) ahead = ahead + into * inside;
     const Vector3<T> torque_ahead = cross(beam, ahead);
     Vector3<T> torque = pass.torque[r] - torque_ahead;
     T wedge_bar = zero;
     if (d.wedge_wanted) {
       wedge_bar = wedge_k * dot(wedge, behind) +
-                  T(d.first_is_angled * in1_bar + d.second_is_angled * on_n2_bar) * wedge_on_beam +
-                  k1 * in2_bar * d.wedge_by_other;
+                  T(d.first_is_angled * in_bar[0] + d.second_is_angled * (into * in_bar[1])) *
+                      wedge_on_beam +
+                  k[0] * in_bar[1] * d.wedge_by_other;
+      if (exit == 2) wedge_bar = wedge_bar + k[1] * in_bar[2] * d.wedge_by_exit;
     }
     pass.torque[r] = torque_ahead;
     if constexpr (kAtFaces) {
-      torque = torque + cross(forward.inside[prism], inside) + cross(n1, at_first) +
-               cross(n2, at_second);
-      wedge_bar = wedge_bar + d.first_is_angled * dot(wedge, k1 * inside + at_first) +
+      torque = torque + cross(forward.inside[prism], inside) +
+               cross(forward.normal[first], at_first) + cross(forward.normal[first + 1], at_second);
+      wedge_bar = wedge_bar + d.first_is_angled * dot(wedge, k[0] * inside + at_first) +
                   d.second_is_angled * dot(wedge, at_second);
       ahead = ahead + before;
       pass.torque[r] = cross(beam, ahead);
@@ -248,6 +283,9 @@ void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T
     by(place::prism_tilt_horizontal(number)) =
         d.tilt_horizontal_wanted ? dot(tilt_horizontal, torque) : zero;
     by(place::prism_tilt_vertical(number)) = dot(tilt_vertical, torque);
+    if (N.kind[prism] == ElementKind::wedge) {  // of its first face alone
+      by(place::prism_tilt_vertical(number)) = by(place::prism_tilt_vertical(number)) - wedge_bar;
+    }
     by(place::wedge_angle(number)) = wedge_bar;
     if (!last) {
       by(place::bearing_tilt_horizontal(number)) = -torque.z;
@@ -260,7 +298,7 @@ void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T
 }
 
 /// After the first prism: the derivatives by the incident beam and by the air.
-template <ModelScalar T, int N, std::size_t Results>
+template <ModelScalar T, TrainLayout N, std::size_t Results>
 void end_reverse(const PreparedDerivatives<T, N>& d, ReversePass<T, N, Results>& pass) {
 #pragma GCC unroll 3
   for (std::size_t r = 0; r < Results; ++r) {
@@ -276,7 +314,7 @@ void end_reverse(const PreparedDerivatives<T, N>& d, ReversePass<T, N, Results>&
 /// @param seeds    d result / d direction [results][3]
 /// @param at_face  called as (face, result, beam, normal): adds to d result / d incident beam of
 ///                 the face and d result / d its normal what does not come through the refraction
-template <ModelScalar T, int N, std::size_t Results, class AtFace = NothingAtFaces>
+template <ModelScalar T, TrainLayout N, std::size_t Results, class AtFace = NothingAtFaces>
 std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& train,
                                                   const PreparedDerivatives<T, N>& d,
                                                   const Trace<T, N>& forward,
@@ -284,7 +322,8 @@ std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& tra
                                                   const AtFace& at_face = {}) {
   auto pass = begin_reverse<N>(forward.direction(), seeds);
 #pragma GCC unroll 4
-  for (std::size_t i = 0; i < N; ++i) reverse_prism(train, d, forward, N - 1 - i, pass, at_face);
+  for (std::size_t i = 0; i < kElements<N>; ++i)
+    reverse_prism(train, d, forward, N - 1 - i, pass, at_face);
   end_reverse(d, pass);
   return pass.gradients;
 }
@@ -307,7 +346,7 @@ AngleSeeds<T> angle_seeds(const Vector3<T>& direction) {
 }
 
 /// Azimuth and zenith of one shot and their gradients.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 struct AngleLinearisation {
   Vector3<T> direction;
   SphericalAngles<T> angles;
@@ -316,7 +355,7 @@ struct AngleLinearisation {
 };
 
 /// One shot: its direction, azimuth and zenith, and the gradients of both angles.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 AngleLinearisation<T, N> linearise_angles(const PreparedTrain<T, N>& train,
                                           const PreparedDerivatives<T, N>& derivatives,
                                           const RotationAngles<T, N>& rotation_angle) {
@@ -328,37 +367,43 @@ AngleLinearisation<T, N> linearise_angles(const PreparedTrain<T, N>& train,
           gradients[1], forward.valid()};
 }
 
-/// What a small turn of a direction about Y does to its angles; about Z it adds itself to the
-/// azimuth.
+/// What a small turn of a direction about the Z axis (yaw) and the Y axis (pitch) of the train's
+/// frame, whose X is the axis of rotation, does to its angles.
 template <ModelScalar T>
 struct TurnDerivatives {
-  T azimuth_by_pitch, zenith_by_pitch;
+  T azimuth_by_yaw, zenith_by_yaw, azimuth_by_pitch, zenith_by_pitch;
 };
 
-/// @param direction  not along the Z axis
-template <ModelScalar T>
+/// @param direction  sensor frame, not along the Z axis
+template <TrainLayout N, ModelScalar T>
 TurnDerivatives<T> turn_derivatives(const Vector3<T>& direction) {
   using std::sqrt;
   const Vector3<T>& v = direction;
   const T horizontal2 = v.x * v.x + v.y * v.y;
-  return {-v.y * v.z / horizontal2, v.x / sqrt(horizontal2)};
+  const T horizontal = sqrt(horizontal2);
+  const T azimuth_about_y = -v.y * v.z / horizontal2, zenith_about_y = v.x / horizontal;
+  if constexpr (N.axis_up) {  // Z is the sensor's Y, and Y its X
+    return {azimuth_about_y, zenith_about_y, T(-v.x * v.z / horizontal2), T(-v.y / horizontal)};
+  } else {
+    return {T(1.0), T(0.0), azimuth_about_y, zenith_about_y};
+  }
 }
 
-/// Fills the places of place::frame_yaw and place::frame_pitch: what a small turn of the emergent
-/// beam about Z and about Y does to both angles. No other function of this file writes there.
-template <ModelScalar T, int N>
+/// Fills the places of place::frame_yaw and place::frame_pitch with turn_derivatives(). No other
+/// function of this file writes there.
+template <ModelScalar T, TrainLayout N>
 void add_turn_derivatives(AngleLinearisation<T, N>& shot) {
   constexpr auto kYaw = static_cast<std::size_t>(place::frame_yaw(N));
   constexpr auto kPitch = static_cast<std::size_t>(place::frame_pitch(N));
-  const TurnDerivatives<T> turn = turn_derivatives(shot.direction);
-  shot.azimuth.parameters[kYaw] = T(1.0);
-  shot.zenith.parameters[kYaw] = T(0.0);
+  const TurnDerivatives<T> turn = turn_derivatives<N>(shot.direction);
+  shot.azimuth.parameters[kYaw] = turn.azimuth_by_yaw;
+  shot.zenith.parameters[kYaw] = turn.zenith_by_yaw;
   shot.azimuth.parameters[kPitch] = turn.azimuth_by_pitch;
   shot.zenith.parameters[kPitch] = turn.zenith_by_pitch;
 }
 
 /// The three components of the direction of one shot and their gradients.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 struct DirectionLinearisation {
   Vector3<T> direction;
   std::array<Gradient<T, N>, 3> components;
@@ -366,7 +411,7 @@ struct DirectionLinearisation {
 };
 
 /// One shot: its direction and the gradients of its x, y and z.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 DirectionLinearisation<T, N> linearise_direction(const PreparedTrain<T, N>& train,
                                                  const PreparedDerivatives<T, N>& derivatives,
                                                  const RotationAngles<T, N>& rotation_angle) {

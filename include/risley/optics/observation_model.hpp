@@ -19,7 +19,7 @@
 namespace risley {
 
 /// One rotation angle per prism in beam order, rad. (Not deduced: std::array counts in size_t.)
-template <class T, int N>
+template <class T, TrainLayout N>
 using RotationAngles = std::type_identity_t<std::array<T, static_cast<std::size_t>(N)>>;
 
 /// Unit vector [3] that leans from X by a horizontal angle towards -Y and a vertical angle towards
@@ -61,11 +61,11 @@ Vector3<T> leaning_vertical_rate(const T& horizontal, const T& vertical) {
   return leaning_vertical_rate<T>(sin_cos(horizontal), sin_cos(vertical));
 }
 
-/// Part of the wedge angle that a face's vertical angle contains: 0 for a perpendicular face,
-/// +1 for an angled second face, -1 for an angled first face.                  [B21 Eq. (15-18)]
-constexpr double wedge_sign(FaceOrder order, int face_of_prism) {
-  if (order == FaceOrder::perpendicular_angled) return face_of_prism == 0 ? 0.0 : 1.0;
-  return face_of_prism == 0 ? -1.0 : 0.0;
+/// Part of place::wedge_angle() that a surface's vertical angle contains: 0 for a perpendicular
+/// face, +1 for an angled second face or a mirror, -1 for an angled first face. [B21 Eq. (15-18)]
+constexpr double wedge_sign(FaceOrder order, int surface_of_element) {
+  if (order == FaceOrder::angled_perpendicular) return surface_of_element == 0 ? -1.0 : 0.0;
+  return surface_of_element == 1 ? 1.0 : 0.0;
 }
 
 /// A vector as its prism turns, such as a face's unit normal: along + cos(angle) cosine +
@@ -96,17 +96,50 @@ TurningVector<T> turning_about(const Vector3<T>& axis, const Vector3<T>& vector)
 }
 
 /// A train with everything computed that does not depend on the rotation angles.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 struct PreparedTrain {
-  /// One face of a prism.
+  /// One surface of an element.
   struct Face {
     TurningVector<T> normal;
-    T index_ratio;  ///< index before the face over index behind it
+    T index_ratio;  ///< index before the face over index behind it, 1 for a mirror
   };
   Vector3<T> incident;  ///< of the emitter that fires
-  std::array<Face, 2 * N> faces;
-  std::array<T, N> cosine_between;  ///< of the two normals of each prism, which turn together
+  std::array<Face, N.surfaces()> faces;
+  /// Of the normals of two surfaces of one element, which turn together: see pair_of_surfaces().
+  std::array<T, N + (N.reflects() ? 2 : 0)> cosine_between;
 };
+
+/// The place in PreparedTrain::cosine_between of two surfaces of an element, one < other.
+template <TrainLayout N>
+constexpr std::size_t pair_of_surfaces(std::size_t element, std::size_t one, std::size_t other) {
+  return other == 1 ? element : static_cast<std::size_t>(N) + one;
+}
+
+/// Surfaces of an element, a constant as long as no element reflects.
+template <TrainLayout N>
+[[gnu::always_inline]] constexpr std::size_t surfaces_of(std::size_t element) {
+  if constexpr (N.reflects()) return N.surfaces(element);
+  return 2;
+}
+
+/// A direction in the sensor's frame from one in the train's frame, whose X is the axis.
+template <TrainLayout N, class Vector>
+[[gnu::always_inline]] constexpr decltype(auto) in_sensor_frame(const Vector& v) {
+  if constexpr (N.axis_up) {
+    return Vector{v.y, v.z, v.x};
+  } else {
+    return (v);
+  }
+}
+/// The inverse of in_sensor_frame().
+template <TrainLayout N, class Vector>
+[[gnu::always_inline]] constexpr decltype(auto) in_train_frame(const Vector& v) {
+  if constexpr (N.axis_up) {
+    return Vector{v.z, v.x, v.y};
+  } else {
+    return (v);
+  }
+}
 
 /// The angles by which incident beam, axes and normals lean, as places of one array, so that
 /// whoever prepares a train for every shot computes all their sines at once.
@@ -115,7 +148,8 @@ constexpr std::size_t incident_horizontal() { return 0; }  ///< of the emitter t
 constexpr std::size_t incident_vertical() { return 1; }    ///< of the emitter that fires
 /// Of both normals of a prism.
 constexpr std::size_t horizontal(std::size_t prism) { return 2 + 5 * prism; }
-/// Of the normal of a prism's face, 0 or 1, in which the wedge may be.
+/// Of the normal of an element's face, 0 or 1, in which the wedge or the mirror may be. The third
+/// surface of a reflector stands a right angle below its tilt.
 constexpr std::size_t vertical(std::size_t prism, std::size_t face) { return 3 + 5 * prism + face; }
 /// Of a prism's axis, but not of the last prism's, which is X.
 constexpr std::size_t bearing_horizontal(std::size_t prism) { return 5 + 5 * prism; }
@@ -127,7 +161,7 @@ constexpr std::size_t count(int prisms) { return 5 * static_cast<std::size_t>(pr
 
 /// The leaning angles of a train, rad: see namespace leaning.
 /// @param parameters  flat vector, SI units, see namespace place
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 std::array<T, leaning::count(N)> leaning_angles(const std::array<T, parameter_count(N)>& parameters,
                                                 const std::array<FaceOrder, N>& face_order) {
   const auto p = [&](int at) -> const T& { return parameters[static_cast<std::size_t>(at)]; };
@@ -135,10 +169,11 @@ std::array<T, leaning::count(N)> leaning_angles(const std::array<T, parameter_co
   angles[leaning::incident_horizontal()] = p(place::incident_beam_horizontal());
   angles[leaning::incident_vertical()] = p(place::incident_beam_vertical());
 #pragma GCC unroll 4
-  for (std::size_t prism = 0; prism < N; ++prism) {
+  for (std::size_t prism = 0; prism < kElements<N>; ++prism) {
     const int number = static_cast<int>(prism);
+    const bool wedge = N.kind[prism] == ElementKind::wedge;  // its faces share no angle
     T horizontal = p(place::prism_tilt_horizontal(number));
-    T vertical = p(place::prism_tilt_vertical(number));
+    T vertical = p(place::prism_tilt_vertical(number)), second(0.0);
     if (prism + 1 < N) {
       const T& bearing_horizontal = p(place::bearing_tilt_horizontal(number));
       const T& bearing_vertical = p(place::bearing_tilt_vertical(number));
@@ -146,12 +181,15 @@ std::array<T, leaning::count(N)> leaning_angles(const std::array<T, parameter_co
       angles[leaning::bearing_vertical(prism)] = bearing_vertical;
       horizontal = bearing_horizontal + horizontal;
       vertical = bearing_vertical + vertical;
+      if (wedge) second = bearing_vertical;
     }
+    if (!wedge) second = vertical;
     angles[leaning::horizontal(prism)] = horizontal;
 #pragma GCC unroll 2
     for (std::size_t face = 0; face < 2; ++face) {
       const double sign = wedge_sign(face_order[prism], static_cast<int>(face));
-      angles[leaning::vertical(prism, face)] = vertical + T(sign) * p(place::wedge_angle(number));
+      angles[leaning::vertical(prism, face)] =
+          (face == 0 ? vertical : second) + T(sign) * p(place::wedge_angle(number));
     }
   }
   return angles;
@@ -173,7 +211,7 @@ struct PrismAxis {
 };
 
 /// @param sines  by leaning angle: an array of SinePair<T>, or what gives its elements
-template <ModelScalar T, int N, class Sines>
+template <ModelScalar T, TrainLayout N, class Sines>
 PrismAxis<T> prism_axis(const Sines& sines, std::size_t prism) {
   const T zero(0.0), one(1.0);
   if (prism + 1 == N) return {{one, zero, zero}, {zero, one}};
@@ -184,7 +222,7 @@ PrismAxis<T> prism_axis(const Sines& sines, std::size_t prism) {
 /// One prism of prepare().
 /// @param parameters  flat vector: an array of T, or what gives its elements
 /// @param sines       as prism_axis()
-template <ModelScalar T, int N, class Parameters, class Sines>
+template <ModelScalar T, TrainLayout N, class Parameters, class Sines>
 void prepare_prism(const Parameters& parameters, const Sines& sines, std::size_t prism,
                    PreparedTrain<T, N>& train) {
   const int number = static_cast<int>(prism);
@@ -192,20 +230,29 @@ void prepare_prism(const Parameters& parameters, const Sines& sines, std::size_t
   auto&& glass = parameters[static_cast<std::size_t>(place::refractive_index(number))];
   Vector3<T> axis = prism_axis<T, N>(sines, prism).direction;
   auto&& horizontal = sines[leaning::horizontal(prism)];
-  std::array<Vector3<T>, 2> normals;
-#pragma GCC unroll 2
-  for (std::size_t side = 0; side < 2; ++side) {
+  const std::size_t surfaces = surfaces_of<N>(prism);
+  std::array<Vector3<T>, 3> normals;
+#pragma GCC unroll 3
+  for (std::size_t side = 0; side < surfaces; ++side) {
     Vector3<T>& normal = normals[side];
-    normal = leaning_direction<T>(horizontal, sines[leaning::vertical(prism, side)]);
+    if (side < 2) {
+      normal = leaning_direction<T>(horizontal, sines[leaning::vertical(prism, side)]);
+    } else {  // a right angle below the first
+      const SinePair<T> first = sines[leaning::vertical(prism, 0)];
+      normal = leaning_direction<T>(horizontal, SinePair<T>{-first.second, first.first});
+    }
     auto& face = train.faces[2 * prism + side];
     face.normal = turning_about(axis, normal);
-    face.index_ratio = side == 0 ? T(air / glass) : T(glass / air);
+    face.index_ratio = side == 0 ? T(air / glass) : side + 1 == surfaces ? T(glass / air) : T(1.0);
+#pragma GCC unroll 2
+    for (std::size_t before = 0; before < side; ++before) {
+      train.cosine_between[pair_of_surfaces<N>(prism, before, side)] = dot(normals[before], normal);
+    }
   }
-  train.cosine_between[prism] = dot(normals[0], normals[1]);
 }
 
 /// @param parameters  flat vector, SI units, see namespace place
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 PreparedTrain<T, N> prepare(const std::array<T, parameter_count(N)>& parameters,
                             const std::array<FaceOrder, N>& face_order) {
   const auto sines = sines_of(leaning_angles<T, N>(parameters, face_order));
@@ -213,75 +260,85 @@ PreparedTrain<T, N> prepare(const std::array<T, parameter_count(N)>& parameters,
   train.incident = leaning_direction<T>(sines[leaning::incident_horizontal()],
                                         sines[leaning::incident_vertical()]);
 #pragma GCC unroll 4
-  for (std::size_t prism = 0; prism < N; ++prism) prepare_prism(parameters, sines, prism, train);
+  for (std::size_t prism = 0; prism < kElements<N>; ++prism)
+    prepare_prism(parameters, sines, prism, train);
   return train;
 }
 
-/// How one beam goes through all prisms: what a forward pass leaves behind for the reverse passes.
-template <ModelScalar T, int N>
+/// How one beam goes through all elements: what a forward pass leaves behind for the reverse
+/// passes, in the train's frame.
+template <ModelScalar T, TrainLayout N>
 struct Trace {
-  std::array<T, N> sine, cosine;         ///< of the rotation angles
-  std::array<Vector3<T>, N + 1> beam;    ///< before each prism and behind the last, unit vectors
-  std::array<Vector3<T>, N> inside;      ///< the beam within each prism: see trace_forward()
-  std::array<Vector3<T>, 2 * N> normal;  ///< of the faces, unit vectors
-  /// Of the angles of incidence and refraction at the faces; out is NaN from where the beam does
-  /// not get through.
-  std::array<T, 2 * N> cosine_in, cosine_out;
+  static constexpr std::size_t kSurfaces = N.surfaces();
+  std::array<T, N> sine, cosine;       ///< of the rotation angles
+  std::array<Vector3<T>, N + 1> beam;  ///< before each element and behind the last, unit vectors
+  std::array<Vector3<T>, N> inside;    ///< behind each element's first face: trace_forward()
+  std::array<Vector3<T>, kSurfaces> normal;  ///< of the surfaces, unit vectors
+  /// Of the angles of incidence and refraction at the surfaces; out is NaN from where the beam does
+  /// not get through. At a mirror out = -in.
+  std::array<T, kSurfaces> cosine_in, cosine_out;
 
   /// The emergent beam: unit vector, sensor frame; NaN where not valid.
-  const Vector3<T>& direction() const { return beam[N]; }
-  /// The beam that meets a face.
+  decltype(auto) direction() const { return in_sensor_frame<N>(beam[N]); }
+  /// The beam that meets a face of a prism.
   const Vector3<T>& incident(std::size_t face) const {
     return face % 2 == 0 ? beam[face / 2] : inside[face / 2];
   }
-  /// Whether the beam gets through every face.
-  Mask<T> valid() const { return Mask<T>(cosine_out[2 * N - 1] >= T(0.0)); }
+  /// Whether the beam gets through every surface.
+  Mask<T> valid() const { return Mask<T>(cosine_out[kSurfaces - 1] >= T(0.0)); }
 };
 
 /// Turns one prism. @param rotation_angle  rad
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 void turn_prism(const T& rotation_angle, std::size_t prism, Trace<T, N>& trace) {
   const auto [sine, cosine] = sin_cos(rotation_angle);
   trace.sine[prism] = sine;
   trace.cosine[prism] = cosine;
 }
 
-/// Sends the beam through one prism. With m and 1/m the index ratios of its faces, Eq. (10) twice
-/// is
-///   L' = m L + k1 N1,  L'' = L'/m + k2 N2 = L + k1/m N1 + k2 N2,  k = cos_out - ratio cos_in,
-///   N2.L' = m N2.L + k1 N1.N2,
-/// and N1.N2 is constant: the beam within the prism need not be known, which saves 4 % of a
+/// Sends the beam through one element. Within the glass, with m and 1/m the index ratios of its
+/// faces, every surface adds a part along its normal, Eq. (10):
+///   L' = m L + sum k_i N_i,  k = cos_out - ratio cos_in,  of a mirror k = -2 cos_in,
+/// and the last face L'' = L'/m + k_K N_K = L + 1/m sum k_i N_i + k_K N_K, where
+///   N_j.L' = m N_j.L + sum k_i N_i.N_j
+/// and N_i.N_j is constant: the beam within the element need not be known, which saves 4 % of a
 /// direction's time.                                                         [B21 section 2.2]
-/// @param[in,out] trace  sine, cosine and beam of the prism are given, the rest of it is set
-template <ModelScalar T, int N>
+/// @param[in,out] trace  sine, cosine and beam of the element are given, the rest of it is set
+template <ModelScalar T, TrainLayout N>
 void pass_prism(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>& trace) {
-  const std::size_t first = 2 * prism, second = first + 1;
+  const std::size_t first = 2 * prism, surfaces = surfaces_of<N>(prism);
   const T& into = train.faces[first].index_ratio;
-  const T& out_of = train.faces[second].index_ratio;
-  const Vector3<T>& beam = trace.beam[prism];
-  const auto turned = [&](std::size_t face) {
-    const TurningVector<T>& normal = train.faces[face].normal;
-    return prism == N - 1 ? normal.at_about_x(trace.sine[prism], trace.cosine[prism])
-                          : normal.at(trace.sine[prism], trace.cosine[prism]);
-  };
-  const Vector3<T> n1 = turned(first), n2 = turned(second);
-  const T in1 = dot(n1, beam);
-  const T out1 = refraction_cosine(in1, into);
-  const T k1 = out1 - into * in1;
-  const T in2 = into * dot(n2, beam) + k1 * train.cosine_between[prism];
-  const T out2 = refraction_cosine(in2, out_of);
-  const T k2 = out2 - out_of * in2;
-  trace.beam[prism + 1] = beam + T(out_of * k1) * n1 + k2 * n2;
-  trace.normal[first] = n1;
-  trace.normal[second] = n2;
-  trace.cosine_in[first] = in1;
-  trace.cosine_in[second] = in2;
-  trace.cosine_out[first] = out1;
-  trace.cosine_out[second] = out2;
+  const T& out_of = train.faces[first + surfaces - 1].index_ratio;
+  const Vector3<T> beam = trace.beam[prism];
+  Vector3<T> behind = beam;
+  std::array<T, 3> k;
+#pragma GCC unroll 3
+  for (std::size_t i = 0; i < surfaces; ++i) {
+    const std::size_t at = first + i;
+    const TurningVector<T>& turning = train.faces[at].normal;
+    const Vector3<T> normal = prism == N - 1
+                                  ? turning.at_about_x(trace.sine[prism], trace.cosine[prism])
+                                  : turning.at(trace.sine[prism], trace.cosine[prism]);
+    T in = i == 0 ? dot(normal, beam) : T(into * dot(normal, beam));
+#pragma GCC unroll 2
+    for (std::size_t before = 0; before < i; ++before) {
+      in = in + k[before] * train.cosine_between[pair_of_surfaces<N>(prism, before, i)];
+    }
+    const bool last = i + 1 == surfaces, mirror = i == 1 && !last;
+    const T& ratio = train.faces[at].index_ratio;
+    const T out = mirror ? reflection_cosine(in) : refraction_cosine(in, ratio);
+    k[i] = out - ratio * in;
+    behind = behind + (last ? k[i] : T(out_of * k[i])) * normal;
+    trace.normal[at] = normal;
+    trace.cosine_in[at] = in;
+    trace.cosine_out[at] = out;
+  }
+  trace.beam[prism + 1] = behind;
 }
 
-/// The beam within one prism, L' = m L + k1 N1. @param[in,out] trace  as pass_prism() left it
-template <ModelScalar T, int N>
+/// The beam behind the first face of an element, L' = m L + k1 N1. @param[in,out] trace  as
+/// pass_prism() left it
+template <ModelScalar T, TrainLayout N>
 void set_inside(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>& trace) {
   const std::size_t face = 2 * prism;
   const T& into = train.faces[face].index_ratio;
@@ -292,13 +349,13 @@ void set_inside(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>
 
 /// Sends the beam through all prisms.                                         [B21 section 2.2]
 /// @param rotation_angle  of every prism in beam order, rad
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 Trace<T, N> trace_forward(const PreparedTrain<T, N>& train,
                           const RotationAngles<T, N>& rotation_angle) {
   Trace<T, N> out;
   out.beam[0] = train.incident;
 #pragma GCC unroll 4  // gcc 12 keeps batches in registers only where indices are constants
-  for (std::size_t prism = 0; prism < N; ++prism) {
+  for (std::size_t prism = 0; prism < kElements<N>; ++prism) {
     turn_prism(rotation_angle[prism], prism, out);
     pass_prism(train, prism, out);
     set_inside(train, prism, out);
@@ -314,12 +371,12 @@ struct Beam {
 };
 
 /// As trace_forward(), of which only the emergent beam is wanted.
-template <ModelScalar T, int N>
+template <ModelScalar T, TrainLayout N>
 Beam<T> trace(const PreparedTrain<T, N>& train, const RotationAngles<T, N>& rotation_angle) {
   Trace<T, N> forward;
   forward.beam[0] = train.incident;
 #pragma GCC unroll 4
-  for (std::size_t prism = 0; prism < N; ++prism) {
+  for (std::size_t prism = 0; prism < kElements<N>; ++prism) {
     turn_prism(rotation_angle[prism], prism, forward);
     pass_prism(train, prism, forward);
   }

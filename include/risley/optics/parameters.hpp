@@ -13,15 +13,17 @@ namespace risley {
 /// Largest number of emitters behind one train (Livox builds one and six).
 inline constexpr int kMaxEmitters = 8;
 
-/// How many prisms and emitters a train has: what its parameters depend on.
+/// Which elements and how many emitters a train has: what its parameters depend on.
 struct TrainShape {
-  int prisms = 0;
+  TrainLayout prisms;
   int emitters = 1;
 
-  friend bool operator==(const TrainShape&, const TrainShape&) = default;
+  friend bool operator==(const TrainShape& a, const TrainShape& b) {
+    return same_layout(a.prisms, b.prisms) && a.emitters == b.emitters;
+  }
 };
 
-/// @throws InvalidArgument unless there are 1 to kMaxPrisms prisms and 1 to kMaxEmitters emitters
+/// @throws InvalidArgument unless there are 1 to kMaxPrisms elements and 1 to kMaxEmitters emitters
 void check_shape(TrainShape shape);
 
 /// Places in the flat parameter vector of a train: air, incident beam of the first emitter, then
@@ -47,15 +49,19 @@ constexpr int emitter(int at, int prisms) {
 }
 /// Of a prism's glass; prisms count from 0.
 constexpr int refractive_index(int prism) { return 3 + 6 * prism; }
-constexpr int wedge_angle(int prism) { return 4 + 6 * prism; }            ///< between the two faces
+/// Between the two faces of a prism; of a wedge's second face; of a reflector's mirror. Faces' and
+/// mirrors' angles are those of their normals from the axis.
+constexpr int wedge_angle(int prism) { return 4 + 6 * prism; }
 constexpr int prism_tilt_horizontal(int prism) { return 5 + 6 * prism; }  ///< against its bearing
-constexpr int prism_tilt_vertical(int prism) { return 6 + 6 * prism; }    ///< against its bearing
+/// Against its bearing; of a wedge its first face alone.
+constexpr int prism_tilt_vertical(int prism) { return 6 + 6 * prism; }
 /// Of the axis about which a prism turns, against X; always zero for the last prism.
 constexpr int bearing_tilt_horizontal(int prism) { return 7 + 6 * prism; }
 /// Of the axis about which a prism turns, against X; always zero for the last prism.
 constexpr int bearing_tilt_vertical(int prism) { return 8 + 6 * prism; }
 /// Derivatives keep in the last prism's two bearing places, which are no parameters, what a small
-/// turn of the whole emergent beam about Z (yaw) and about Y (pitch) does: turn_derivatives().
+/// turn of the whole emergent beam about Z (yaw) and about Y (pitch) of the train's frame does:
+/// turn_derivatives().
 constexpr int frame_yaw(int prisms) { return bearing_tilt_horizontal(prisms - 1); }
 /// As frame_yaw(), of the pitch.
 constexpr int frame_pitch(int prisms) { return bearing_tilt_vertical(prisms - 1); }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -9,40 +10,113 @@
 
 namespace risley {
 
-/// Largest number of prisms in one train (Livox builds two and three).
+/// Largest number of elements in one train (Livox builds two and three).
 inline constexpr int kMaxPrisms = 4;
 
-/// @throws InvalidArgument naming the number and what is allowed
-[[noreturn]] void refuse_prism_count(int prisms);
+/// An element's surfaces in beam order, by their normals at rotation angle zero: P stands across
+/// the axis, A is angled against P, M is a mirror, U stands along the axis (upright). An angled
+/// normal leans towards +Z where it comes last and towards -Z where it comes first, so the thick
+/// end of every prism points down there.                                            [B21 Fig. 3]
+enum class FaceOrder : std::uint8_t {
+  perpendicular_angled,         ///< PA: a prism
+  angled_perpendicular,         ///< AP: a prism
+  angled_angled,                ///< AA: a wedge of which each face has an angle of its own
+  perpendicular_mirror_upright  ///< PMU: a body that turns the beam aside by a reflection within it
+};
 
-/// Calls `function.template operator()<N>()` for the run-time number of prisms: the one place
-/// where run-time and compile-time sizes meet.
-/// @throws InvalidArgument unless 1 <= prisms <= kMaxPrisms
+/// What a template has to know of an element: which surfaces it has and what leans them.
+enum class ElementKind : std::uint8_t {
+  prism,      ///< two faces; one angle, between them
+  wedge,      ///< two faces; an angle each
+  reflector,  ///< two faces and a mirror between them; one angle, the mirror's
+};
+
+/// @return prism for both of a prism's face orders
+constexpr ElementKind kind_of(FaceOrder order) {
+  if (order == FaceOrder::angled_angled) return ElementKind::wedge;
+  if (order == FaceOrder::perpendicular_mirror_upright) return ElementKind::reflector;
+  return ElementKind::prism;
+}
+
+/// The part of a train that templates are made for: its elements and where their axis points.
+/// Where a number is needed, such as in 2 * N, it is the number of its elements.
+struct TrainLayout {
+  int elements = 0;
+  ElementKind kind[kMaxPrisms] = {};  ///< beam order; prism beyond the last element
+  bool axis_up = false;               ///< the axis is the sensor's Z, not its X
+
+  constexpr TrainLayout() = default;
+  /// Prisms that turn about X. (Implicit: most trains are these.)
+  constexpr TrainLayout(int prisms) : elements(prisms) {}  // NOLINT(google-explicit-constructor)
+  // NOLINTNEXTLINE(google-explicit-constructor)
+  [[gnu::always_inline]] constexpr operator int() const { return elements; }
+
+  [[gnu::always_inline]] constexpr bool is_reflector(std::size_t element) const {
+    return kind[element] == ElementKind::reflector;
+  }
+  /// Whether the last element reflects; no other may.
+  [[gnu::always_inline]] constexpr bool reflects() const {
+    return elements > 0 && is_reflector(static_cast<std::size_t>(elements) - 1);
+  }
+  /// Of all elements; those of an element begin at twice its number.
+  [[gnu::always_inline]] constexpr std::size_t surfaces() const {
+    return 2 * static_cast<std::size_t>(elements) + (reflects() ? 1 : 0);
+  }
+  [[gnu::always_inline]] constexpr std::size_t surfaces(std::size_t element) const {
+    return is_reflector(element) ? 3 : 2;
+  }
+};
+
+/// The number of a layout's elements as a plain number: gcc 12 unrolls no loop that ends elsewhere.
+template <TrainLayout N>
+inline constexpr auto kElements = static_cast<std::size_t>(N.elements);
+
+/// A wedge and a reflector that turn about Z: Livox Mid-360.
+inline constexpr TrainLayout kWedgeAndReflector = [] {
+  TrainLayout layout(2);
+  layout.kind[0] = ElementKind::wedge;
+  layout.kind[1] = ElementKind::reflector;
+  layout.axis_up = true;
+  return layout;
+}();
+
+/// Whether both are the same in everything.
+constexpr bool same_layout(const TrainLayout& a, const TrainLayout& b) {
+  if (a.elements != b.elements || a.axis_up != b.axis_up) return false;
+  for (int i = 0; i < kMaxPrisms; ++i) {
+    if (a.kind[i] != b.kind[i]) return false;
+  }
+  return true;
+}
+
+/// The layout of elements in beam order.
+/// @throws InvalidArgument where the model is not made for such a train, naming what it is made for
+TrainLayout layout_of(const std::vector<FaceOrder>& face_order);
+
+/// @throws InvalidArgument naming the layout and what is allowed
+[[noreturn]] void refuse_layout(const TrainLayout& layout);
+
+/// Calls `function.template operator()<N>()` for a layout: the one place where run-time and
+/// compile-time layouts meet.
+/// @throws InvalidArgument unless it is one of 1 to kMaxPrisms prisms or kWedgeAndReflector
 template <class Function>
-decltype(auto) with_prism_count(int prisms, Function&& function) {
-  switch (prisms) {
+decltype(auto) with_layout(const TrainLayout& layout, Function&& function) {
+  if (layout.axis_up) return function.template operator()<kWedgeAndReflector>();
+  switch (layout.elements) {
     case 1:
-      return function.template operator()<1>();
+      return function.template operator()<TrainLayout(1)>();
     case 2:
-      return function.template operator()<2>();
+      return function.template operator()<TrainLayout(2)>();
     case 3:
-      return function.template operator()<3>();
+      return function.template operator()<TrainLayout(3)>();
     case 4:
-      return function.template operator()<4>();
+      return function.template operator()<TrainLayout(4)>();
     default:
-      refuse_prism_count(prisms);
+      refuse_layout(layout);
   }
 }
 
-/// Which face of a prism the beam meets first. The angled normal leans towards +Z at rotation
-/// angle zero when the perpendicular face comes first and towards -Z when it comes second, so the
-/// thick end of every prism points down there.                                     [B21 Fig. 3]
-enum class FaceOrder : std::uint8_t {
-  perpendicular_angled,  ///< PA
-  angled_perpendicular,  ///< AP
-};
-
-/// Face orders of a train in beam order from text such as "PA-AP".
+/// Face orders of a train in beam order from text such as "PA-AP" or "AA-PMU".
 /// @throws InvalidArgument naming the text and what is allowed
 std::vector<FaceOrder> parse_face_order(std::string_view text);
 

@@ -20,13 +20,15 @@ class PrismTrain {
   /// No prisms at all, to assign a train to: whatever needs a train refuses this one.
   PrismTrain() = default;
   /// Ideal train: every error zero, air 1.0, glass 1.51, wedges 18 deg.           [B21 Eq. (30)]
-  /// The beams of all emitters run along the X axis.
-  /// @throws InvalidArgument as check_shape()
+  /// A wedge and a reflector have the glass (1.9682) and the angles (10, 29 and 50 deg) that repeat
+  /// the maker's sequence of the Mid-360. The beams of all emitters run along the axis.
+  /// @throws InvalidArgument as check_shape() and layout_of()
   explicit PrismTrain(std::vector<FaceOrder> face_order, int emitters = 1);
 
-  int prisms() const { return static_cast<int>(face_order_.size()); }  ///< how many
-  int emitters() const { return emitters_; }                           ///< how many
-  TrainShape shape() const { return {prisms(), emitters_}; }  ///< numbers of prisms and emitters
+  int prisms() const { return layout_; }                     ///< how many
+  int emitters() const { return emitters_; }                 ///< how many
+  TrainLayout layout() const { return layout_; }             ///< which elements
+  TrainShape shape() const { return {layout_, emitters_}; }  ///< elements and number of emitters
   /// Which face of every prism the beam meets first [prisms], beam order.
   const std::vector<FaceOrder>& face_order() const { return face_order_; }
 
@@ -60,6 +62,7 @@ class PrismTrain {
   [[noreturn]] void refuse_place(int place) const;
 
   std::vector<FaceOrder> face_order_;
+  TrainLayout layout_;
   int emitters_ = 1;
   std::vector<double> parameters_;
 };
@@ -71,7 +74,7 @@ void check_beam(const PrismTrain& train, int beam);
 /// What a shot of one emitter sees of a train's parameters, as a fixed-size array, for the
 /// templates of the observation model.
 /// @param beam  as check_beam(), which the caller has asked
-template <int N>
+template <TrainLayout N>
 std::array<double, parameter_count(N)> parameter_array(const PrismTrain& train, int beam = 0) {
   std::array<double, parameter_count(N)> values{};
   for (int i = 0; i < parameter_count(N); ++i) values[static_cast<std::size_t>(i)] = train[i];
@@ -80,8 +83,8 @@ std::array<double, parameter_count(N)> parameter_array(const PrismTrain& train, 
   return values;
 }
 
-/// The order of the faces of a train, which must have N prisms.
-template <int N>
+/// The order of the faces of a train, which must have layout N.
+template <TrainLayout N>
 std::array<FaceOrder, N> face_order_array(const PrismTrain& train) {
   std::array<FaceOrder, N> values{};
   for (std::size_t i = 0; i < N; ++i) values[i] = train.face_order()[i];

@@ -23,6 +23,20 @@ T refraction_cosine(const T& cosine_in, const T& index_ratio) {
                 T(std::numeric_limits<double>::quiet_NaN()));
 }
 
+/// What refraction_cosine() is of a mirror, whose index ratio is 1: NaN for one met from behind.
+/// @param cosine_in  of the angle of incidence
+template <ModelScalar T>
+T reflection_cosine(const T& cosine_in) {
+  return select(Mask<T>(cosine_in >= T(0.0)), T(-cosine_in),
+                T(std::numeric_limits<double>::quiet_NaN()));
+}
+
+/// Reflects one beam at one plane. @param normal  unit vector, on either side of the mirror
+template <ModelScalar T>
+Vector3<T> reflect(const Vector3<T>& incident, const Vector3<T>& normal) {
+  return incident - T(T(2.0) * dot(normal, incident)) * normal;
+}
+
 /// Refracts one beam at one plane.                                                [B21 Eq. (10)]
 /// @param incident     unit vector along propagation, sensor frame
 /// @param normal       unit vector of the face, sensor frame, on the side the beam leaves to

@@ -46,9 +46,15 @@ std::string to_string(Firing firing);
 /// The scan that a sensor of this type makes from its start. Shot i, counted from 0, is of emitter
 /// i modulo their number and has the time (first_shot + i) / shot_rate; its rotors are where they
 /// are then, or, where E emitters fire together, at (first_shot + floor(i / E)) E / shot_rate.
+/// The speed of a rotor may swing: by swing cos(2 pi f t), where f is swings_per_beat times the
+/// turns per second of the second rotor against the first. The manufacturer adds speeds up group by
+/// group of shots, so the angle at time t is start + w t + swing h (1 + ... + cos(2 pi f t)), h
+/// being the interval of groups.
 struct ScanSequence {
-  std::vector<double> rotation_angle;  ///< [prisms] at time 0, rad
-  int first_shot = 0;                  ///< 0 or 1
+  std::vector<double> rotation_angle;  ///< [prisms] at time 0, without the swing, rad
+  std::vector<double> swing;           ///< [prisms], rad/s; empty: none
+  int swings_per_beat = 0;
+  int first_shot = 0;  ///< 0 or 1
   Firing firing = Firing::in_turn;
 };
 
