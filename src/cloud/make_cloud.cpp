@@ -183,8 +183,8 @@ class CloudMaker {
     }
   }
 
-  static void mirror(Observations& rows) {
-    for (double& zenith : rows.zenith) zenith = kPi - zenith;
+  void mirror(Observations& rows) const {
+    estimation::mirror(rows.azimuth, rows.zenith, calibration_.train.layout().axis_up);
   }
 
   /// As many directions a second of the beginning as the belief wants; empty for all.

@@ -94,10 +94,11 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
   const estimation::FrameTurn& turn = estimate.frame_turn->turn;
   throw EstimationError(fmt::format(
       "the recording's frame is not the sensor's: shots lie outside the field of view, and its "
-      "axis is found turned by {:.3f} deg in yaw and {:.3f} deg in pitch (a roll cannot be "
+      "axis is found turned by {:.3f} deg in {} and {:.3f} deg in {} (a turn about it cannot be "
       "found){}; "
       "points need the whole turn to be stated: say it with {} YAW,PITCH,ROLL",
-      degrees_from_radians(turn.yaw), degrees_from_radians(turn.pitch),
+      degrees_from_radians(turn.yaw), turn.axis_up ? "pitch" : "yaw",
+      degrees_from_radians(turn.pitch), turn.axis_up ? "roll" : "pitch",
       estimate.converged ? "" : ", though the estimate failed: " + estimate.reason,
       name_of(kSetting.extrinsics)));
 }

@@ -112,8 +112,14 @@ std::int64_t median_step_ns(std::span<const std::int64_t> time_ns) {
   return upper_median(steps);
 }
 
-void mirror(AngleSeries& series) {
-  for (double& zenith : series.zenith) zenith = kPi - zenith;
+void mirror(AngleSeries& series, bool axis_up) { mirror(series.azimuth, series.zenith, axis_up); }
+
+void mirror(std::span<double> azimuth, std::span<double> zenith, bool axis_up) {
+  if (axis_up) {
+    for (double& angle : azimuth) angle = -angle;
+  } else {
+    for (double& angle : zenith) angle = kPi - angle;
+  }
 }
 
 ShotSelector::ShotSelector(const SelectionOptions& options)

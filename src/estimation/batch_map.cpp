@@ -50,10 +50,10 @@ constexpr double kSignificantExcess = 1.02;
 struct Constants {
   std::vector<FreeParameter> parameters, all;
 
-  Constants(const BatchMapOptions& options, int prisms)
+  Constants(const BatchMapOptions& options, const TrainLayout& layout)
       : parameters(options.free), all(options.free) {
     if (!(options.frame_sigma > 0)) return;
-    const auto frame = frame_parameters(prisms, options.frame_sigma);
+    const auto frame = frame_parameters(layout, options.frame_sigma);
     all.insert(all.end(), frame.begin(), frame.end());
   }
   bool frame_is_free() const { return all.size() > parameters.size(); }
@@ -186,7 +186,7 @@ class Iteration {
     Eigen::VectorXd offset = Eigen::VectorXd::Zero(n);
     offset.head(constants_.count()) = prior_mean_ - free_values(train_, constants_.parameters);
     if (constants_.frame_is_free()) {
-      const FrameTurn turn = turn_of(frame_);
+      const FrameTurn turn = turn_of(frame_, train_.layout().axis_up);
       offset.tail(2) = -Eigen::Vector2d(turn.yaw, turn.pitch);
     }
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -204,7 +204,7 @@ class Iteration {
     train_ = with_free_values(train_, constants_.parameters,
                               free_values(train_, constants_.parameters) + step);
     if (constants_.frame_is_free()) {
-      frame_ = turned_further(frame_, solution.parameter_step.tail(2));
+      frame_ = turned_further(frame_, solution.parameter_step.tail(2), train_.layout().axis_up);
     }
     double largest = 0;
     for (Eigen::Index i = 0; i < solution.parameter_step.size(); ++i) {
@@ -476,7 +476,7 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
                                           : options.rotor_process;
 
   // Coarse: tracked phases, then robust steps.
-  const Constants constants(options, prisms);
+  const Constants constants(options, sensor.train.layout());
   const std::vector<ShotRange> all_stretches = stretches(series);
   std::vector<ShotRange> coarse_stretches = all_stretches;
   const PackedSeries coarse_shots =

@@ -216,11 +216,12 @@ std::string frame_words(const Estimate& estimate) {
                      : fmt::format("{:.3f} deg", degrees_from_radians(value));
   };
   return fmt::format(
-      "the recording's frame is not the sensor's: it is turned by {} in yaw and {} in pitch{}; a "
-      "roll about the optical axis cannot be told from the zeros of the rotation angles and was "
+      "the recording's frame is not the sensor's: it is turned by {} in {} and {} in {}{}; a "
+      "turn about the axis of rotation cannot be told from the zeros of the rotation angles and "
+      "was "
       "taken as 0",
-      angle(frame.turn.yaw, frame.covariance(0, 0)),
-      angle(frame.turn.pitch, frame.covariance(1, 1)),
+      angle(frame.turn.yaw, frame.covariance(0, 0)), frame.turn.axis_up ? "pitch" : "yaw",
+      angle(frame.turn.pitch, frame.covariance(1, 1)), frame.turn.axis_up ? "roll" : "pitch",
       has_sigma ? "" : " (held at what the start found)");
 }
 
@@ -429,7 +430,7 @@ void add_statistics(Estimate& estimate) {
 void take_frame(Estimate& estimate) {
   estimate.series.change([&](AngleSeries& rows) { turn(rows, estimate.frame.transpose()); });
   FrameEstimate& whole = *estimate.frame_turn;
-  whole.turn = turn_of(recording_from_sensor(whole.turn) * estimate.frame);
+  whole.turn = turn_of(recording_from_sensor(whole.turn) * estimate.frame, whole.turn.axis_up);
   // Turns about the sensor's Z and Y axes; a yaw about the recording's Z moves the axis by its
   // cosine.
   const Eigen::DiagonalMatrix<double, 2> scale(1.0 / std::max(std::cos(whole.turn.pitch), 1e-9),

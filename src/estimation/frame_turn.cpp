@@ -12,20 +12,33 @@
 
 namespace risley::estimation {
 
+Eigen::Matrix3d sensor_from_train(bool axis_up) {
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  if (axis_up) axes << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  return axes;
+}
+
 Eigen::Matrix3d recording_from_sensor(const FrameTurn& turn) {
-  return (Eigen::AngleAxisd(turn.yaw, Eigen::Vector3d::UnitZ()) *
+  const Eigen::Matrix3d axes = sensor_from_train(turn.axis_up);
+  return axes *
+         (Eigen::AngleAxisd(turn.yaw, Eigen::Vector3d::UnitZ()) *
           Eigen::AngleAxisd(turn.pitch, Eigen::Vector3d::UnitY()))
-      .toRotationMatrix();
+             .toRotationMatrix() *
+         axes.transpose();
 }
 
-FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor) {
-  const Eigen::Vector3d axis = recording_from_sensor.col(0);
-  return {std::atan2(axis.y(), axis.x()), std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))};
+FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor, bool axis_up) {
+  const Eigen::Matrix3d axes = sensor_from_train(axis_up);
+  const Eigen::Vector3d axis = axes.transpose() * (recording_from_sensor * axes.col(0));
+  return {std::atan2(axis.y(), axis.x()), std::atan2(-axis.z(), std::hypot(axis.x(), axis.y())),
+          axis_up};
 }
 
-Eigen::Matrix3d turned_further(const Eigen::Matrix3d& rotation, const Eigen::Vector2d& step) {
+Eigen::Matrix3d turned_further(const Eigen::Matrix3d& rotation, const Eigen::Vector2d& step,
+                               bool axis_up) {
   if (step.isZero(0)) return rotation;
-  return recording_from_sensor(turn_of(rotation * algebra::rotation_by({0, step[1], step[0]})));
+  const Eigen::Vector3d about = sensor_from_train(axis_up) * Eigen::Vector3d(0, step[1], step[0]);
+  return recording_from_sensor(turn_of(rotation * algebra::rotation_by(about), axis_up));
 }
 
 void turn(AngleSeries& series, const Eigen::Matrix3d& rotation) {
@@ -52,9 +65,10 @@ void turn(AngleSeries& series, const Eigen::Matrix3d& rotation) {
   }
 }
 
-std::vector<FreeParameter> frame_parameters(int prisms, double prior_sigma) {
-  return {{"frame_yaw_deg", {place::frame_yaw(prisms)}, prior_sigma},
-          {"frame_pitch_deg", {place::frame_pitch(prisms)}, prior_sigma}};
+std::vector<FreeParameter> frame_parameters(const TrainLayout& layout, double prior_sigma) {
+  const bool up = layout.axis_up;
+  return {{up ? "frame_pitch_deg" : "frame_yaw_deg", {place::frame_yaw(layout)}, prior_sigma},
+          {up ? "frame_roll_deg" : "frame_pitch_deg", {place::frame_pitch(layout)}, prior_sigma}};
 }
 
 }  // namespace risley::estimation

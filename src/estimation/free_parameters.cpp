@@ -31,11 +31,15 @@ std::vector<std::string> default_free_names(TrainShape shape, bool one_glass) {
     if (info.name.starts_with("incident_beam")) names.push_back(info.name);
   }
   if (shape.prisms.reflects()) {
-    // Four emitters fix these; other tilts of the body cannot be told from its glass and mirror.
+    // A row of emitters determines every angle but one: the vertical tilt of the reflector cannot
+    // be told from glass, mirror and entrance face.
+    const std::string held = fmt::format("prism_tilt_{}_vertical_deg", prism_letter(prisms - 1));
     for (const ParameterInfo& info : parameter_list(shape)) {
-      if (info.name.find("_face_") != std::string::npos) names.push_back(info.name);
+      const bool is_angle = info.kind == ParameterKind::train && info.unit == "deg";
+      if (is_angle && info.name != held && !info.name.starts_with("incident_beam")) {
+        names.push_back(info.name);
+      }
     }
-    names.push_back(fmt::format("prism_tilt_{}_horizontal_deg", prism_letter(prisms - 1)));
     return names;
   }
   for (int i = 0; i + 1 < prisms; ++i) {

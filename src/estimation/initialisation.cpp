@@ -141,7 +141,7 @@ class WindowFitter {
     Eigen::VectorXd offset(static_cast<Eigen::Index>(all_.size()));
     offset.head(prior_.size()) = free_values(fit.train, free_) - prior_;
     if (turns()) {
-      const FrameTurn turn = turn_of(fit.frame);
+      const FrameTurn turn = turn_of(fit.frame, fit.train.layout().axis_up);
       offset.tail(2) = Eigen::Vector2d(turn.yaw, turn.pitch);
     }
     return offset;
@@ -197,7 +197,7 @@ class WindowFitter {
     next.train = with_free_values(fit.train, free_,
                                   free_values(fit.train, free_) + step.segment(d, prior_.size()));
     for (Eigen::Index i = 0; i < d; ++i) next.knot.state[static_cast<std::size_t>(i)] += step[i];
-    if (turns()) next.frame = turned_further(fit.frame, step.tail(2));
+    if (turns()) next.frame = turned_further(fit.frame, step.tail(2), fit.train.layout().axis_up);
     return next;
   }
 
@@ -215,7 +215,8 @@ struct Hypothesis {
   bool mirrored = false;
   sensors::Sensor sensor;  // in one of its speed combinations
 
-  /// Speeds of the lines of y + iz as recorded: a mirror image turns the other way.
+  /// Speeds of the lines of y + iz of the train's frame as recorded: a mirror image turns the other
+  /// way.
   std::vector<double> recorded_speeds() const {
     std::vector<double> speeds = sensor.angular_velocity;
     if (mirrored) std::transform(speeds.begin(), speeds.end(), speeds.begin(), std::negate<>());
@@ -256,22 +257,27 @@ struct Answer {
 /// The shots of a window, ready to be fitted under any hypothesis.
 class StartWindow {
  public:
-  /// @param frame  of the recording, roughly
+  /// @param frame  of the recording, from the sensor's, roughly
   /// @param found  about the head
   StartWindow(const AngleSeries& head, const sensors::Sensor& sensor, const StartOptions& options,
               const Eigen::Matrix3d& frame, StartFindings& found)
       : options_(options),
         found_(found),
         frame_(frame),
+        axis_up_(sensor.train.layout().axis_up),
         turned_(frame.isIdentity() ? AngleSeries() : head),
         series_(frame.isIdentity() ? head : turned_),
         noise_(least_noise(options)),
-        frame_parameters_(frame_parameters(sensor.prisms(), kFrameSigma)) {
-    if (frame.isIdentity()) {
+        frame_parameters_(frame_parameters(sensor.train.layout(), kFrameSigma)) {
+    if (!frame.isIdentity()) turn(turned_, frame.transpose());
+    if (axis_up_) {  // lines are of what turns about X
+      AngleSeries about_x = series_;
+      turn(about_x, sensor_from_train(true).transpose());
+      search_ = std::make_shared<const LineSearch>(about_x);
+    } else if (frame.isIdentity()) {
       if (!found.lines) found.lines = std::make_shared<const LineSearch>(head);
       search_ = found.lines;
     } else {
-      turn(turned_, frame.transpose());
       search_ = std::make_shared<const LineSearch>(turned_);
     }
   }
@@ -281,7 +287,7 @@ class StartWindow {
   const LineSearch& search() const { return *search_; }
   /// The lines near a hypothesis's speeds.
   std::vector<RotorLines> near(const std::vector<double>& speeds) const {
-    if (search_ != found_.lines) return search_->near(speeds, kUsualShare, kMostMinima);
+    if (search_ != found_.lines) return search_->near(speeds, kUsualShare, kMostMinima, axis_up_);
     const auto [known, is_new] = found_.near.try_emplace(speeds);
     if (is_new) known->second = search_->near(speeds, kUsualShare, kMostMinima);
     return known->second;
@@ -296,7 +302,7 @@ class StartWindow {
     WindowFit fit{h.sensor.train, make_knots(shots, {&all, 1}, h.sensor.prisms(), 1e9)};
     fit.knot.time_ns[0] = search_->time_ns();
     const double sign = h.mirrored ? -1.0 : 1.0;
-    for (std::size_t k = 0; k < trial.lines.lines.size(); ++k) {
+    for (std::size_t k = 0; k < h.sensor.angular_velocity.size(); ++k) {
       const SpectralLine& line = trial.lines.lines[k];
       // At rotation angle zero the beam leans to -Z, so a line's phase is the angle less 90
       // degrees.
@@ -308,9 +314,10 @@ class StartWindow {
     const WindowFit from_lines = fit;
     WindowFitter fitter(shots, h.sensor.train, options_.free, frame, noise_);
     fitter.run(fit);
-    // Where the lines explain next to nothing more than others would, their phases mean little.
+    // Where the lines explain next to nothing more than others would, or leave much, their phases
+    // mean little.
     if (!(fit.rms < kGoodResidual) &&
-        (trial.lines.unexplained < kSecondOrder || !std::isfinite(fit.rms))) {
+        (axis_up_ || trial.lines.unexplained < kSecondOrder || !std::isfinite(fit.rms))) {
       constexpr std::size_t kGridShots = 150;
       const AngleSeries few = chosen(h.mirrored, kGridShots);
       WindowFit around = from_lines;
@@ -337,18 +344,19 @@ class StartWindow {
     start.combination = h.sensor.combination;
     start.mirrored = h.mirrored;
     start.residual_rms = answer.fit.rms;
-    for (std::size_t k = 0; k < answer.trial.lines.lines.size(); ++k) {
+    for (std::size_t k = 0; k < h.sensor.angular_velocity.size(); ++k) {
       start.rotation_angle.push_back(wrap_to_pi(answer.fit.knot.state[3 * k]));
       start.angular_velocity.push_back(answer.fit.knot.state[3 * k + 1]);
     }
     if (!answer.frame_is_free) return start;
-    // The mirror of the mirrored recording: its frame turns the other way in elevation.
+    // The mirror of the mirrored recording: its frame turns the other way in what is mirrored.
     Eigen::Matrix3d total = frame_;
     if (h.mirrored) {
-      const Eigen::DiagonalMatrix<double, 3> mirror(1.0, 1.0, -1.0);
+      const Eigen::DiagonalMatrix<double, 3> mirror(1.0, axis_up_ ? -1.0 : 1.0,
+                                                    axis_up_ ? 1.0 : -1.0);
       total = (mirror * frame_ * mirror).eval();
     }
-    start.frame = turn_of(total * answer.fit.frame);
+    start.frame = turn_of(total * answer.fit.frame, axis_up_);
     return start;
   }
 
@@ -362,13 +370,14 @@ class StartWindow {
     const ShotRange rows = search_->shots();
     const std::size_t stride = thinning_stride(series_, rows, most);
     for (std::size_t i = rows.begin; i < rows.end; i += stride) shots.append(series_, i);
-    if (mirrored) mirror(shots);
+    if (mirrored) mirror(shots, axis_up_);
     return shots;
   }
 
   const StartOptions& options_;
   StartFindings& found_;
   Eigen::Matrix3d frame_;
+  bool axis_up_;
   AngleSeries turned_;
   const AngleSeries& series_;
   double noise_;
@@ -446,7 +455,7 @@ std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Tria
 /// Whether two answers say the same of rotors and image.
 bool same_answer(const Answer& a, const Answer& b, double resolved) {
   if (a.trial.hypothesis != b.trial.hypothesis) return false;
-  for (std::size_t k = 0; k < a.trial.lines.lines.size(); ++k) {
+  for (std::size_t k = 0; k < a.trial.hypothesis->sensor.angular_velocity.size(); ++k) {
     if (std::abs(a.fit.knot.state[3 * k + 1] - b.fit.knot.state[3 * k + 1]) > resolved) {
       return false;
     }
@@ -517,7 +526,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
     double fastest = 0;
     for (const double speed : sensor.angular_velocity) fastest = std::max(fastest, std::abs(speed));
     std::vector<RotorLines> everywhere;
-    if (turning_rotors(sensor) == 2 && sensor.prisms() == 2) {
+    if (turning_rotors(sensor) == 2 && sensor.prisms() == 2 && !sensor.train.layout().reflects()) {
       everywhere = search.anywhere(2.1 * fastest, kMostMinima);
     }
     std::vector<Trial> farther;
@@ -583,15 +592,18 @@ Eigen::Vector3d mean_direction(const AngleSeries& series) {
 Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sensor,
                              const StartOptions& options, StartFindings& found) {
   const Eigen::Vector3d middle = mean_direction(head);
-  Eigen::Matrix3d frame =
+  const Eigen::Matrix3d train_from_sensor =
+      sensor_from_train(sensor.train.layout().axis_up).transpose();
+  Eigen::Matrix3d frame =  // of the train
       recording_from_sensor({std::atan2(middle.y(), middle.x()),
                              std::atan2(-middle.z(), std::hypot(middle.x(), middle.y()))});
   constexpr int kRounds = 6;
   for (int round = 0; round < kRounds; ++round) {
-    const StartWindow window(head, sensor, options, frame, found);
+    const StartWindow window(head, sensor, options, frame * train_from_sensor, found);
     std::optional<RotorLines> best;
     for (const Hypothesis& h : hypotheses_of(sensor, options.mirrored)) {
-      for (const RotorLines& lines : window.search().near(h.recorded_speeds(), kUsualShare, 1)) {
+      for (const RotorLines& lines : window.search().near(h.recorded_speeds(), kUsualShare, 1,
+                                                          sensor.train.layout().axis_up)) {
         if (!best || lines.unexplained < best->unexplained) best = lines;
       }
     }
@@ -605,7 +617,7 @@ Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sen
         {std::atan2(axis.y(), axis.x()), std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))});
     if (size < radians_from_degrees(0.05)) break;
   }
-  return frame;
+  return frame * train_from_sensor;
 }
 
 /// Whether a start of one is a start of the other.
@@ -666,7 +678,7 @@ Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
 }
 
 void prepare_shots(AngleSeries& series, const Start& start) {
-  if (start.mirrored) mirror(series);
+  if (start.mirrored) mirror(series, start.train.layout().axis_up);
   if (start.frame) turn(series, recording_from_sensor(*start.frame).transpose());
 }
 

@@ -43,7 +43,7 @@ constexpr double kEmittersFit = 0.25;
 
 /// The lines of a sensor's scan when all of its field is seen.
 struct NominalLines {
-  std::vector<double> amplitude;  ///< [prisms]
+  std::vector<double> amplitude;  ///< [prisms], then that of LineSearch::near()'s image
   std::vector<Complex> constant;  ///< [emitters]
 };
 
@@ -51,9 +51,13 @@ NominalLines nominal_lines(const PrismTrain& train) {
   const int steps = train.prisms() <= 2 ? 24 : 12;
   const auto prisms = static_cast<std::size_t>(train.prisms());
   NominalLines result;
-  result.amplitude.assign(prisms, 0.0);
+  // A line turns with so many times each rotor's angle.
+  std::vector<std::vector<double>> turns(prisms, std::vector<double>(prisms, 0.0));
+  for (std::size_t k = 0; k < prisms; ++k) turns[k][k] = 1.0;
+  if (train.layout().reflects()) turns.push_back({-1.0, 2.0});
+  result.amplitude.assign(turns.size(), 0.0);
   for (int beam = 0; beam < train.emitters(); ++beam) {
-    std::vector<Complex> sums(prisms);
+    std::vector<Complex> sums(turns.size());
     Complex constant = 0;
     double count = 0;
     std::vector<double> angles(prisms, 0.0);
@@ -67,14 +71,22 @@ NominalLines nominal_lines(const PrismTrain& train) {
       }
       const Observation shot = observe(train, angles, beam);
       if (!shot.valid) return;
-      const Complex value(shot.direction.y, shot.direction.z);
+      const Vector3<double>& v = shot.direction;
+      const Complex value =  // of the train's frame
+          train.layout().axis_up ? Complex(v.x, v.y) : Complex(v.y, v.z);
       count += 1.0;
       constant += value;
-      for (std::size_t k = 0; k < prisms; ++k) sums[k] += value * std::polar(1.0, -angles[k]);
+      for (std::size_t k = 0; k < turns.size(); ++k) {
+        double angle = 0;
+        for (std::size_t rotor = 0; rotor < prisms; ++rotor) {
+          angle += turns[k][rotor] * angles[rotor];
+        }
+        sums[k] += value * std::polar(1.0, -angle);
+      }
     };
     visit(visit, 0);
     count = std::max(count, 1.0);
-    for (std::size_t k = 0; k < prisms; ++k) {
+    for (std::size_t k = 0; k < turns.size(); ++k) {
       result.amplitude[k] += std::abs(sums[k]) / count / train.emitters();
     }
     result.constant.push_back(constant / count);
@@ -141,13 +153,18 @@ EmitterFit emitter_fit(const RotorLines& found, const std::vector<Complex>& expe
   return best;
 }
 
-/// The rotation whose X axis leans by the sine of a constant.
+/// The frame without roll whose X axis points so.
+Eigen::Matrix3d frame_along(const Eigen::Vector3d& axis) {
+  return recording_from_sensor(
+      {std::atan2(axis.y(), axis.x()), std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))});
+}
+
+/// The rotation whose X axis leans by the sine of a constant: from the train's frame.
 Eigen::Matrix3d frame_with_axis(const Eigen::Matrix3d& frame, Complex constant) {
   const double size = std::min(std::abs(constant), 1.0);
   const Eigen::Vector3d axis =
       frame * Eigen::Vector3d(std::sqrt(1.0 - size * size), constant.real(), constant.imag());
-  return recording_from_sensor(
-      {std::atan2(axis.y(), axis.x()), std::atan2(-axis.z(), std::hypot(axis.x(), axis.y()))});
+  return frame_along(axis);
 }
 
 Eigen::Matrix3d frame_about_mean(const AngleSeries& series) {
@@ -156,8 +173,7 @@ Eigen::Matrix3d frame_about_mean(const AngleSeries& series) {
     const auto v = direction_from_angles<double>({series.azimuth[i], series.zenith[i]});
     sum += Eigen::Vector3d(v.x, v.y, v.z);
   }
-  return recording_from_sensor(
-      {std::atan2(sum.y(), sum.x()), std::atan2(-sum.z(), std::hypot(sum.x(), sum.y()))});
+  return frame_along(sum);
 }
 
 AngleSeries in_frame(const AngleSeries& shots, const Eigen::Matrix3d& frame) {
@@ -175,20 +191,29 @@ class LineMatcher {
       : beams_(beams), matches_(candidates.size()) {
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       matches_[i].candidate = i;
-      candidates_.push_back(
-          {sensors::in_all_combinations(candidates[i]), nominal_lines(candidates[i].train)});
+      candidates_.push_back({sensors::in_all_combinations(candidates[i]),
+                             nominal_lines(candidates[i].train),
+                             candidates[i].train.layout().axis_up});
+      any_axis_up_ = any_axis_up_ || candidates_.back().axis_up;
     }
   }
 
-  /// Tries every candidate in a frame. @param search  in the shots, turned back by the frame
-  /// @return the optical axis of the best one there
+  bool any_axis_up() const { return any_axis_up_; }
+
+  /// Tries candidates in a frame.
+  /// @param search  in the shots, turned back by the frame
+  /// @param frame   of the train, whose X is the axis of rotation
+  /// @param which   those whose axis is the sensor's Z, or its X, or all
+  /// @return the axis of the best one there
   /// @param[in,out] known  lines near some speeds
-  Complex try_frame(const LineSearch& search, const Eigen::Matrix3d& frame, LinesNear& known) {
-    find_lines_near(search, known);
+  Complex try_frame(const LineSearch& search, const Eigen::Matrix3d& frame,
+                    std::optional<bool> axis_up, LinesNear& known) {
+    find_lines_near(search, axis_up, known);
     double least = std::numeric_limits<double>::infinity();
     Complex axis = 0;
     for (SensorMatch& match : matches_) {
       const Candidate& candidate = candidates_[match.candidate];
+      if (axis_up.value_or(candidate.axis_up) != candidate.axis_up) continue;
       for (const bool mirrored : {false, true}) {
         std::vector<Complex> emitters = candidate.lines.constant;
         if (mirrored) {
@@ -207,7 +232,9 @@ class LineMatcher {
             if (!(misfit < match.misfit)) continue;
             match.misfit = misfit;
             match.mirrored = mirrored;
-            match.frame = turn_of(frame_with_axis(frame, lines.constant));
+            match.frame = turn_of(frame_with_axis(frame, lines.constant) *
+                                      sensor_from_train(candidate.axis_up).transpose(),
+                                  candidate.axis_up);
             match.order = fit.order;
             match.roll = fit.roll;
           }
@@ -230,8 +257,10 @@ class LineMatcher {
   struct Candidate {
     std::vector<sensors::Sensor> combinations;
     NominalLines lines;
+    bool axis_up = false;
   };
-  /// By ascending speeds, so that all ways to say the same are looked for once.
+  /// By ascending speeds where there is no image, so that all ways to say the same are looked for
+  /// once.
   struct ExpectedLines {
     std::vector<double> speeds, amplitudes;
   };
@@ -243,34 +272,44 @@ class LineMatcher {
       rotors.emplace_back(mirrored ? -sensor.angular_velocity[k] : sensor.angular_velocity[k],
                           lines.amplitude[k]);
     }
-    std::sort(rotors.begin(), rotors.end());
+    const bool has_image = lines.amplitude.size() > rotors.size();
+    if (!has_image) std::sort(rotors.begin(), rotors.end());
     ExpectedLines expected;
     for (const auto& [speed, amplitude] : rotors) {
       expected.speeds.push_back(speed);
       expected.amplitudes.push_back(amplitude);
     }
+    if (has_image) expected.amplitudes.push_back(lines.amplitude.back());
     return expected;
   }
 
   /// Adds the lines of a recording near the speeds that candidates have.
-  void find_lines_near(const LineSearch& search, LinesNear& found) const {
-    std::vector<LinesNear::value_type*> wanted;
+  void find_lines_near(const LineSearch& search, std::optional<bool> axis_up,
+                       LinesNear& found) const {
+    struct Wanted {
+      LinesNear::value_type* lines;
+      bool with_image;
+    };
+    std::vector<Wanted> wanted;
     for (const Candidate& candidate : candidates_) {
+      if (axis_up.value_or(candidate.axis_up) != candidate.axis_up) continue;
       for (const sensors::Sensor& sensor : candidate.combinations) {
         for (const bool mirrored : {false, true}) {
           const auto [one, is_new] =
               found.try_emplace(expected_lines(sensor, candidate.lines, mirrored).speeds);
-          if (is_new) wanted.push_back(&*one);
+          if (is_new) wanted.push_back({&*one, candidate.axis_up});
         }
       }
     }
     parallel::for_each(wanted.size(), [&](std::size_t i) {
-      wanted[i]->second = search.near(wanted[i]->first, kUsualShare, kMostMinima);
+      auto& [speeds, lines] = *wanted[i].lines;
+      lines = search.near(speeds, kUsualShare, kMostMinima, wanted[i].with_image);
     });
   }
 
   BeamSource beams_;
   std::vector<Candidate> candidates_;
+  bool any_axis_up_ = false;
   std::vector<SensorMatch> matches_;
 };
 
@@ -301,17 +340,28 @@ SensorRecognition recognise_sensor(const AngleSeries& head,
   if (found == nullptr) found = &own;
   if (!found->lines) found->lines = std::make_shared<const LineSearch>(head);
   LineMatcher matcher(candidates, beams);
-  Complex axis = matcher.try_frame(*found->lines, Eigen::Matrix3d::Identity(), found->near);
+  Complex axis = matcher.try_frame(*found->lines, Eigen::Matrix3d::Identity(), false, found->near);
   result.matches = matcher.sorted();
+  if (!lines_decide(result.matches) && matcher.any_axis_up()) {
+    const ShotRange window = found->lines->shots();
+    const Eigen::Matrix3d upright = sensor_from_train(true);
+    LinesNear known;
+    const Complex leaning =
+        matcher.try_frame(LineSearch(in_frame(rows_of(head, window.begin, window.end), upright)),
+                          upright, true, known);
+    result.matches = matcher.sorted();
+    if (lines_decide(result.matches)) axis = leaning;
+  }
   if (!lines_decide(result.matches) || std::abs(axis) > kAxisFound) {
     const bool near = lines_decide(result.matches);
     const ShotRange window = found->lines->shots();
     const AngleSeries shots = rows_of(head, window.begin, window.end);
+    const bool axis_up = result.matches.front().frame.axis_up;
     Eigen::Matrix3d frame =
-        near ? frame_with_axis(Eigen::Matrix3d::Identity(), axis) : frame_about_mean(shots);
+        near ? frame_with_axis(sensor_from_train(axis_up), axis) : frame_about_mean(shots);
     for (int round = 0; round < kMostFrames; ++round) {
       LinesNear known;
-      axis = matcher.try_frame(LineSearch(in_frame(shots, frame)), frame, known);
+      axis = matcher.try_frame(LineSearch(in_frame(shots, frame)), frame, std::nullopt, known);
       if (std::abs(axis) < kAxisFound || std::abs(axis) > kAxisLost) break;
       frame = frame_with_axis(frame, axis);
     }

@@ -14,6 +14,7 @@
 #include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/golden_section.hpp"
+#include "risley/core/require.hpp"
 #include "risley/optics/prism_train.hpp"
 #include "risley/parallel/parallel.hpp"
 
@@ -326,12 +327,16 @@ LineSearch::Bins LineSearch::bins_about(double speed, double share) const {
 }
 
 std::vector<RotorLines> LineSearch::near(std::span<const double> speeds, double share,
-                                         std::size_t most) const {
+                                         std::size_t most, bool with_image) const {
   std::vector<Bins> bins;
   for (const double speed : speeds) {
     if (speed != 0) bins.push_back(bins_about(speed, share));
   }
-  std::vector<RotorLines> best = best_of(bins, false, most);
+  if (with_image) {
+    require_between("number of speeds with an image", static_cast<double>(bins.size()), 2, 2);
+    bins.emplace_back();
+  }
+  std::vector<RotorLines> best = best_of(bins, false, most, with_image);
   for (RotorLines& found : best) {  // rotors that stand still get their place back
     for (std::size_t k = 0; k < speeds.size(); ++k) {
       if (speeds[k] == 0)
@@ -348,7 +353,7 @@ std::vector<RotorLines> LineSearch::anywhere(double fastest, std::size_t most) c
 }
 
 std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ordered,
-                                            std::size_t most) const {
+                                            std::size_t most, bool with_image) const {
   constexpr std::ptrdiff_t kApart = 4;  // bins: lines nearer to each other or to 0 are one line
   if (bins.empty()) return {};
   return with_layout(static_cast<int>(bins.size()), [&]<int Lines>() {
@@ -361,9 +366,11 @@ std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ord
         all.push_back(candidate);
         return;
       }
-      const std::ptrdiff_t first =
+      std::ptrdiff_t first =
           ordered && line > 0 ? candidate.bin[line - 1] + kApart : bins[line].first;
-      for (std::ptrdiff_t bin = first; bin <= bins[line].last; ++bin) {
+      std::ptrdiff_t last = bins[line].last;
+      if (with_image && line == 2) first = last = 2 * candidate.bin[1] - candidate.bin[0];
+      for (std::ptrdiff_t bin = first; bin <= last; ++bin) {
         bool apart = std::abs(bin) >= kApart;
         for (std::size_t other = 0; other < line; ++other) {
           apart = apart && std::abs(bin - candidate.bin[other]) >= kApart;

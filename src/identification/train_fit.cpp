@@ -141,8 +141,11 @@ bool apply(const std::vector<Unknown>& unknowns, const Eigen::VectorXd& step, Tr
     set_glass(train, k, index[at], deviations[at]);
   }
   if (yaw != 0 || pitch != 0) {
-    model.frame = estimation::turn_of(
-        estimation::turned_further(estimation::recording_from_sensor(model.frame), {yaw, pitch}));
+    const bool up = train.layout().axis_up;
+    model.frame =
+        estimation::turn_of(estimation::turned_further(
+                                estimation::recording_from_sensor(model.frame), {yaw, pitch}, up),
+                            up);
   }
   return true;
 }

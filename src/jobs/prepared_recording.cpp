@@ -65,7 +65,8 @@ std::unique_ptr<recordings::Reader> open_lidar(const recordings::Source& source,
 Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
   const Eigen::Matrix3d axis_frame = estimation::recording_from_sensor(frame);
   const Eigen::Matrix3d turn =
-      axis_frame * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()) * axis_frame.transpose();
+      axis_frame * Eigen::AngleAxisd(roll, estimation::sensor_from_train(frame.axis_up).col(0)) *
+      axis_frame.transpose();
   // Of Rz(yaw) Ry(pitch) Rx(roll).
   return {std::atan2(turn(1, 0), turn(0, 0)),
           std::atan2(-turn(2, 0), std::hypot(turn(0, 0), turn(1, 0))),

@@ -30,9 +30,12 @@ Json value_json(double value, double sigma) {
 
 Json frame_json(const std::optional<estimation::FrameEstimate>& turn) {
   const estimation::FrameEstimate frame = turn.value_or(estimation::FrameEstimate{});
-  return {{"yaw_deg", value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)))},
-          {"pitch_deg", value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)))},
-          {"estimated", turn.has_value()}};
+  const bool up = frame.turn.axis_up;
+  return {
+      {up ? "pitch_deg" : "yaw_deg", value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)))},
+      {up ? "roll_deg" : "pitch_deg",
+       value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)))},
+      {"estimated", turn.has_value()}};
 }
 
 Json slips_json(const std::vector<recordings::ShotSlip>& slips) {

@@ -156,8 +156,10 @@ const LivoxType* livox_type(std::uint8_t number) {
 
 std::string livox_types_text() {
   std::string text;
-  for (const LivoxType& type : kLivoxTypes)
+  for (const LivoxType& type : kLivoxTypes) {
+    if (!type.first_generation) continue;
     text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", type.number, type.name);
+  }
   return text;
 }
 

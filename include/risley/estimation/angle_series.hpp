@@ -63,8 +63,11 @@ inline constexpr std::size_t kMedianSteps = 20000;
 /// @param time_ns  of at least two shots
 std::int64_t median_step_ns(std::span<const std::int64_t> time_ns);
 
-/// The same shots with the sign of the elevation turned.
-void mirror(AngleSeries& series);
+/// The mirror image of the shots: elevations change their sign, or azimuths where the axis of
+/// rotation is the sensor's Z.
+void mirror(AngleSeries& series, bool axis_up);
+/// As above. @param azimuth,zenith  rad
+void mirror(std::span<double> azimuth, std::span<double> zenith, bool axis_up);
 
 /// Picks shots on a fixed grid of ticks, so that gaps and jitter do not move them: at each tick the
 /// next shot of a beam that has not had its turn in this round, so that rates and the order of the

@@ -15,20 +15,27 @@ namespace risley::estimation {
 /// p_sensor, rad. A hub or a vehicle's calibration turns clouds so. The sensor's optical axis then
 /// points to azimuth yaw and elevation -pitch. Directions alone do not tell a roll about that axis
 /// from other zeros of all rotation angles; it is taken as 0.
+///
+/// Of a sensor whose axis of rotation is its Z, yaw and pitch are about Z and Y of the train's
+/// frame, which are the sensor's Y and X, and the axis is Z.
 struct FrameTurn {
   double yaw = 0, pitch = 0;
+  bool axis_up = false;  ///< of the sensor
 };
+
+/// The axes of the train's frame, in which X is the axis of rotation, in the sensor's.
+Eigen::Matrix3d sensor_from_train(bool axis_up);
 
 /// Rotation that takes vectors of the sensor's frame to the recording's.
 Eigen::Matrix3d recording_from_sensor(const FrameTurn& turn);
 
-/// The turn whose optical axis is that of a rotation, which may roll.
-FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor);
+/// The turn whose axis of rotation is that of a rotation, which may roll about it.
+FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor, bool axis_up);
 
-/// A rotation followed by small turns about the sensor's Z axis (yaw) and Y axis (pitch), without
-/// the roll that this leaves. @param step  yaw and pitch, rad
+/// A rotation followed by small turns as a FrameTurn has them, without the roll that this leaves.
+/// @param step  yaw and pitch, rad
 Eigen::Matrix3d turned_further(const Eigen::Matrix3d& recording_from_sensor,
-                               const Eigen::Vector2d& step);
+                               const Eigen::Vector2d& step, bool axis_up);
 
 /// Turns all directions: v := rotation v. Rounding variances go along.
 void turn(AngleSeries& series, const Eigen::Matrix3d& rotation);
@@ -39,9 +46,9 @@ struct FrameEstimate {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< of yaw and pitch, rad^2
 };
 
-/// What stands at the end of the free parameters where the frame's turn is estimated too: small
-/// turns of the recorded beam about the sensor's Z axis (yaw) and Y axis (pitch).
+/// What stands at the end of the free parameters where the frame's turn is estimated too, named by
+/// the axes of the sensor's frame: yaw about Z, pitch about Y, roll about X.
 /// @param prior_sigma  of each, rad
-std::vector<FreeParameter> frame_parameters(int prisms, double prior_sigma);
+std::vector<FreeParameter> frame_parameters(const TrainLayout& layout, double prior_sigma);
 
 }  // namespace risley::estimation

@@ -67,9 +67,11 @@ class LineSearch {
   std::int64_t time_ns() const { return time_ns_; }  ///< of the phases: the middle of the shots
 
   /// The best minima with speeds within a share of the given ones, rad/s, best first.
-  /// @param speeds  one per rotor, 1 to kMaxPrisms; two of them may be equal and opposite
-  std::vector<RotorLines> near(std::span<const double> speeds, double share,
-                               std::size_t most) const;
+  /// @param speeds      one per rotor, 1 to kMaxPrisms; two of them may be equal and opposite
+  /// @param with_image  of two speeds: a third line lies as far beyond the second as the first lies
+  ///                    before it, as the beam of a reflector has, which bends it far
+  std::vector<RotorLines> near(std::span<const double> speeds, double share, std::size_t most,
+                               bool with_image = false) const;
   /// The best minima among all pairs of speeds up to the fastest, rad/s, best first.
   std::vector<RotorLines> anywhere(double fastest, std::size_t most) const;
 
@@ -89,7 +91,8 @@ class LineSearch {
     Complex value;                  // sum of the values
   };
 
-  std::vector<RotorLines> best_of(std::span<const Bins> bins, bool ordered, std::size_t most) const;
+  std::vector<RotorLines> best_of(std::span<const Bins> bins, bool ordered, std::size_t most,
+                                  bool with_image = false) const;
   template <int Lines>
   double unexplained(std::span<const std::ptrdiff_t> bins) const;
   template <int Lines>

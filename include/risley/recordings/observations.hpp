@@ -103,21 +103,23 @@ inline constexpr std::uint8_t kMid40 = 1,  ///< Mid-40
     kTele15 = 2,                           ///< Tele-15
     kHorizon = 3,                          ///< Horizon
     kMid70 = 6,                            ///< Mid-70
-    kAvia = 7;                             ///< Avia
-/// A type of Livox's first generation of sensors.
+    kAvia = 7,                             ///< Avia
+    kMid360 = 9;                           ///< Mid-360
+/// A type of Livox's sensors.
 struct LivoxType {
-  std::uint8_t number;    ///< Device::type
-  std::string_view name;  ///< "Mid-40"
-  bool fast;              ///< 240,000 shots a second instead of 100,000, and inertial samples
+  std::uint8_t number;           ///< Device::type
+  std::string_view name;         ///< "Mid-40"
+  bool fast;                     ///< more than 100,000 shots a second, and inertial samples
+  bool first_generation = true;  ///< its packets are those of LVX 1.1
 };
 /// All of them.
 inline constexpr std::array kLivoxTypes{
-    LivoxType{kMid40, "Mid-40", false}, LivoxType{kTele15, "Tele-15", true},
+    LivoxType{kMid40, "Mid-40", false},   LivoxType{kTele15, "Tele-15", true},
     LivoxType{kHorizon, "Horizon", true}, LivoxType{kMid70, "Mid-70", false},
-    LivoxType{kAvia, "Avia", true}};
+    LivoxType{kAvia, "Avia", true},       LivoxType{kMid360, "Mid-360", true, false}};
 /// One by its number, or nullptr.
 const LivoxType* livox_type(std::uint8_t number);
-/// "1 (Mid-40), 2 (Tele-15), ...": what messages allow.
+/// "1 (Mid-40), 2 (Tele-15), ...": those of the first generation, which messages allow.
 std::string livox_types_text();
 /// Device::type of a sensor about which a format tells nothing, or only that it is no Mid-40.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;

@@ -49,8 +49,10 @@ std::uint8_t data_type_of(bool cartesian, bool tagged, int returns) {
 }
 
 std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_type) {
+  const LivoxType* type = livox_type(device_type);
+  if (type != nullptr && !type->first_generation) return std::nullopt;
   if (data_type < 2) return kGrid100kHz;
-  if (const LivoxType* type = livox_type(device_type)) {
+  if (type != nullptr) {
     return type->fast ? kGrid240kHz : kGrid100kHz;
   }
   if (data_type > kImuDataType) return kGrid240kHz;  // only the Avia has three returns
