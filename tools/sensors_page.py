@@ -26,7 +26,7 @@ PICTURES = ROOT / "docs" / "images" / "patterns"
 DURATION = 0.1  # s, of a picture
 SIDE = 420      # of a picture, pixels
 COLOURS = ("#1f6feb", "#d9730d", "#1a7f5a", "#8250df", "#cf222e", "#5b6470")
-TYPES = ("mid-40", "mid-70", "avia", "horizon", "tele-15")  # that have a section
+TYPES = ("mid-40", "mid-70", "avia", "horizon", "tele-15", "mid-360")  # that have a section
 
 # What HELIOS++ ships: python/helios/data/scanners_tls.xml of
 # https://github.com/3dgeo-heidelberg/helios, commit 1b7fa9e3. Angles in degrees, their sign chooses
@@ -74,14 +74,19 @@ class Risley:
 # ---- pictures ----
 
 def picture(risley, preset, emitters):
-    """The scan's first tenth of a second, as one looks out: left is left. One line per emitter."""
+    """The scan's first tenth of a second, as one looks out: left is left. One line per emitter. A
+    sensor that sees all around is drawn as a panorama, azimuth against elevation."""
     path = risley.folder / "pattern.npy"
     risley("pattern", "--sensor", preset, "--format", "npy", "-o", path, "--duration-s", DURATION,
            *risley.start(preset))
     azimuth, elevation = np.load(path).T.astype(float)
-    x = np.cos(elevation) * np.cos(azimuth)
-    scale = np.sqrt(2 / (1 + x))  # Lambert's equal-area map
-    left, up = scale * np.cos(elevation) * np.sin(azimuth), scale * np.sin(elevation)
+    around = np.ptp(azimuth) > np.pi
+    if around:
+        left, up = azimuth, elevation
+    else:
+        x = np.cos(elevation) * np.cos(azimuth)
+        scale = np.sqrt(2 / (1 + x))  # Lambert's equal-area map
+        left, up = scale * np.cos(elevation) * np.sin(azimuth), scale * np.sin(elevation)
     half = 1.03 * max(np.abs(left).max(), np.abs(up).max())
     fine = 4  # steps of a pixel
     points = np.rint(fine * SIDE / 2 * np.stack([1 - left / half, 1 - up / half], 1)).astype(int)
@@ -90,7 +95,10 @@ def picture(risley, preset, emitters):
     for emitter in range(emitters):
         line = points[emitter::emitters][::thin]
         steps = np.diff(line, axis=0)
-        path = f"M{line[0][0]} {line[0][1]}l" + " ".join(f"{a} {b}" for a, b in steps)
+        if around:  # steps of a thinned scan go right around
+            path = "".join(f"M{a} {b}h1" for a, b in line)
+        else:
+            path = f"M{line[0][0]} {line[0][1]}l" + " ".join(f"{a} {b}" for a, b in steps)
         lines.append(f'<path d="{path.replace(" -", "-")}" stroke="{COLOURS[emitter]}"/>')
     degrees = np.degrees(half)
     bar = 10 if degrees > 12 else 2
@@ -99,7 +107,7 @@ def picture(risley, preset, emitters):
     text = (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size} {size}" width="{SIDE}" '
             f'height="{SIDE}" role="img"><title>{preset}: {DURATION} s</title>'
             f'<rect width="{size}" height="{size}" fill="#fff"/>'
-            f'<g fill="none" stroke-width="3" stroke-opacity="0.75">{"".join(lines)}</g>'
+            f'<g fill="none" stroke-width="{6 if around else 3}" stroke-opacity="0.75">{"".join(lines)}</g>'
             f'<path d="M40 {size - 40}h{length}" stroke="#1b1f24" stroke-width="6"/>'
             f'<text x="40" y="{size - 60}" font-family="sans-serif" font-size="56" fill="#1b1f24">'
             f'{bar}°</text></svg>\n')
@@ -125,15 +133,22 @@ def optics(risley, presets):
         values, faces, emitters = risley.values(preset)
         prisms, sources = [], []
         for letter, face in zip("abc", faces):
-            wedge = values.get("wedge_angle_deg") or values[f"wedge_angle_{letter}_deg"]
+            angles = [values[name] for name in (
+                f"entrance_face_{letter}_deg", f"exit_face_{letter}_deg",
+                f"mirror_face_{letter}_deg", f"wedge_angle_{letter}_deg") if name in values]
+            if not angles:
+                angles = [values["wedge_angle_deg"]]
+            wedge = angles[0]
             index = values.get("refractive_index") or values[f"refractive_index_{letter}"]
             speed = values[f"angular_velocity_{letter}_deg_per_s"]
-            prisms.append(f"{face} {wedge[0]:.6g}°, {index[0]:.6g}, {speed[0] / 6:+.6g} rpm")
+            shape = " and ".join(f"{angle[0]:.6g}°" for angle in angles)
+            prisms.append(f"{face} {shape}, {index[0]:.6g}, {speed[0] / 6:+.6g} rpm")
             sources += [short_source(one[1]) for one in (wedge, index, speed)]
         beams = f"{emitters}"
         if emitters > 1:
-            first = values["incident_beam_1_vertical_deg"][0]
-            last = values[f"incident_beam_{emitters}_vertical_deg"][0]
+            axis = "vertical" if values["incident_beam_1_vertical_deg"][0] else "horizontal"
+            first = values[f"incident_beam_1_{axis}_deg"][0]
+            last = values[f"incident_beam_{emitters}_{axis}_deg"][0]
             beams = f"{emitters}, {min(first, last):.4f}° to {max(first, last):.4f}°"
         rows.append((f"`{preset}`", "<br>".join(prisms), beams,
                      "<br>".join(dict.fromkeys(sources))))
@@ -153,9 +168,13 @@ def gallery(presets):
     return lines
 
 
+def seen_as_a_disc(presets):
+    return [one for one in presets if not one.startswith("mid-360")]
+
+
 def coverage(risley, presets):
     rows = []
-    for preset in presets:
+    for preset in seen_as_a_disc(presets):
         found = risley.json("pattern", "--sensor", preset, "--coverage",
                             *risley.start(preset))["coverage"]
         field = found["field_of_view"]
@@ -170,7 +189,7 @@ def coverage(risley, presets):
 
 def carried(risley, presets):
     rows = []
-    for preset in presets:
+    for preset in seen_as_a_disc(presets):
         made = risley.json("pattern", "--sensor", preset, "--format", "helios-xml", "-o",
                            risley.folder / "scanner.xml", *risley.start(preset))
         residual = made["residual"]

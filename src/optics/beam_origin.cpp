@@ -51,12 +51,7 @@ std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
   const auto thickness = one_each("thickness", geometry.thickness, prisms);
   const auto spacing = one_each("spacing", geometry.spacing, prisms - 1);
   std::vector<double> positions(2 * prisms);
-  if (layout.reflects()) {
-    for (const double size :
-         {*std::ranges::max_element(thickness), *std::ranges::max_element(spacing)})
-      require_between("thickness or spacing of elements that reflect", size, 0, 0);
-    return positions;
-  }
+  if (layout.reflects()) return positions;
   double perpendicular = 0;
   for (std::size_t prism = prisms; prism-- > 0;) {
     if (prism + 1 < prisms) perpendicular -= spacing[prism];

@@ -24,7 +24,10 @@ Json page_of(TrainShape shape, const std::vector<jobs::ReadRecording>& recording
     list.push_back({{"name", file_name(one.path)}});
     list.back().update(json::of(one));
   }
-  return {{"prisms", int{shape.prisms}}, {"emitters", shape.emitters}, {"recordings", list}};
+  return {{"prisms", int{shape.prisms}},
+          {"reflects", shape.prisms.reflects()},
+          {"emitters", shape.emitters},
+          {"recordings", list}};
 }
 
 Json correlation_json(const std::vector<std::string>& names, const Eigen::MatrixXd& covariance) {
@@ -48,7 +51,10 @@ Json correlation_json(const std::vector<estimation::FreeParameter>& free,
 
 TrainShape shape_of(const View& report) {
   const View page = report["page"];
-  return {static_cast<int>(page["prisms"].count()), static_cast<int>(page["emitters"].count())};
+  const TrainLayout layout = page["reflects"].flag()
+                                 ? kWedgeAndReflector
+                                 : TrainLayout(static_cast<int>(page["prisms"].count()));
+  return {layout, static_cast<int>(page["emitters"].count())};
 }
 
 std::string file_name(const std::string& path) { return path.substr(path.find_last_of('/') + 1); }

@@ -161,6 +161,11 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
         fmt::format("sensor \"{}\" has {} prisms, a scanner of HELIOS++ can have {} at most",
                     sensor.name, prisms, kHeliosPrisms));
   }
+  if (sensor.train.layout().reflects()) {
+    throw InvalidArgument(fmt::format(
+        "sensor \"{}\" reflects its beam within glass, a scanner of HELIOS++ has prisms alone",
+        sensor.name));
+  }
   if (options.every != 1) {
     throw InvalidArgument(fmt::format(
         "every = {}, allowed 1: a scanner of HELIOS++ has prisms instead of rows", options.every));

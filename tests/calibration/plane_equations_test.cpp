@@ -145,7 +145,7 @@ struct Reference {
       row[columns.normal(1)] = range.v[kParameters + N + 1];
       row[columns.distance()] = range.v[kParameters + N + 2];
 
-      Eigen::MatrixXd covariance(N, N);
+      Eigen::MatrixXd covariance(int{N}, int{N});
       std::size_t pair = 0;
       for (int k = 0; k < N; ++k) {
         for (int l = k; l < N; ++l) {
@@ -153,7 +153,7 @@ struct Reference {
               static_cast<double>(shots.angle_covariance[pair++][i]);
         }
       }
-      const Eigen::VectorXd slopes = row.segment(columns.rotation_angle(0), N);
+      const Eigen::VectorXd slopes = row.segment(columns.rotation_angle(0), int{N});
       variance[i] = view.range_variance + slopes.dot(covariance * slopes);
       const double weight = 1.0 / variance[i];
       cost += weight * residual[i] * residual[i];

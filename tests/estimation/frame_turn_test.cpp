@@ -19,12 +19,12 @@ TEST(FrameTurn, ItsOpticalAxisPointsToYawAndMinusPitch) {
       EXPECT_NEAR(std::atan2(axis.y(), axis.x()), yaw, 1e-12);
       EXPECT_NEAR(std::asin(axis.z()), -pitch, 1e-12);
       EXPECT_NEAR(rotation.col(1).z(), 0.0, 1e-15);  // no roll: Y stays level
-      const FrameTurn back = turn_of(rotation);
+      const FrameTurn back = turn_of(rotation, false);
       EXPECT_NEAR(back.yaw, yaw, 1e-12);
       EXPECT_NEAR(back.pitch, pitch, 1e-12);
       const Eigen::Matrix3d rolled =
           rotation * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitX()).toRotationMatrix();
-      EXPECT_NEAR(turn_of(rolled).yaw, yaw, 1e-12);  // a roll does not move the axis
+      EXPECT_NEAR(turn_of(rolled, false).yaw, yaw, 1e-12);  // a roll does not move the axis
     }
   }
 }
@@ -59,13 +59,13 @@ TEST(FrameTurn, ShotsTurnedThereAndBackAreTheSame) {
 
 TEST(FrameTurn, SmallFurtherTurnsMoveTheAxisAsTheyShould) {
   const Eigen::Matrix3d first = recording_from_sensor({0.4, 0.3});
-  const Eigen::Matrix3d further = turned_further(first, {1e-4, -2e-4});
+  const Eigen::Matrix3d further = turned_further(first, {1e-4, -2e-4}, false);
   // Yaw moves the axis along the sensor's Y, pitch against its Z.
   const Eigen::Vector3d moved = first.transpose() * further.col(0);
   EXPECT_NEAR(moved.y(), 1e-4, 1e-8);
   EXPECT_NEAR(moved.z(), 2e-4, 1e-8);
   EXPECT_NEAR(further.col(1).z(), 0.0, 1e-15);
-  EXPECT_EQ(turned_further(first, {0.0, 0.0}), first);
+  EXPECT_EQ(turned_further(first, {0.0, 0.0}, false), first);
 }
 
 }  // namespace risley::estimation::frame_turn_test

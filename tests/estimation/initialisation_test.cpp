@@ -59,7 +59,7 @@ TEST_P(StartOfRandomSensors, AlwaysFindsCombinationSpeedsAndAngles) {
     };
     EXPECT_FALSE(found_mirrored(head));
     AngleSeries turned = head;
-    mirror(turned);
+    mirror(turned, false);
     EXPECT_TRUE(found_mirrored(turned));
   }
 }

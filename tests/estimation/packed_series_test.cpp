@@ -175,8 +175,8 @@ TEST(PackedSeries, IsThinnedByTicksAndBeams) {
 TEST(PackedSeries, ChangesRows) {
   AngleSeries series = even_shots();
   PackedSeries packed(series);
-  packed.change([](AngleSeries& rows) { mirror(rows); });
-  mirror(series);
+  packed.change([](AngleSeries& rows) { mirror(rows, false); });
+  mirror(series, false);
   expect_same(packed.rows(), series);
 }
 

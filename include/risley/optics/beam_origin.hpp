@@ -39,9 +39,9 @@ std::vector<PrismSize> own_prism_sizes(int prisms);
 
 /// X of the points where the faces, in beam order, cross the axis, m [2 prisms]. The perpendicular
 /// face of the last prism stands at 0, where the frame has its origin. Zeros where an element
-/// reflects, see beam_path().
+/// reflects, whatever the geometry: see beam_path().
 /// @throws InvalidArgument for a number of prisms that no train has, and for a geometry of another
-///         number of prisms or with sizes that are not finite or, where an element reflects, not 0
+///         number of prisms or with sizes that are not finite
 std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
                                    const PrismGeometry& geometry);
 

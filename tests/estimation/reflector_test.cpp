@@ -1,0 +1,93 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// A wedge and a reflector about an upright axis, as the Mid-360 has them.
+#include <random>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "risley/core/angle.hpp"
+#include "risley/estimation/estimate.hpp"
+#include "risley/estimation/frame_turn.hpp"
+#include "risley/estimation/sensor_recognition.hpp"
+#include "risley/optics/observation_model.hpp"
+#include "risley/sensors/preset.hpp"
+
+namespace risley::estimation::reflector_test {
+
+/// A unit that is off in all that the preset calls uncertain.
+sensors::Sensor random_unit(unsigned seed) {
+  sensors::Sensor unit = sensors::load_sensor("mid-360");
+  std::mt19937 generator(seed);
+  std::normal_distribution<double> normal;
+  for (const sensors::Knowledge& known : unit.knowledge) {
+    if (!(known.sigma > 0) || known.name.starts_with("angular")) continue;
+    unit.set(known.name, unit.get(known.name) + known.sigma * normal(generator));
+  }
+  return unit;
+}
+
+/// Shots every 5 us, in turn of the emitters.
+AngleSeries shots_of(const sensors::Sensor& unit, std::size_t shots, unsigned seed) {
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal(0.0, unit.angle_noise);
+  AngleSeries series;
+  for (std::size_t i = 0; i < shots; ++i) {
+    const std::int64_t ns = 5000 * static_cast<std::int64_t>(i);
+    const double t = 1e-9 * static_cast<double>(ns);
+    const int emitter = static_cast<int>(i % 4);
+    const std::array<double, 2> angles{1.0 + t * unit.angular_velocity[0],
+                                       2.5 + t * unit.angular_velocity[1]};
+    const Observation shot = observe(unit.train, angles, emitter);
+    series.append(ns, shot.azimuth + normal(generator), shot.zenith + normal(generator));
+    series.beam.back() = static_cast<std::uint8_t>(emitter);
+  }
+  return series;
+}
+
+TEST(Reflector, UnitsAreEstimatedToTheirNoise) {
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    SCOPED_TRACE(seed);
+    const sensors::Sensor unit = random_unit(seed);
+    const AngleSeries series = shots_of(unit, 40'000, seed);
+    EstimateOptions options;
+    options.sensor = sensors::load_sensor("mid-360");
+    const Estimate found = estimate(Method::map, series, series, options);
+    ASSERT_TRUE(found.converged) << found.reason;
+    EXPECT_FALSE(found.mirrored);
+    EXPECT_NEAR(found.rms_residual.zenith, unit.angle_noise, 0.03 * unit.angle_noise);
+    for (const int place : {place::prism_tilt_vertical(0), place::wedge_angle(0),
+                            place::wedge_angle(1), place::prism_tilt_horizontal(1)}) {
+      EXPECT_NEAR(found.sensor.train[place], unit.train[place], radians_from_degrees(0.6)) << place;
+    }
+  }
+}
+
+TEST(Reflector, IsRecognisedAmongAllPresets) {
+  std::vector<sensors::Sensor> candidates;
+  for (const char* name : {"mid-40", "mid-70", "avia", "horizon", "tele-15", "mid-360"}) {
+    candidates.push_back(sensors::load_sensor(name));
+  }
+  const SensorRecognition found =
+      recognise_sensor(shots_of(random_unit(4), 40'000, 4), candidates, BeamSource::recorded);
+  EXPECT_TRUE(found.fits);
+  EXPECT_TRUE(found.decided);
+  EXPECT_EQ(candidates[found.matches.front().candidate].name, "mid-360");
+}
+
+TEST(Reflector, ItsFrameTurnsAboutTheSensorsXAndY) {
+  const FrameTurn turn{0.2, -0.1, true};
+  const Eigen::Matrix3d rotation = recording_from_sensor(turn);
+  const FrameTurn back = turn_of(rotation, true);
+  EXPECT_NEAR(back.yaw, turn.yaw, 1e-15);
+  EXPECT_NEAR(back.pitch, turn.pitch, 1e-15);
+  const Eigen::Matrix3d rolled =
+      rotation * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  EXPECT_NEAR(turn_of(rolled, true).yaw, turn.yaw, 1e-14);
+  // A small yaw is about the sensor's Y and moves its Z along X; a small pitch is about its X.
+  const Eigen::Matrix3d small = turned_further(Eigen::Matrix3d::Identity(), {1e-4, 2e-4}, true);
+  EXPECT_NEAR(small(0, 2), 1e-4, 1e-8);
+  EXPECT_NEAR(small(1, 2), -2e-4, 1e-8);
+}
+
+}  // namespace risley::estimation::reflector_test
