@@ -55,7 +55,7 @@ TEST(Reflector, UnitsAreEstimatedToTheirNoise) {
     const Estimate found = estimate(Method::map, series, series, options);
     ASSERT_TRUE(found.converged) << found.reason;
     EXPECT_FALSE(found.mirrored);
-    EXPECT_NEAR(found.rms_residual.zenith, unit.angle_noise, 0.03 * unit.angle_noise);
+    EXPECT_NEAR(found.expected_residual, unit.angle_noise, 0.03 * unit.angle_noise);
     for (const int place : {place::prism_tilt_vertical(0), place::wedge_angle(0),
                             place::wedge_angle(1), place::prism_tilt_horizontal(1)}) {
       EXPECT_NEAR(found.sensor.train[place], unit.train[place], radians_from_degrees(0.6)) << place;
