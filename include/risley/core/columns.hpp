@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <iterator>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+namespace risley {
+
+// Tables of columns are structs whose columns a list describes, once. Each entry of such a list
+// is a place, or says in `place`, where the table has the column, or several alike within arrays
+// and vectors.
+
+/// A place: a pointer to a member of one of some types.
+template <class Table, class... Columns>
+using ColumnPlace = std::variant<Columns Table::*...>;
+
+/// Calls visit(column...) with a column of numbers of every table, or with each of those within
+/// columns of columns, in order. Tables after the first must have as many.
+template <class Visit, class First, class... Others>
+void visit_numbers(const Visit& visit, First& first, Others&... others) {
+  if constexpr (std::is_arithmetic_v<typename First::value_type>) {
+    visit(first, others...);
+  } else {
+    for (std::size_t i = 0; i < first.size(); ++i) visit_numbers(visit, first[i], others[i]...);
+  }
+}
+
+/// Calls visit(entry, column...) for every column of numbers that the list describes, whose types
+/// the compiler knows.
+template <const auto& List, class Visit, class... Tables>
+void for_each_entry(const Visit& visit, Tables&... tables) {
+  const auto one = [&]<std::size_t I>() {
+    constexpr auto any = [] {
+      if constexpr (requires { List[I].place; }) {
+        return List[I].place;
+      } else {
+        return List[I];
+      }
+    }();
+    constexpr auto place = std::get<any.index()>(any);
+    visit_numbers([&](auto&... columns) { visit(List[I], columns...); }, (tables.*place)...);
+  };
+  [&]<std::size_t... I>(std::index_sequence<I...>) { (one.template operator()<I>(), ...); }
+  (std::make_index_sequence<std::size(List)>());
+}
+
+/// The same with visit(column...).
+template <const auto& List, class Visit, class... Tables>
+void for_each_column(const Visit& visit, Tables&... tables) {
+  for_each_entry<List>([&](const auto&, auto&... columns) { visit(columns...); }, tables...);
+}
+
+}  // namespace risley
