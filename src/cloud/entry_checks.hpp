@@ -27,6 +27,7 @@ inline void require_columns(const Points& points, const CloudHeader& header, std
   require_length("loading", points.loading.size(), header.factors.size());
   for_each_entry<kPointColumns>(
       [&](const PointColumn& entry, const auto& column) {
+        if (entry.is(PointColumn::kDerived)) return;
         require_length(entry.variable.substr(0, entry.variable.find("_{")), column.size(),
                        header.announces(entry) ? rows : 0);
       },

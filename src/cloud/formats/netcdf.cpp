@@ -132,7 +132,7 @@ class NetcdfWriter final : public CloudWriter {
     if (axis != 0 && axis != 'T' && header.has_covariance) {
       file_.put_text(variable, "ancillary_variables", "std_" + field.variable);
     }
-    if (field.column->is(PointColumn::kHasUnknown)) {
+    if (field.column->is(PointColumn::kHasUnknown)) {  // all of them are float32
       file_.set_fill(variable, std::numeric_limits<float>::quiet_NaN());
     }
   }

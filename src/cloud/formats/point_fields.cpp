@@ -18,10 +18,10 @@ namespace risley::cloud {
 namespace {
 
 /// Rows that are worked on together: what is read and written stays in the cache.
-constexpr std::size_t kBlock = 256;
+constexpr std::size_t kPackedRows = 256;
 
-/// Square roots of up to kBlock numbers. std::sqrt sets errno below zero, which keeps compilers
-/// from taking several at once.
+/// Square roots of up to kPackedRows numbers. std::sqrt sets errno below zero, which keeps
+/// compilers from taking several at once.
 void square_roots(const double* from, std::size_t count, double* to) {
   using Batch = xsimd::batch<double>;
   const std::size_t whole = count - count % Batch::size;
@@ -100,9 +100,9 @@ void PointField::store(const Points& points, std::size_t first, std::size_t rows
         } else if constexpr (std::is_same_v<typename Column::value_type, std::vector<double>>) {
           const double* from = all[index].data() + first;
           if (!column->is(PointColumn::kDerived)) return put(from, rows);
-          double roots[kBlock];
-          for (std::size_t i = 0; i < rows; i += kBlock, to += kBlock * stride) {
-            const std::size_t count = std::min(kBlock, rows - i);
+          double roots[kPackedRows];
+          for (std::size_t i = 0; i < rows; i += kPackedRows, to += kPackedRows * stride) {
+            const std::size_t count = std::min(kPackedRows, rows - i);
             square_roots(from + i, count, roots);
             put(roots, count);
           }
@@ -178,8 +178,8 @@ RecordPacker::RecordPacker(std::vector<PointField> fields) : fields_(std::move(f
 
 void RecordPacker::pack(const Points& points, std::size_t first, std::size_t rows,
                         std::uint8_t* out, std::size_t stride) const {
-  for (const std::size_t end = first + rows; first < end; first += kBlock) {
-    const std::size_t count = std::min(kBlock, end - first);
+  for (const std::size_t end = first + rows; first < end; first += kPackedRows) {
+    const std::size_t count = std::min(kPackedRows, end - first);
     for (std::size_t k = 0; k < fields_.size(); ++k) {
       fields_[k].store(points, first, count, out + offsets_[k], stride);
     }
