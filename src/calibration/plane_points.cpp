@@ -97,6 +97,8 @@ void take_shots(const estimation::Estimate& estimate, RangedRecording& recording
 
 }  // namespace
 
+static_assert(lists_all_columns<RangedShots, kRangedShotColumns>());
+
 void RangedShots::resize(int prisms, std::size_t shots) {
   require_between("number of prisms", prisms, 1, kMaxPrisms);
   rotation_angle.resize(prisms);

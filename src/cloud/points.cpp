@@ -9,6 +9,8 @@
 
 namespace risley::cloud {
 
+static_assert(lists_all_columns<Points, kPointColumns>());
+
 void Points::keep(std::span<const std::size_t> rows) {
   require_rows(rows, size());
   for_each_entry<kPointColumns>(

@@ -6,6 +6,9 @@
 
 namespace risley::estimation {
 
+static_assert(lists_all_columns<RotorStates, kRotorStateColumns>());
+static_assert(lists_all_columns<AngleSeries, kSeriesColumns>());
+
 void RotorStates::resize(int prisms, std::size_t shots) {
   const auto n = static_cast<std::size_t>(prisms);
   for (auto* columns : {&rotation_angle, &angular_velocity, &angular_velocity_sigma}) {

@@ -13,6 +13,8 @@
 
 namespace risley::recordings {
 
+static_assert(lists_all_columns<Observations, kObservationColumns>());
+
 void Observations::clear() {
   for_each_column<kObservationColumns>([](auto& column) { column.clear(); }, *this);
 }
