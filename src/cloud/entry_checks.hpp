@@ -25,13 +25,10 @@ inline void require_columns(const Points& points, const CloudHeader& header, std
   require_length("rotation_angle", points.rotation_angle.size(),
                  header.has_rotation_angles ? header.prisms : 0);
   require_length("loading", points.loading.size(), header.factors.size());
-  for_each_entry<kPointColumns>(
-      [&](const PointColumn& entry, const auto& column) {
-        if (entry.is(PointColumn::kDerived)) return;
-        require_length(entry.variable.substr(0, entry.variable.find("_{")), column.size(),
-                       header.announces(entry) ? rows : 0);
-      },
-      points);
+  for_each_point_column(points, [&](const PointColumn& entry, const auto& column) {
+    require_length(entry.variable.substr(0, entry.variable.find("_{")), column.size(),
+                   header.announces(entry) ? rows : 0);
+  });
 }
 
 }  // namespace risley::cloud

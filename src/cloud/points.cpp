@@ -13,11 +13,7 @@ static_assert(lists_all_columns<Points, kPointColumns>());
 
 void Points::keep(std::span<const std::size_t> rows) {
   require_rows(rows, size());
-  for_each_entry<kPointColumns>(
-      [rows](const PointColumn& entry, auto& column) {
-        if (!entry.is(PointColumn::kDerived)) keep_rows(column, rows);
-      },
-      *this);
+  for_each_point_column(*this, [rows](const auto&, auto& column) { keep_rows(column, rows); });
 }
 
 bool CloudHeader::announces(const PointColumn& column) const {
@@ -28,9 +24,9 @@ void CloudHeader::resize(Points& points, std::size_t rows) const {
   require_between("number of prisms", prisms, 1, kMaxPrisms);
   points.rotation_angle.resize(has_rotation_angles ? prisms : 0);
   points.loading.resize(factors.size());
-  for_each_entry<kPointColumns>(
-      [&](const PointColumn& entry, auto& column) { column.resize(announces(entry) ? rows : 0); },
-      points);
+  for_each_point_column(points, [&](const PointColumn& entry, auto& column) {
+    column.resize(announces(entry) ? rows : 0);
+  });
 }
 
 }  // namespace risley::cloud

@@ -189,4 +189,14 @@ inline constexpr auto kPointColumns = [] {
   });
 }();
 
+/// Calls visit(entry, column) for every column of numbers of points, once for each.
+template <class AnyPoints, class Visit>
+void for_each_point_column(AnyPoints& points, const Visit& visit) {
+  for_each_entry<kPointColumns>(
+      [&visit](const PointColumn& entry, auto& column) {
+        if (!entry.is(PointColumn::kDerived)) visit(entry, column);
+      },
+      points);
+}
+
 }  // namespace risley::cloud
