@@ -38,7 +38,10 @@ class NetcdfWriter final : public CloudWriter {
   void write(const Points& points) override {
     for (std::size_t first = 0; first < points.size();) {
       const std::size_t count = std::min(points.size() - first, kChunkRows - rows_);
-      for (const Variable& variable : variables_) variable.fill(points, first, count, rows_);
+      for (const Variable& variable : variables_) {
+        const std::size_t bytes = variable.packer.record_bytes();
+        variable.packer.pack(points, first, count, variable.block + rows_ * bytes, bytes);
+      }
       rows_ += count;
       first += count;
       if (rows_ == kChunkRows) put_block();
@@ -53,20 +56,10 @@ class NetcdfWriter final : public CloudWriter {
  private:
   /// One variable with its rows that are not in the file yet.
   struct Variable {
-    std::vector<PointField> fields;  ///< one per entry of the inner dimension
-    std::size_t number_bytes;
-    std::uint8_t* block;  ///< [kChunkRows][fields]
+    RecordPacker packer;  ///< of a record with one number per entry of the inner dimension
+    std::uint8_t* block;  ///< [kChunkRows] records
     /// Writes the block's first rows at row `first` of the file.
     std::function<void(std::size_t first, std::size_t rows)> put;
-
-    /// Stores points [first, first + count) as rows from `row` of the block on.
-    void fill(const Points& points, std::size_t first, std::size_t count, std::size_t row) const {
-      const std::size_t row_bytes = fields.size() * number_bytes;
-      for (std::size_t k = 0; k < fields.size(); ++k) {
-        fields[k].store(points, first, count, block + row * row_bytes + k * number_bytes,
-                        row_bytes);
-      }
-    }
   };
 
   void put_attributes(const CloudHeader& header) {
@@ -104,7 +97,7 @@ class NetcdfWriter final : public CloudWriter {
         put_attributes(variable, fields.front(), header);
         const auto block = std::make_shared<std::vector<T>>(kChunkRows * fields.size());
         variables_.push_back(
-            {std::move(fields), sizeof(T), reinterpret_cast<std::uint8_t*>(block->data()),
+            {RecordPacker(std::move(fields)), reinterpret_cast<std::uint8_t*>(block->data()),
              [this, block, variable](std::size_t first, std::size_t rows) {
                file_.put(variable, first, std::span<const T>(*block).first(rows * variable.width));
              }});

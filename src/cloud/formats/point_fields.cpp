@@ -67,7 +67,9 @@ Words words_of_term(CovarianceTerm term, bool deviation) {
 const TypeNames& names_of(PointType type) {
   static constexpr TypeNames kNames[] = {{1, "|u1", "uchar", 'U', 2, 1},
                                          {4, "<f4", "float", 'F', 7, 9},
-                                         {8, "<f8", "double", 'F', 8, 10}};
+                                         {8, "<f8", "double", 'F', 8, 10},
+                                         {4, "<i4", "int", 'I', 5, 6},
+                                         {8, "<i8", nullptr, 'I', 0, 8}};
   return kNames[static_cast<int>(type)];
 }
 

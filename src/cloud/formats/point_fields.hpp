@@ -11,7 +11,7 @@
 
 namespace risley::cloud {
 
-/// What formats call a type that records have.
+/// What formats call a type, as far as they have it.
 struct TypeNames {
   std::size_t bytes;
   const char *npy, *ply;
