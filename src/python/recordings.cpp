@@ -246,8 +246,11 @@ void bind_column(py::class_<Recording, SharedRecording>& type,
                  const recordings::ObservationColumn& entry) {
   std::visit(
       [&]<class T>(std::vector<T> Observations::*column) {
-        std::string doc = fmt::format("{} ({}). {}.", entry.meaning, entry.unit,
-                                      std::string(py::str(py::dtype::of<T>())));
+        constexpr const char* kNumbers = std::is_same_v<T, std::int64_t> ? "int64"
+                                         : std::is_same_v<T, double>     ? "float64"
+                                         : std::is_same_v<T, float>      ? "float32"
+                                                                         : "uint8";
+        std::string doc = fmt::format("{} ({}). {}.", entry.meaning, entry.unit, kNumbers);
         doc.front() = static_cast<char>(std::toupper(doc.front()));
         type.def_property_readonly(
             entry.name,
