@@ -22,7 +22,6 @@
 #include "calibration/range_terms.hpp"
 #include "calibration/same_walls.hpp"
 #include "calibration/shot_blocks.hpp"
-#include "calibration/shot_columns.hpp"
 #include "calibration/verdict.hpp"
 #include "calibration/wall_flatness.hpp"
 #include "calibration/wall_matching.hpp"
@@ -82,7 +81,7 @@ RangedShots shifted(const RangedShots& shots, const std::vector<double>& shift) 
       if (from.empty()) return;  // emitters that are not known
       std::copy(from.data() + begin, from.data() + end, to.data() + begin);
     };
-    for_each_column(copy, shots, result);
+    for_each_column<kRangedShotColumns>(copy, shots, result);
     for (std::size_t k = 0; k < shift.size(); ++k) {
       for (std::size_t i = begin; i < end; ++i) result.rotation_angle[k][i] += shift[k];
     }

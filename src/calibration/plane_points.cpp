@@ -16,7 +16,6 @@
 #include "risley/parallel/parallel.hpp"
 
 #include "calibration/shot_blocks.hpp"
-#include "calibration/shot_columns.hpp"
 
 namespace risley::calibration {
 namespace {
@@ -91,12 +90,14 @@ void take_shots(const estimation::Estimate& estimate, RangedRecording& recording
     const auto put = [at = first[number]](const auto& from, auto& to) {
       std::ranges::copy(from, to.begin() + at);
     };
-    for_each_column(put, block.shots, shots);
+    for_each_column<kRangedShotColumns>(put, block.shots, shots);
     put(block.time_ns, recording.time_ns);
   });
 }
 
 }  // namespace
+
+static_assert(lists_all_columns<RangedShots, kRangedShotColumns>());
 
 void RangedShots::resize(int prisms, std::size_t shots) {
   require_between("number of prisms", prisms, 1, kMaxPrisms);
@@ -133,7 +134,7 @@ RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& ro
       if (from.empty()) return;  // emitters that are not known
       for (std::size_t i = begin; i < end; ++i) to[i] = from[rows[i]];
     };
-    for_each_column(take, shots, result);
+    for_each_column<kRangedShotColumns>(take, shots, result);
   });
   return result;
 }

@@ -25,7 +25,7 @@ class CheckedWriter final : public CloudWriter {
       : writer_(std::move(writer)), path_(std::move(path)), header_(std::move(header)) {}
 
   void write(const Points& points) override {
-    require_columns(points, header_);
+    require_columns(points, header_, points.size());
     require_sound();
     sound_ = false;  // unless all goes well
     writer_->write(points);

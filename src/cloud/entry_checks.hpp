@@ -8,8 +8,6 @@
 #include "risley/cloud/sensor_poses.hpp"
 #include "risley/core/require.hpp"
 
-#include "cloud/point_columns.hpp"
-
 namespace risley::cloud {
 
 inline void require_poses(const SensorPoses& poses, std::size_t shots) {
@@ -22,29 +20,15 @@ inline void require_poses(const SensorPoses& poses, std::size_t shots) {
   }
 }
 
-/// The columns that compute_points() fills, as far as a header announces them.
-inline void require_computed_columns(const Points& points, const CloudHeader& header,
-                                     std::size_t rows) {
-  if (header.has_rotation_angles) {
-    require_length("rotation_angle", points.rotation_angle.size(), header.prisms);
-  }
+/// All columns are as a header announces them, with so many rows or none.
+inline void require_columns(const Points& points, const CloudHeader& header, std::size_t rows) {
+  require_length("rotation_angle", points.rotation_angle.size(),
+                 header.has_rotation_angles ? header.prisms : 0);
   require_length("loading", points.loading.size(), header.factors.size());
-  visit_computed_columns(points, header, [rows](const auto& column, const char* name, bool there) {
-    if (there) require_length(name, column.size(), rows);
+  for_each_point_column(points, [&](const PointColumn& entry, const auto& column) {
+    require_length(entry.variable.substr(0, entry.variable.find("_{")), column.size(),
+                   header.announces(entry) ? rows : 0);
   });
-  for (const auto& column : points.own_covariance) {
-    require_length("own_covariance", column.size(), header.has_own_covariance ? rows : 0);
-  }
-}
-
-/// All columns that a header announces.
-inline void require_columns(const Points& points, const CloudHeader& header) {
-  const std::size_t rows = points.size();
-  require_computed_columns(points, header, rows);
-  visit_columns(points, header, [rows](const auto& column, const char* name, bool there) {
-    if (there) require_length(name, column.size(), rows);
-  });
-  require_length("point_source", points.point_source.size(), header.has_point_source ? rows : 0);
 }
 
 }  // namespace risley::cloud

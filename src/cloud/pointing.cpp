@@ -178,17 +178,12 @@ class ColumnPointers {
 /// Of fewer shots than a group has: filled up.
 void compute_few_points(const PointingModel& model, const CloudHeader& header, PointedShots shots,
                         Points& points, SensorPoses poses, InstructionSet set) {
-  const auto resize = [&](std::size_t rows) {
-    visit_computed_columns(points, header, [rows](auto& column, const char*, bool there) {
-      if (there) column.resize(rows);
-    });
-  };
   const std::size_t count = shots.size();
   shots.resize(model.train.prisms(), kPointPadding);
   if (model.moves) poses.resize(kPointPadding);
-  resize(kPointPadding);
+  header.resize(points, kPointPadding);
   compute_points(model, header, shots, points, poses, set);
-  resize(count);
+  header.resize(points, count);
 }
 
 }  // namespace
@@ -214,7 +209,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   require_model(model);
   require_shots(model, header, shots);
   require_poses(poses, model.moves ? shots.size() : 0);
-  require_computed_columns(points, header, shots.size());
+  require_columns(points, header, shots.size());
   if (shots.size() > 0 && shots.size() < kPointPadding) {
     compute_few_points(model, header, shots, points, poses, set);
     return;

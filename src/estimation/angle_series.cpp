@@ -55,6 +55,10 @@ void AngleSeries::append(std::int64_t shot_time_ns, double shot_azimuth, double 
   zenith_rounding_variance.push_back(shot_zenith_variance);
 }
 
+void AngleSeries::clear() {
+  for_each_column<kSeriesColumns>([](auto& column) { column.clear(); }, *this);
+}
+
 void AngleSeries::append(const AngleSeries& other, std::size_t row) {
   require_place("row", row, other.size());
   append(other.time_ns[row], other.azimuth[row], other.zenith[row], other.beam[row],

@@ -137,15 +137,6 @@ class BlockFit {
     step_towards(equations_, prior, state);
   }
 
-  static void clear(AngleSeries& series) {
-    series.time_ns.clear();
-    series.azimuth.clear();
-    series.zenith.clear();
-    series.beam.clear();
-    series.azimuth_rounding_variance.clear();
-    series.zenith_rounding_variance.clear();
-  }
-
   const PrismTrain& train_;
   AngleSeries block_;
   ShotWeights weights_;

@@ -19,14 +19,12 @@ namespace risley::estimation {
 
 /// Columns of one length; beams and ranges may be left out.
 inline void require_columns(const AngleSeries& series) {
-  const std::size_t size = series.size();
-  require_length("azimuth", series.azimuth.size(), size);
-  require_length("zenith", series.zenith.size(), size);
-  require_length_or_none("beam", series.beam.size(), size);
-  require_length("azimuth_rounding_variance", series.azimuth_rounding_variance.size(), size);
-  require_length("zenith_rounding_variance", series.zenith_rounding_variance.size(), size);
-  require_length_or_none("range", series.range.size(), size);
-  require_length_or_none("intensity", series.intensity.size(), size);
+  for_each_entry<kSeriesColumns>(
+      [&series](const SeriesColumn& entry, const auto& column) {
+        (entry.optional ? require_length_or_none : require_length)(entry.name, column.size(),
+                                                                   series.size());
+      },
+      series);
 }
 
 /// A start with an angle and a speed for every prism of a train.

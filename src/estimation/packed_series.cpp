@@ -360,12 +360,7 @@ void PackedSeries::pack_tail() {
   if (has_ranges_) block.intensity = mostly(tail_.intensity);
   block.azimuth = Angles(tail_.azimuth, block.azimuth_variance, azimuth_grid_);
   block.zenith = Angles(tail_.zenith, block.zenith_variance, zenith_grid_);
-  for (auto* column : {&tail_.azimuth, &tail_.zenith, &tail_.range}) column->clear();
-  tail_.time_ns.clear();
-  tail_.beam.clear();
-  tail_.intensity.clear();
-  tail_.azimuth_rounding_variance.clear();
-  tail_.zenith_rounding_variance.clear();
+  tail_.clear();
 }
 
 std::vector<ShotRange> stretches(const PackedSeries& series, double longest_gap) {

@@ -105,7 +105,7 @@ class PacketFitter : private BlockFit {
 
  private:
   void load(std::size_t packet) {
-    clear(block_);
+    block_.clear();
     for (std::size_t i = begin(packet); i < begin(packet) + size(packet); ++i) {
       block_.append(series_, i);
     }

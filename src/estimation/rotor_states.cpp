@@ -6,25 +6,28 @@
 
 namespace risley::estimation {
 
+static_assert(lists_all_columns<RotorStates, kRotorStateColumns>());
+static_assert(lists_all_columns<AngleSeries, kSeriesColumns>());
+
+void RotorStates::resize(int prisms, std::size_t shots) {
+  const auto n = static_cast<std::size_t>(prisms);
+  for (auto* columns : {&rotation_angle, &angular_velocity, &angular_velocity_sigma}) {
+    columns->resize(n);
+  }
+  rotation_angle_covariance.resize(n * (n + 1) / 2);
+  for_each_column<kRotorStateColumns>([shots](auto& column) { column.resize(shots); }, *this);
+}
+
 RotorStates rows_of(const RotorStates& all, ShotRange shots) {
   require_rows("shots", shots.begin, shots.end, all.size());
   RotorStates rows;
-  const auto cut = [&](const auto& from, auto& to) {
-    to.assign(from.begin() + static_cast<std::ptrdiff_t>(shots.begin),
-              from.begin() + static_cast<std::ptrdiff_t>(shots.end));
-  };
-  const auto cut_all = [&](const auto& from, auto& to) {
-    to.resize(from.size());
-    for (std::size_t i = 0; i < from.size(); ++i) cut(from[i], to[i]);
-  };
-  cut(all.time_ns, rows.time_ns);
-  cut_all(all.rotation_angle, rows.rotation_angle);
-  cut_all(all.angular_velocity, rows.angular_velocity);
-  cut_all(all.rotation_angle_covariance, rows.rotation_angle_covariance);
-  cut_all(all.angular_velocity_sigma, rows.angular_velocity_sigma);
-  cut(all.azimuth_residual, rows.azimuth_residual);
-  cut(all.zenith_residual, rows.zenith_residual);
-  cut(all.outlier, rows.outlier);
+  rows.resize(all.prisms(), 0);
+  for_each_column<kRotorStateColumns>(
+      [shots](const auto& from, auto& to) {
+        to.assign(from.begin() + static_cast<std::ptrdiff_t>(shots.begin),
+                  from.begin() + static_cast<std::ptrdiff_t>(shots.end));
+      },
+      all, rows);
   return rows;
 }
 

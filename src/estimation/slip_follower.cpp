@@ -173,7 +173,7 @@ class Follower : private BlockFit {
   }
 
   void load(std::size_t begin, std::size_t end, std::int64_t lag) {
-    clear(block_);
+    block_.clear();
     for (std::size_t place = begin; place < end; ++place) {
       shots_.append_to(block_, shot_at(place), lag);
     }

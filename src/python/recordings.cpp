@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -9,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -240,15 +242,24 @@ SharedRecording recording_from_arrays(const py::object& time_ns, const py::objec
 }
 
 /// A property with the column of that name.
-template <class T>
-void bind_column(py::class_<Recording, SharedRecording>& type, const char* name,
-                 std::vector<T> Observations::*column, const char* doc) {
-  type.def_property_readonly(
-      name,
-      [column](const SharedRecording& recording) {
-        return view_of<T, Recording>(recording->data.observations.*column, recording);
+void bind_column(py::class_<Recording, SharedRecording>& type,
+                 const recordings::ObservationColumn& entry) {
+  std::visit(
+      [&]<class T>(std::vector<T> Observations::*column) {
+        constexpr const char* kNumbers = std::is_same_v<T, std::int64_t> ? "int64"
+                                         : std::is_same_v<T, double>     ? "float64"
+                                         : std::is_same_v<T, float>      ? "float32"
+                                                                         : "uint8";
+        std::string doc = fmt::format("{} ({}). {}.", entry.meaning, entry.unit, kNumbers);
+        doc.front() = static_cast<char>(std::toupper(doc.front()));
+        type.def_property_readonly(
+            entry.name,
+            [column](const SharedRecording& recording) {
+              return view_of<T, Recording>(recording->data.observations.*column, recording);
+            },
+            doc.c_str());
       },
-      doc);
+      entry.place);
 }
 
 void bind_header(py::module_& module) {
@@ -296,8 +307,10 @@ void bind_recordings(py::module_& module) {
       module, "Recording",
       "Observations of a recording as columns, one row per return.\n\n"
       "Every column is a numpy array of shape (rows,) that shares the recording's memory: it\n"
-      "cannot be written to, and stays valid after the recording is deleted. `read` and "
-      "`read_chunks`\nmake recordings of files, `from_arrays` of numbers.");
+      "cannot be written to, and stays valid after the recording is deleted. Where the header has "
+      "no\ntimes, ``time_ns`` holds the numbers of shots; where it has no ranges, ``range`` is "
+      "NaN.\n"
+      "`read` and `read_chunks` make recordings of files, `from_arrays` of numbers.");
   type.def("__len__", [](const Recording& recording) { return recording.data.observations.size(); })
       .def_readonly("header", &Recording::header, "What is known of the whole recording.")
       .def_property_readonly(
@@ -307,28 +320,7 @@ void bind_recordings(py::module_& module) {
         return fmt::format("<risley.Recording {}, {} rows>", recording.header.format,
                            recording.data.observations.size());
       });
-  bind_column(type, "time_ns", &Observations::time_ns,
-              "Time of the shot, ns; its number in firing order where there are no times. int64.");
-  bind_column(type, "azimuth", &Observations::azimuth,
-              "Azimuth from X towards Y in (-pi, pi], rad. float64.");
-  bind_column(type, "zenith", &Observations::zenith, "Zenith from Z in [0, pi], rad. float64.");
-  bind_column(type, "range", &Observations::range,
-              "Range, m; 0 without a return, NaN where the format holds none. float64.");
-  bind_column(type, "azimuth_resolution", &Observations::azimuth_resolution,
-              "Rounding step of the azimuth at this point, rad; 0: not rounded. float32.");
-  bind_column(type, "zenith_resolution", &Observations::zenith_resolution,
-              "Rounding step of the zenith at this point, rad; 0: not rounded. float32.");
-  bind_column(type, "range_resolution", &Observations::range_resolution,
-              "Rounding step of the range at this point, m; 0: not rounded. float32.");
-  bind_column(type, "intensity", &Observations::intensity,
-              "Intensity as the sensor reports it, 0 to 255. uint8.");
-  bind_column(type, "return_number", &Observations::return_number,
-              "Number of the return of its shot, from 1. uint8.");
-  bind_column(type, "tag", &Observations::tag, "Tag byte of the format; 0 without. uint8.");
-  bind_column(type, "beam", &Observations::beam, "Number of the emitter, from 0. uint8.");
-  bind_column(type, "device", &Observations::device, "Row of ``header.devices``. uint8.");
-  bind_column(type, "valid", &Observations::valid,
-              "1 where the direction can be trusted, 0 elsewhere. uint8.");
+  for (const auto& entry : recordings::kObservationColumns) bind_column(type, entry);
 
   py::class_<ChunkReader>(module, "ChunkReader",
                           "Iterator over the pieces of a recording; see `read_chunks`.")

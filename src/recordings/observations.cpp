@@ -12,38 +12,19 @@
 #include "risley/core/require.hpp"
 
 namespace risley::recordings {
-namespace {
 
-/// Applies a function to every column with its name; the one place that lists them all.
-template <class Function, class... Columns>
-void for_each_column(Function&& function, Columns&... o) {
-  function("time_ns", o.time_ns...);
-  function("azimuth", o.azimuth...);
-  function("zenith", o.zenith...);
-  function("range", o.range...);
-  function("azimuth_resolution", o.azimuth_resolution...);
-  function("zenith_resolution", o.zenith_resolution...);
-  function("range_resolution", o.range_resolution...);
-  function("intensity", o.intensity...);
-  function("return_number", o.return_number...);
-  function("tag", o.tag...);
-  function("beam", o.beam...);
-  function("device", o.device...);
-  function("valid", o.valid...);
-}
-
-}  // namespace
+static_assert(lists_all_columns<Observations, kObservationColumns>());
 
 void Observations::clear() {
-  for_each_column([](std::string_view, auto& column) { column.clear(); }, *this);
+  for_each_column<kObservationColumns>([](auto& column) { column.clear(); }, *this);
 }
 
 void Observations::resize(std::size_t rows) {
-  for_each_column([rows](std::string_view, auto& column) { column.resize(rows); }, *this);
+  for_each_column<kObservationColumns>([rows](auto& column) { column.resize(rows); }, *this);
 }
 
 void Observations::reserve(std::size_t rows) {
-  for_each_column([rows](std::string_view, auto& column) { column.reserve(rows); }, *this);
+  for_each_column<kObservationColumns>([rows](auto& column) { column.reserve(rows); }, *this);
 }
 
 void Observations::append(const Observations& other) { append(other, 0, other.size()); }
@@ -51,8 +32,8 @@ void Observations::append(const Observations& other) { append(other, 0, other.si
 void Observations::append(const Observations& other, std::size_t begin, std::size_t end) {
   require_columns(other);
   require_rows("rows", begin, end, other.size());
-  for_each_column(
-      [begin, end](std::string_view, auto& column, const auto& more) {
+  for_each_column<kObservationColumns>(
+      [begin, end](auto& column, const auto& more) {
         column.insert(column.end(), more.begin() + static_cast<std::ptrdiff_t>(begin),
                       more.begin() + static_cast<std::ptrdiff_t>(end));
       },
@@ -62,8 +43,8 @@ void Observations::append(const Observations& other, std::size_t begin, std::siz
 void Observations::append(const Observations& other, std::span<const std::size_t> rows) {
   require_columns(other);
   for (const std::size_t row : rows) require_place("rows", row, other.size());
-  for_each_column(
-      [rows](std::string_view, auto& column, const auto& more) {
+  for_each_column<kObservationColumns>(
+      [rows](auto& column, const auto& more) {
         column.reserve(column.size() + rows.size());
         for (const std::size_t row : rows) column.push_back(more[row]);
       },
@@ -73,17 +54,19 @@ void Observations::append(const Observations& other, std::span<const std::size_t
 void Observations::drop_front(std::size_t rows) {
   require_columns(*this);
   require_rows("rows", 0, rows, size());
-  for_each_column(
-      [rows](std::string_view, auto& column) {
+  for_each_column<kObservationColumns>(
+      [rows](auto& column) {
         column.erase(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(rows));
       },
       *this);
 }
 
 void require_columns(const Observations& rows) {
-  for_each_column([&rows](std::string_view name,
-                          const auto& column) { require_length(name, column.size(), rows.size()); },
-                  rows);
+  for_each_entry<kObservationColumns>(
+      [&rows](const auto& entry, const auto& column) {
+        require_length(entry.name, column.size(), rows.size());
+      },
+      rows);
 }
 
 void mark_valid(Observations& rows) {

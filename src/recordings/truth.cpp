@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/columns.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/tables/netcdf.hpp"
@@ -21,7 +22,25 @@ constexpr const char* kDimension = "shot";
 constexpr std::size_t kBlockRows = 16384;
 constexpr int kMostPrisms = 26;  ///< one letter each
 
-/// One variable of the file; si_per_unit turns its values into SI units.
+/// A column, or one of each prism, whose letter stands for {} in names and words.
+struct TruthColumn {
+  ColumnPlace<TruthColumns, std::vector<double>, std::vector<std::vector<double>>> place;
+  std::string_view name, units, long_name;
+  double si_per_unit = 1.0;  ///< turns the file's values into SI units
+};
+
+/// Those beside the time, in the file's order.
+constexpr TruthColumn kTruthColumns[] = {
+    {&TruthColumns::rotation_angle, "rotation_angle_{}_deg", "degree",
+     "true rotation angle of prism {}, not wrapped", kRadiansPerDegree},
+    {&TruthColumns::angular_velocity, "angular_velocity_{}_deg_per_s", "degree s-1",
+     "true angular velocity of prism {}", kRadiansPerDegree},
+    {&TruthColumns::azimuth, "azimuth_deg", "degree", "true azimuth from X towards Y",
+     kRadiansPerDegree},
+    {&TruthColumns::zenith, "zenith_deg", "degree", "true zenith angle from Z", kRadiansPerDegree},
+    {&TruthColumns::range, "range_m", "m", "true range, NaN where the beam hits nothing"}};
+
+/// One variable of the file.
 struct Variable {
   std::string name, units, long_name;
   double si_per_unit = 1.0;
@@ -30,20 +49,16 @@ struct Variable {
 /// All variables of a file in order; the first is the time.
 std::vector<Variable> variables(int prisms) {
   std::vector<Variable> list{{"time", "s", "time of the shot", 1.0}};
-  for (int i = 0; i < prisms; ++i) {
-    const char letter = static_cast<char>('a' + i);
-    list.push_back({fmt::format("rotation_angle_{}_deg", letter), "degree",
-                    fmt::format("true rotation angle of prism {}, not wrapped", letter),
-                    kRadiansPerDegree});
+  for (const TruthColumn& column : kTruthColumns) {
+    const bool of_prisms = column.place.index() == 1;
+    for (int i = 0; i < (of_prisms ? prisms : 1); ++i) {
+      const auto text = [letter = static_cast<char>('a' + i)](std::string_view pattern) {
+        return fmt::format(fmt::runtime(pattern), letter);
+      };
+      list.push_back({text(column.name), std::string(column.units), text(column.long_name),
+                      column.si_per_unit});
+    }
   }
-  for (int i = 0; i < prisms; ++i) {
-    const char letter = static_cast<char>('a' + i);
-    list.push_back({fmt::format("angular_velocity_{}_deg_per_s", letter), "degree s-1",
-                    fmt::format("true angular velocity of prism {}", letter), kRadiansPerDegree});
-  }
-  list.push_back({"azimuth_deg", "degree", "true azimuth from X towards Y", kRadiansPerDegree});
-  list.push_back({"zenith_deg", "degree", "true zenith angle from Z", kRadiansPerDegree});
-  list.push_back({"range_m", "m", "true range, NaN where the beam hits nothing", 1.0});
   return list;
 }
 
@@ -55,9 +70,7 @@ void require_prisms(int prisms, int least) {
 template <class Truth>
 auto columns_of(Truth& rows) {
   std::vector<decltype(&rows.range)> columns;
-  for (auto& column : rows.rotation_angle) columns.push_back(&column);
-  for (auto& column : rows.angular_velocity) columns.push_back(&column);
-  for (auto* column : {&rows.azimuth, &rows.zenith, &rows.range}) columns.push_back(column);
+  for_each_column<kTruthColumns>([&columns](auto& column) { columns.push_back(&column); }, rows);
   return columns;
 }
 

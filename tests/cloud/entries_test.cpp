@@ -55,7 +55,7 @@ TEST(Entries, EveryFormatAsksForTheColumnsOfItsHeader) {
       spoil(points);
       return refusal([&] { writer->write(points); });
     };
-    EXPECT_EQ(run([](Points& p) { p.x.pop_back(); }), "x has 2 values, expected 3") << name;
+    EXPECT_EQ(run([](Points& p) { p.x.pop_back(); }), "x_m has 2 values, expected 3") << name;
     EXPECT_EQ(run([](Points& p) { p.tag.pop_back(); }), "tag has 2 values, expected 3");
     EXPECT_EQ(run([](Points& p) { p.covariance[4].clear(); }),
               "covariance has 0 values, expected 3");
@@ -63,7 +63,7 @@ TEST(Entries, EveryFormatAsksForTheColumnsOfItsHeader) {
               "rotation_angle has 1 values, expected 2");
     EXPECT_EQ(run([](Points& p) { p.loading.clear(); }), "loading has 0 values, expected 1");
     EXPECT_EQ(run([](Points& p) { p.loading[0][2].pop_back(); }),
-              "loading of a factor has 2 values, expected 3");
+              "loading has 2 values, expected 3");
     EXPECT_EQ(run([](Points&) {}), "") << name;
   }
 }
@@ -136,7 +136,7 @@ TEST(Entries, PointsAskForColumnsOfAllShots) {
   EXPECT_EQ(one.run(), "beam = 1 in row 1, allowed 0 to 0");
   one = {};
   one.points.incidence.pop_back();
-  EXPECT_EQ(one.run(), "incidence has 2 values, expected 3");
+  EXPECT_EQ(one.run(), "incidence_angle_deg has 2 values, expected 3");
 }
 
 TEST(Entries, PointsAskForAHeaderAndAModelThatFit) {

@@ -18,20 +18,7 @@ namespace risley::cloud::points_test {
 template <class Function>
 void number_columns(Points& p, const Function& function) {
   int number = 0;
-  const auto one = [&](auto& column) { function(column, number++); };
-  one(p.time_ns);
-  for (auto* column :
-       {&p.x, &p.y, &p.z, &p.range, &p.incidence, &p.azimuth_residual, &p.zenith_residual}) {
-    one(*column);
-  }
-  for (auto& column : p.covariance) one(column);
-  for (auto& column : p.rotation_angle) one(column);
-  for (auto* column : {&p.intensity, &p.return_number, &p.number_of_returns, &p.tag, &p.beam}) {
-    one(*column);
-  }
-  for (auto& factor : p.loading) {
-    for (auto& column : factor) one(column);
-  }
+  for_each_point_column(p, [&](const auto&, auto& column) { function(column, number++); });
 }
 
 /// The value that a row of a column gets.
@@ -62,6 +49,7 @@ void expect_rows(Points& points, const std::vector<std::size_t>& rows, bool all_
 CloudHeader full_header() {
   CloudHeader header;
   header.prisms = 3;
+  header.has_own_covariance = header.has_point_source = true;
   header.factors = {"one", "two"};
   return header;
 }
@@ -123,15 +111,8 @@ TEST(Observations, DropFrontTakesTheSameRowsOffEveryColumn) {
   recordings::Observations o;
   const auto each = [&o](const auto& function) {
     int number = 0;
-    const auto one = [&](auto& column) { function(column, number++); };
-    one(o.time_ns);
-    for (auto* column : {&o.azimuth, &o.zenith, &o.range}) one(*column);
-    for (auto* column : {&o.azimuth_resolution, &o.zenith_resolution, &o.range_resolution}) {
-      one(*column);
-    }
-    for (auto* column : {&o.intensity, &o.return_number, &o.tag, &o.beam, &o.device, &o.valid}) {
-      one(*column);
-    }
+    for_each_column<recordings::kObservationColumns>(
+        [&](auto& column) { function(column, number++); }, o);
   };
   o.resize(9);
   each([](auto& column, int number) {

@@ -174,7 +174,8 @@ TEST(RecordPacker, NoPointsNeedNoRoom) {
   RecordPacker packer(all_fields(header));
   Points none;
   header.resize(none, 0);
-  packer.pack(none, nullptr, packer.record_bytes());  // the undefined-behaviour sanitizer looks on
+  packer.pack(none, 0, 0, nullptr,
+              packer.record_bytes());  // the undefined-behaviour sanitizer looks on
 }
 
 TEST(PlyComments, TellTheProvenanceInLinesThatEveryReaderTakes) {

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "risley/core/columns.hpp"
 #include "risley/core/vector3.hpp"
 #include "risley/estimation/estimate.hpp"
 
@@ -34,6 +35,13 @@ struct RangedShots {
   /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(int prisms, std::size_t shots);
 };
+
+/// All columns.
+inline constexpr ColumnPlace<RangedShots, std::vector<double>, std::vector<std::uint8_t>,
+                             std::vector<std::vector<double>>, std::vector<std::vector<float>>>
+    kRangedShotColumns[] = {&RangedShots::rotation_angle, &RangedShots::angle_covariance,
+                            &RangedShots::range_terms,    &RangedShots::range,
+                            &RangedShots::beam,           &RangedShots::intensity};
 
 /// As many columns for another number of shots.
 RangedShots columns_like(const RangedShots& shots, std::size_t size);

@@ -8,9 +8,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "risley/core/columns.hpp"
 #include "risley/recordings/observations.hpp"
 
 namespace risley::cloud {
@@ -19,7 +21,7 @@ namespace risley::cloud {
 enum CovarianceTerm : std::size_t { kXX, kXY, kXZ, kYY, kYZ, kZZ, kCovarianceTerms };
 
 /// Points with their uncertainty, as columns of one length (or empty where CloudHeader says that
-/// they are not there), in the frame that CloudHeader names.
+/// they are not there), in the frame that CloudHeader names. kPointColumns lists them.
 struct Points {
   std::vector<std::int64_t> time_ns;  ///< as recorded
   std::vector<double> x, y, z;        ///< m
@@ -76,6 +78,8 @@ struct TrajectoryErrors {
   std::vector<std::array<double, 6>> sigma;     ///< of the fading parts, m and rad
 };
 
+struct PointColumn;
+
 /// What is known of a cloud before its first point.
 struct CloudHeader {
   std::string sensor;  ///< manufacturer and model, e.g. "Livox Mid-40"
@@ -95,9 +99,104 @@ struct CloudHeader {
   /// How the cloud was made: name and value pairs such as command, version, input_sha256.
   std::vector<std::pair<std::string, std::string>> provenance;
 
+  /// Whether points have a column.
+  bool announces(const PointColumn& column) const;
   /// Gives every column that this header announces so many rows, and empties the others.
   /// @throws InvalidArgument for a number of prisms that no sensor has
   void resize(Points& points, std::size_t rows) const;
 };
+
+/// The unit of a column in files; in memory, angles are in rad and times in ns.
+enum class PointUnit : std::uint8_t { one, metres, square_metres, degrees, seconds, nanoseconds };
+
+/// The type of a column's numbers in files. Records have no int32 and int64.
+enum class PointType : std::uint8_t { uint8, float32, float64, int32, int64 };
+
+/// A column of points, or several alike: one for each term of a covariance, each prism, or each
+/// axis of each common factor. {} in names and words stands for what tells these apart.
+struct PointColumn {
+  using Numbers = std::vector<double>;  ///< of most columns
+  ColumnPlace<Points, std::vector<std::int64_t>, Numbers, std::vector<std::uint8_t>,
+              std::vector<std::uint16_t>, std::array<Numbers, kCovarianceTerms>,
+              std::vector<Numbers>, std::vector<std::array<Numbers, 3>>>
+      place;
+  std::string_view field;     ///< name in records, PDAL's where it has one; empty: not in records
+  std::string_view variable;  ///< name in NetCDF
+  PointType type;
+  PointUnit unit;
+  std::string_view note;                   ///< on the field; LAS has room for 31 characters
+  std::string_view meaning;                ///< of the variable
+  bool CloudHeader::*announced = nullptr;  ///< says whether points have it; nullptr: always
+  std::uint8_t traits = 0;
+  char axis = 0;  ///< of a coordinate, whose words are the header's: T, X, Y or Z
+
+  /// The traits.
+  static constexpr std::uint8_t kDerived = 1,  ///< the numbers of another column in another form
+      kInLasRecord = 2,                        ///< LAS's point record has it, not the extra bytes
+      kHasUnknown = 4;                         ///< NaN where nothing is known
+  /// Whether it has one of the traits.
+  constexpr bool is(std::uint8_t trait) const { return (traits & trait) != 0; }
+};
+
+/// All columns of points and of clouds, in NetCDF's order. Memory is given, rows are taken and
+/// every format is written by this list.
+inline constexpr auto kPointColumns = [] {
+  using enum PointType;
+  using enum PointUnit;
+  using Is = PointColumn;
+  constexpr bool CloudHeader::*kAlways = nullptr;
+  constexpr auto kCovariance = &CloudHeader::has_covariance;
+  constexpr auto kOwnCovariance = &CloudHeader::has_own_covariance;
+  constexpr auto kStrips = &CloudHeader::has_point_source;
+  constexpr auto kRotors = &CloudHeader::has_rotation_angles;
+  return std::to_array<PointColumn>({
+      {&Points::time_ns, "Time", "time", float64, seconds, "of the shot, recording's clock",
+       "time of the shot, as in the recording", kAlways, Is::kDerived | Is::kInLasRecord, 'T'},
+      {&Points::x, "X", "x_m", float64, metres, "{}", "{}", kAlways, Is::kInLasRecord, 'X'},
+      {&Points::y, "Y", "y_m", float64, metres, "{}", "{}", kAlways, Is::kInLasRecord, 'Y'},
+      {&Points::z, "Z", "z_m", float64, metres, "{}", "{}", kAlways, Is::kInLasRecord, 'Z'},
+      {&Points::time_ns, "", "time_ns", int64, nanoseconds, "", "time without rounding"},
+      {&Points::intensity, "Intensity", "intensity", uint8, one, "as reported, 0-255",
+       "intensity as the sensor reports it", kAlways, Is::kInLasRecord},
+      {&Points::return_number, "ReturnNumber", "return_number", uint8, one, "from 1",
+       "number of the return within its shot, from 1", kAlways, Is::kInLasRecord},
+      {&Points::number_of_returns, "NumberOfReturns", "number_of_returns", uint8, one,
+       "of the shot", "returns of the shot", kAlways, Is::kInLasRecord},
+      {&Points::tag, "Tag", "tag", uint8, one, "of the sensor's record", "tag byte of the sensor"},
+      {&Points::beam, "Beam", "beam", uint8, one, "firing beam, from 0", "firing beam, from 0"},
+      {&Points::point_source, "", "strip", int32, one, "",
+       "strip of the flight, from 1; 0: of none", kStrips},
+      {&Points::covariance, "Std{}", "std_{}_m", float32, metres, "1 sigma of {} (m)",
+       "standard deviation of {}", kCovariance, Is::kDerived},
+      {&Points::covariance, "{}", "covariance_{}_m2", float32, square_metres, "{} (m2)",
+       "covariance of {}", kCovariance},
+      {&Points::own_covariance, "Own{}", "own_covariance_{}_m2", float32, square_metres,
+       "not shared with others (m2)",
+       "part of covariance_{1}_m2 that the point shares with no other", kOwnCovariance},
+      {&Points::range, "LidarRange", "range_m", float32, metres, "range from the last prism (m)",
+       "range from where the beam leaves the sensor"},
+      {&Points::incidence, "IncidenceAngle", "incidence_angle_deg", float32, degrees,
+       "beam to surface normal (deg)", "angle between beam and surface normal", kAlways,
+       Is::kHasUnknown},
+      {&Points::rotation_angle, "PrismAngle{}", "rotation_angle_{}_deg", float32, degrees,
+       "rotation angle (deg)", "rotation angle of prism {}", kRotors},
+      {&Points::azimuth_residual, "ResidualAzimuth", "azimuth_residual_deg", float32, degrees,
+       "reported - smoothed (deg)", "reported minus smoothed azimuth", kRotors},
+      {&Points::zenith_residual, "ResidualZenith", "zenith_residual_deg", float32, degrees,
+       "reported - smoothed (deg)", "reported minus smoothed zenith angle", kRotors},
+      {&Points::loading, "Loading{}", "loading_{}_m", float32, metres,
+       "per sigma of a common factor", "change of {} by one standard deviation of a common factor"},
+  });
+}();
+
+/// Calls visit(entry, column) for every column of numbers of points, once for each.
+template <class AnyPoints, class Visit>
+void for_each_point_column(AnyPoints& points, const Visit& visit) {
+  for_each_entry<kPointColumns>(
+      [&visit](const PointColumn& entry, auto& column) {
+        if (!entry.is(PointColumn::kDerived)) visit(entry, column);
+      },
+      points);
+}
 
 }  // namespace risley::cloud

@@ -36,9 +36,30 @@ struct AngleSeries {
   /// Appends a shot without a range.
   void append(std::int64_t time_ns, double azimuth, double zenith, std::uint8_t beam = 0,
               float azimuth_rounding_variance = 0, float zenith_rounding_variance = 0);
+  /// Leaves no shot.
+  void clear();
   /// Appends one row of another series.
   void append(const AngleSeries& other, std::size_t row);
 };
+
+/// A column of an AngleSeries.
+struct SeriesColumn {
+  ColumnPlace<AngleSeries, std::vector<std::int64_t>, std::vector<double>,
+              std::vector<std::uint8_t>, std::vector<float>>
+      place;
+  const char* name;
+  bool optional = false;  ///< may be empty
+};
+/// All of them.
+inline constexpr SeriesColumn kSeriesColumns[] = {
+    {&AngleSeries::time_ns, "time_ns"},
+    {&AngleSeries::azimuth, "azimuth"},
+    {&AngleSeries::zenith, "zenith"},
+    {&AngleSeries::beam, "beam", true},
+    {&AngleSeries::azimuth_rounding_variance, "azimuth_rounding_variance"},
+    {&AngleSeries::zenith_rounding_variance, "zenith_rounding_variance"},
+    {&AngleSeries::range, "range", true},
+    {&AngleSeries::intensity, "intensity", true}};
 
 /// Rows [begin, end) of a series.
 AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t end);

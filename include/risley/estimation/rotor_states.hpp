@@ -26,22 +26,20 @@ struct RotorStates {
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
 
   /// Gives every column so many rows.
-  void resize(int prisms, std::size_t shots) {
-    const auto n = static_cast<std::size_t>(prisms);
-    time_ns.resize(shots);
-    rotation_angle.resize(n);
-    angular_velocity.resize(n);
-    angular_velocity_sigma.resize(n);
-    rotation_angle_covariance.resize(n * (n + 1) / 2);
-    for (auto* columns : {&rotation_angle, &angular_velocity, &angular_velocity_sigma,
-                          &rotation_angle_covariance}) {
-      for (auto& column : *columns) column.resize(shots);
-    }
-    azimuth_residual.resize(shots);
-    zenith_residual.resize(shots);
-    outlier.resize(shots);
-  }
+  void resize(int prisms, std::size_t shots);
 };
+
+/// All columns.
+inline constexpr ColumnPlace<RotorStates, std::vector<std::int64_t>, std::vector<double>,
+                             std::vector<unsigned char>, std::vector<std::vector<double>>>
+    kRotorStateColumns[] = {&RotorStates::time_ns,
+                            &RotorStates::rotation_angle,
+                            &RotorStates::angular_velocity,
+                            &RotorStates::rotation_angle_covariance,
+                            &RotorStates::angular_velocity_sigma,
+                            &RotorStates::azimuth_residual,
+                            &RotorStates::zenith_residual,
+                            &RotorStates::outlier};
 
 /// Rows [begin, end).
 RotorStates rows_of(const RotorStates& states, ShotRange rows);

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "risley/core/columns.hpp"
+
 namespace risley::recordings {
 
 /// Observations as columns, one row per return (all returns of one shot share its time and follow
@@ -49,6 +51,37 @@ struct Observations {
   /// Removes rows from the beginning.
   /// @throws InvalidArgument when there are fewer, and as require_columns()
   void drop_front(std::size_t rows);
+};
+
+/// A column of observations.
+struct ObservationColumn {
+  ColumnPlace<Observations, std::vector<std::int64_t>, std::vector<double>, std::vector<float>,
+              std::vector<std::uint8_t>>
+      place;
+  const char *name, *variable;  ///< in memory and Python; in NetCDF
+  const char *unit, *meaning;   ///< as NetCDF has them
+};
+
+/// All columns: rows are made, taken and checked, the lossless format is written and read, and
+/// Python's arrays are made by this list.
+inline constexpr ObservationColumn kObservationColumns[] = {
+    {&Observations::time_ns, "time_ns", "time", "ns", "time of the shot"},
+    {&Observations::azimuth, "azimuth", "azimuth", "radian", "azimuth from X towards Y"},
+    {&Observations::zenith, "zenith", "zenith", "radian", "zenith angle from Z"},
+    {&Observations::range, "range", "range", "m", "range, 0 where the shot had no return"},
+    {&Observations::azimuth_resolution, "azimuth_resolution", "azimuth_resolution", "radian",
+     "rounding step of the azimuth, 0 where unknown"},
+    {&Observations::zenith_resolution, "zenith_resolution", "zenith_resolution", "radian",
+     "rounding step of the zenith angle, 0 where unknown"},
+    {&Observations::range_resolution, "range_resolution", "range_resolution", "m",
+     "rounding step of the range, 0 where unknown"},
+    {&Observations::intensity, "intensity", "intensity", "1", "intensity as the sensor reports it"},
+    {&Observations::return_number, "return_number", "return_number", "1",
+     "number of the return within its shot, from 1"},
+    {&Observations::tag, "tag", "tag", "1", "tag byte of the sensor"},
+    {&Observations::beam, "beam", "beam", "1", "firing beam, from 0"},
+    {&Observations::device, "device", "device", "1", "row of the device table"},
+    {&Observations::valid, "valid", "valid", "1", "1 where the direction can be trusted"},
 };
 
 /// @throws InvalidArgument when a column has another length than time_ns

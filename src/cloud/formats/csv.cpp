@@ -30,7 +30,7 @@ class TextWriter final : public CloudWriter {
   void write(const Points& points) override {
     const std::size_t stride = packer_.record_bytes();
     records_.resize(points.size() * stride);
-    packer_.pack(points, records_.data(), stride);
+    packer_.pack(points, 0, points.size(), records_.data(), stride);
     for (std::size_t i = 0; i < points.size(); ++i) {
       print_record(records_.data() + i * stride);
       if (text_.size() >= kBufferBytes) flush();
@@ -76,7 +76,8 @@ std::unique_ptr<CloudWriter> create_csv(const std::string& path, const CloudHead
   for (const PointField& field : fields) {
     if (!head.empty()) head += ',';
     head += field.name;
-    if (!field.unit.empty()) head += "_" + (field.unit == "degrees" ? "deg" : field.unit);
+    const std::string unit = names_of(field.column->unit).suffix;
+    if (!unit.empty()) head += "_" + unit;
   }
   return std::make_unique<TextWriter>(path, std::move(fields), head + '\n', ',');
 }

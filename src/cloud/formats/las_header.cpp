@@ -22,12 +22,10 @@ namespace risley::cloud::las {
 namespace {
 
 using recordings::las::kAdjustedGpsTime;
-using recordings::las::kBeamField;
 using recordings::las::kDescriptorBytes;
 using recordings::las::kExtraBytesNumber;
 using recordings::las::kRecordHeaderBytes;
 using recordings::las::kSpecificationUser;
-using recordings::las::kTagField;
 
 /// The 16 bits that a variable length record tells its length in.
 constexpr std::size_t kMaxRecordBytes = std::numeric_limits<std::uint16_t>::max();
@@ -62,10 +60,19 @@ std::string generating_software(const CloudHeader& header) {
 
 void append_descriptor(std::string& data, const PointField& field) {
   std::array<std::uint8_t, kDescriptorBytes> bytes{};
-  bytes[2] = field.type == FieldType::uint8 ? 1 : 9;
+  bytes[2] = names_of(field.type).las;
   put_text(bytes.data() + 4, field.name, 32);
-  put_text(bytes.data() + 160, field.description, 32);
+  put_text(bytes.data() + 160, field.note, 32);
   data.append(bytes.begin(), bytes.end());
+}
+
+std::vector<PointField> extra_fields(const CloudHeader& header) {
+  std::vector<PointField> fields = all_fields(header);
+  std::erase_if(
+      fields, [](const PointField& field) { return field.column->is(PointColumn::kInLasRecord); });
+  std::stable_partition(fields.begin(), fields.end(),
+                        [](const PointField& field) { return field.type == PointType::float32; });
+  return fields;
 }
 
 /// The coordinate system of the points: a map, or the sensor's own or another frame in metres.
@@ -135,20 +142,12 @@ Layout::Layout(const CloudHeader& header, const CloudWriterOptions& options)
       date_(options.date),
       system_identifier_(las::system_identifier(header)),
       generating_software_(las::generating_software(header)),
-      floats_(uncertainty_fields(header)) {
+      extra_(extra_fields(header)) {
   require_above("las_scale", scale_, 0, "m");
-  const std::vector<PointField> loadings = loading_fields(header);
-  floats_.insert(floats_.end(), loadings.begin(), loadings.end());
-  record_bytes_ = base_record_bytes() + 4 * floats_.size() + 2;
-  values_.resize(floats_.size() * kBlock);
-
   std::string descriptors;
-  for (const PointField& field : floats_) append_descriptor(descriptors, field);
-  for (const PointField& field : sensor_fields()) {
-    if (field.name == kTagField || field.name == kBeamField) append_descriptor(descriptors, field);
-  }
+  for (const PointField& field : extra_.fields()) append_descriptor(descriptors, field);
   if (descriptors.size() > kMaxRecordBytes) {
-    const std::size_t others = floats_.size() + 2 - loadings.size();
+    const std::size_t others = extra_.fields().size() - 3 * header.factors.size();
     throw InvalidArgument(fmt::format("factors = {}, allowed up to {} in a LAS file",
                                       header.factors.size(),
                                       (kMaxRecordBytes / kDescriptorBytes - others) / 3));
@@ -215,7 +214,7 @@ std::vector<std::uint8_t> Layout::head(const Summary& summary) const {
   out = put<std::uint32_t>(out, static_cast<std::uint32_t>(length));
   out = put<std::uint32_t>(out, static_cast<std::uint32_t>(records_.size()));
   out = put<std::uint8_t>(out, point_format());
-  out = put<std::uint16_t>(out, static_cast<std::uint16_t>(record_bytes_));
+  out = put<std::uint16_t>(out, static_cast<std::uint16_t>(record_bytes()));
   out += 6 * 4;  // the counters of old, which point formats from 6 on leave 0
   for (int axis = 0; axis < 3; ++axis) out = put<double>(out, scale_);
   for (const double offset : offset_) out = put<double>(out, offset);

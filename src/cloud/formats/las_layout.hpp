@@ -57,7 +57,7 @@ struct HeaderNumbers {
 /// - Classification 0 (never classified), all flags, user data and scanner channel 0. File source
 ///   1; point source the strip of a flight, otherwise 1: the points are of this file.
 /// - The trajectory's errors of a moving sensor: records of the user "risley", docs/files.md.
-/// - Extra bytes: uncertainty_fields and loading_fields, then Tag and Beam.
+/// - Extra bytes: the other fields, first those of float32.
 /// - File creation date: that of the first point in UTC, otherwise that of the options. It is
 ///   never today: the same points give the same bytes.
 class Layout {
@@ -70,7 +70,7 @@ class Layout {
   const std::array<double, 3>& offset() const { return offset_; }
   std::size_t header_bytes() const { return recordings::las::header_bytes(4); }
   std::size_t base_record_bytes() const { return recordings::las::kRecordBytes[point_format()]; }
-  std::size_t record_bytes() const { return record_bytes_; }
+  std::size_t record_bytes() const { return base_record_bytes() + extra_.record_bytes(); }
   std::uint8_t point_format() const { return 6; }
   std::uint16_t global_encoding() const;
   const std::string& system_identifier() const { return system_identifier_; }
@@ -105,14 +105,12 @@ class Layout {
   std::optional<std::chrono::sys_days> date_;  ///< of other clocks
   std::string system_identifier_, generating_software_;
   std::vector<VariableLengthRecord> records_;
-  std::vector<PointField> floats_;  ///< float32 extra bytes
-  std::size_t record_bytes_;
+  RecordPacker extra_;  ///< bytes
 
   // Columns of one block.
   std::array<std::array<double, kBlock>, 3> coordinates_;  ///< see pack_coordinates
   std::array<double, kBlock> times_;                       ///< s
   std::array<std::uint32_t, kBlock> returns_;              ///< intensity and the bits after it
-  std::vector<float> values_;                              ///< [floats][kBlock]
 };
 
 }  // namespace risley::cloud::las

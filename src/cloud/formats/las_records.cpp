@@ -131,16 +131,10 @@ void Layout::pack(const Points& points, std::size_t first, std::size_t rows, std
   pack_coordinates(points, first, rows, summary);
   pack_returns(points, first, rows, summary);
   pack_times(points, first, rows);
-  for (std::size_t k = 0; k < floats_.size(); ++k) {
-    floats_[k].floats(points, first, {values_.data() + k * kBlock, rows});
-  }
 
   // Classification, flags, scan angle and user data are 0, the point source is 1 for one file.
   constexpr std::uint8_t kConstant[] = {0, 0, 0, 0, 1, 0};
-  const std::uint8_t* tag = points.tag.data() + first;
-  const std::uint8_t* beam = points.beam.data() + first;
   const std::uint16_t* source = has_point_source_ ? points.point_source.data() + first : nullptr;
-  const std::size_t floats = floats_.size();
   std::uint8_t* to = out;
   for (std::size_t i = 0; i < rows; ++i) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -150,12 +144,9 @@ void Layout::pack(const Points& points, std::size_t first, std::size_t rows, std
     std::memcpy(to + 16, kConstant, sizeof kConstant);
     to += 16 + sizeof kConstant;
     if (source != nullptr) put<std::uint16_t>(to - 2, source[i]);
-    to = put<double>(to, times_[i]);
-    const float* value = values_.data() + i;
-    for (std::size_t k = 0; k < floats; ++k, value += kBlock) to = put<float>(to, *value);
-    *to++ = tag[i];
-    *to++ = beam[i];
+    to = put<double>(to, times_[i]) + extra_.record_bytes();
   }
+  extra_.pack(points, first, rows, out + base_record_bytes(), record_bytes());
   if (summary.points == 0) summary.first_time_ns = points.time_ns[first];
   summary.points += rows;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,168 +12,163 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/optics/parameters.hpp"
 
 namespace risley::cloud {
 namespace {
 
-/// A field whose numbers are a column as it is, or scaled. @param column  gives it from the points
-template <class Column>
-PointField scaled(std::string name, std::string unit, std::string description, FieldType type,
-                  Column column, double scale = 1.0) {
-  const auto fill = [column, scale](const Points& points, std::size_t first, auto values) {
-    const auto* from = column(points).data() + first;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const double value = scale * static_cast<double>(from[i]);
-      values[i] = static_cast<std::remove_reference_t<decltype(values[i])>>(value);
-    }
-  };
-  PointField field{std::move(name), std::move(unit), std::move(description), type, fill};
-  if (type == FieldType::float32) field.floats = fill;
-  return field;
-}
+/// Rows that are worked on together: what is read and written stays in the cache.
+constexpr std::size_t kPackedRows = 256;
 
-/// Square roots. std::sqrt sets errno below zero, which keeps compilers from taking several at
-/// once.
-template <class Number>
-void square_roots(const double* from, std::span<Number> to) {
+/// Square roots of up to kPackedRows numbers. std::sqrt sets errno below zero, which keeps
+/// compilers from taking several at once.
+void square_roots(const double* from, std::size_t count, double* to) {
   using Batch = xsimd::batch<double>;
-  const std::size_t whole = to.size() - to.size() % Batch::size;
+  const std::size_t whole = count - count % Batch::size;
   for (std::size_t i = 0; i < whole; i += Batch::size) {
-    alignas(Batch::arch_type::alignment()) double roots[Batch::size];
-    xsimd::sqrt(Batch::load_unaligned(from + i)).store_aligned(roots);
-    for (std::size_t k = 0; k < Batch::size; ++k) to[i + k] = static_cast<Number>(roots[k]);
+    xsimd::sqrt(Batch::load_unaligned(from + i)).store_unaligned(to + i);
   }
-  for (std::size_t i = whole; i < to.size(); ++i) to[i] = static_cast<Number>(std::sqrt(from[i]));
+  for (std::size_t i = whole; i < count; ++i) to[i] = std::sqrt(from[i]);
 }
 
-PointField standard_deviation(const char* axis, CovarianceTerm term) {
-  const auto fill = [term](const Points& points, std::size_t first, auto values) {
-    square_roots(points.covariance[term].data() + first, values);
-  };
-  return {fmt::format("Std{}", axis), "m",  fmt::format("1 sigma of {} (m)", axis),
-          FieldType::float32,         fill, fill};
+template <class To, class From>
+void store_numbers(const From* from, std::size_t count, double factor, std::uint8_t* to,
+                   std::size_t stride) {
+  for (std::size_t i = 0; i < count; ++i, to += stride) {
+    if constexpr (std::is_floating_point_v<To>) {
+      io::store<To>(to, static_cast<To>(factor * static_cast<double>(from[i])));
+    } else {
+      io::store<To>(to, static_cast<To>(from[i]));
+    }
+  }
+}
+
+/// What tells one of several columns alike from the others, in each of PointColumn's texts.
+struct Words {
+  std::string field, note, variable, meaning;
+};
+
+constexpr CovarianceTerm kVariancesFirst[] = {kXX, kYY, kZZ, kXY, kXZ, kYZ};
+constexpr std::pair<int, int> kAxesOfTerm[] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
+constexpr std::string_view kAxes = "xyz", kCapitals = "XYZ";
+
+Words words_of_term(CovarianceTerm term, bool deviation) {
+  const auto [a, b] = kAxesOfTerm[term];
+  const char capital = kCapitals[a];
+  if (deviation) return {{capital}, {capital}, {kAxes[a]}, fmt::format("{}_m", kAxes[a])};
+  return {a == b ? fmt::format("Variance{}", capital)
+                 : fmt::format("Covariance{}{}", capital, kCapitals[b]),
+          a == b ? "variance" : "covariance", fmt::format("{}{}", kAxes[a], kAxes[b]),
+          fmt::format("{}_m and {}_m", kAxes[a], kAxes[b])};
 }
 
 }  // namespace
 
-const TypeNames& names_of(FieldType type) {
-  static constexpr TypeNames kNames[] = {
-      {1, "|u1", "uchar", 'U', 2}, {4, "<f4", "float", 'F', 7}, {8, "<f8", "double", 'F', 8}};
+const TypeNames& names_of(PointType type) {
+  static constexpr TypeNames kNames[] = {{1, "|u1", "uchar", 'U', 2, 1},
+                                         {4, "<f4", "float", 'F', 7, 9},
+                                         {8, "<f8", "double", 'F', 8, 10},
+                                         {4, "<i4", "int", 'I', 5, 6},
+                                         {8, "<i8", nullptr, 'I', 0, 8}};
   return kNames[static_cast<int>(type)];
 }
 
-std::vector<PointField> coordinate_fields(const CloudHeader& header) {
-  constexpr FieldType kType = FieldType::float64;
-  return {
-      scaled(
-          "X", "m", header.frame.axes[0], kType, [](const Points& p) -> auto& { return p.x; }),
-      scaled(
-          "Y", "m", header.frame.axes[1], kType, [](const Points& p) -> auto& { return p.y; }),
-      scaled(
-          "Z", "m", header.frame.axes[2], kType, [](const Points& p) -> auto& { return p.z; }),
-  };
+const UnitNames& names_of(PointUnit unit) {
+  static constexpr UnitNames kNames[] = {
+      {"", "", "1", 1},      {"m", "m", "m", 1},
+      {"m2", "m2", "m2", 1}, {"degrees", "deg", "degree", kDegreesPerRadian},
+      {"s", "s", "s", 1e-9}, {"ns", "ns", "ns", 1}};
+  return kNames[static_cast<int>(unit)];
 }
 
-std::vector<PointField> sensor_fields() {
-  constexpr FieldType kType = FieldType::uint8;
-  return {
-      scaled(
-          "Time", "s", "of the shot, recording's clock", FieldType::float64,
-          [](const Points& p) -> auto& { return p.time_ns; }, 1e-9),
-      scaled(
-          "Intensity", "", "as reported, 0-255", kType,
-          [](const Points& p) -> auto& { return p.intensity; }),
-      scaled(
-          "ReturnNumber", "", "from 1", kType,
-          [](const Points& p) -> auto& { return p.return_number; }),
-      scaled(
-          "NumberOfReturns", "", "of the shot", kType,
-          [](const Points& p) -> auto& { return p.number_of_returns; }),
-      scaled(
-          "Tag", "", "of the sensor's record", kType,
-          [](const Points& p) -> auto& { return p.tag; }),
-      scaled(
-          "Beam", "", "firing beam, from 0", kType,
-          [](const Points& p) -> auto& { return p.beam; }),
+void PointField::store(const Points& points, std::size_t first, std::size_t rows, std::uint8_t* to,
+                       std::size_t stride) const {
+  const double factor = names_of(column->unit).per_unit_of_memory;
+  const auto put = [&](const auto* from, std::size_t count) {
+    with_number_type(type, [&]<class To>() {
+      if (stride == sizeof(To)) {  // which compilers turn into wide instructions
+        store_numbers<To>(from, count, factor, to, sizeof(To));
+      } else {
+        store_numbers<To>(from, count, factor, to, stride);
+      }
+    });
   };
+  std::visit(
+      [&](auto place) {
+        const auto& all = points.*place;
+        using Column = std::remove_cvref_t<decltype(all)>;
+        if constexpr (std::is_arithmetic_v<typename Column::value_type>) {
+          put(all.data() + first, rows);
+        } else if constexpr (std::is_same_v<typename Column::value_type, std::vector<double>>) {
+          const double* from = all[index].data() + first;
+          if (!column->is(PointColumn::kDerived)) return put(from, rows);
+          double roots[kPackedRows];
+          for (std::size_t i = 0; i < rows; i += kPackedRows, to += kPackedRows * stride) {
+            const std::size_t count = std::min(kPackedRows, rows - i);
+            square_roots(from + i, count, roots);
+            put(roots, count);
+          }
+        } else {
+          put(all[index][axis].data() + first, rows);
+        }
+      },
+      column->place);
 }
 
-std::vector<PointField> uncertainty_fields(const CloudHeader& header) {
+std::vector<PointField> fields_of(const PointColumn& column, const CloudHeader& header) {
   std::vector<PointField> fields;
-  const auto add = [&fields](std::string name, std::string unit, std::string description,
-                             auto column, double scale = 1.0) {
-    fields.push_back(scaled(std::move(name), std::move(unit), std::move(description),
-                            FieldType::float32, column, scale));
+  if (!header.announces(column)) return fields;
+  const auto text = [](std::string_view pattern, const std::string& word, const Words& words) {
+    return fmt::format(fmt::runtime(pattern), word, words.variable);
   };
-  if (header.has_covariance) {
-    constexpr std::pair<const char*, CovarianceTerm> kAxes[] = {{"X", kXX}, {"Y", kYY}, {"Z", kZZ}};
-    const auto add_term = [&add](std::string name, const char* description, CovarianceTerm term) {
-      add(
-          std::move(name), "m2",
-          description, [term](const Points& p) -> auto& { return p.covariance[term]; });
-    };
-    for (const auto& [axis, term] : kAxes) fields.push_back(standard_deviation(axis, term));
-    for (const auto& [axis, term] : kAxes) {
-      add_term(fmt::format("Variance{}", axis), "variance (m2)", term);
-    }
-    add_term("CovarianceXY", "covariance (m2)", kXY);
-    add_term("CovarianceXZ", "covariance (m2)", kXZ);
-    add_term("CovarianceYZ", "covariance (m2)", kYZ);
-  }
-  if (header.has_own_covariance) {
-    constexpr std::pair<const char*, CovarianceTerm> kTerms[] = {
-        {"OwnVarianceX", kXX},    {"OwnVarianceY", kYY},    {"OwnVarianceZ", kZZ},
-        {"OwnCovarianceXY", kXY}, {"OwnCovarianceXZ", kXZ}, {"OwnCovarianceYZ", kYZ}};
-    for (const auto& [name, term] : kTerms) {
-      add(
-          name, "m2", "not shared with others (m2)", [term = term](const Points& p) -> auto& {
-            return p.own_covariance[term];
-          });
-    }
-  }
-  add(
-      "LidarRange", "m", "range from the last prism (m)",
-      [](const Points& p) -> auto& { return p.range; });
-  add(
-      "IncidenceAngle", "degrees", "beam to surface normal (deg)",
-      [](const Points& p) -> auto& { return p.incidence; }, kDegreesPerRadian);
-  if (header.has_rotation_angles) {
-    for (std::size_t k = 0; k < static_cast<std::size_t>(header.prisms); ++k) {
-      add(
-          fmt::format("PrismAngle{}", k + 1), "degrees",
-          "rotation angle (deg)", [k](const Points& p) -> auto& { return p.rotation_angle[k]; },
-          kDegreesPerRadian);
-    }
-    add(
-        "ResidualAzimuth", "degrees", "reported - smoothed (deg)",
-        [](const Points& p) -> auto& { return p.azimuth_residual; }, kDegreesPerRadian);
-    add(
-        "ResidualZenith", "degrees", "reported - smoothed (deg)",
-        [](const Points& p) -> auto& { return p.zenith_residual; }, kDegreesPerRadian);
-  }
-  return fields;
-}
-
-std::vector<PointField> loading_fields(const CloudHeader& header) {
-  constexpr char kAxes[] = {'X', 'Y', 'Z'};
-  std::vector<PointField> fields;
-  for (std::size_t k = 0; k < header.factors.size(); ++k) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      fields.push_back(scaled(
-          fmt::format("Loading{}{}", k + 1, kAxes[axis]), "m", "per sigma of a common factor",
-          FieldType::float32,
-          [ k, axis ](const Points& p) -> auto& { return p.loading[k][axis]; }));
-    }
-  }
+  const auto add = [&](const Words& words, std::size_t index = 0, std::size_t axis = 0) {
+    fields.push_back({&column, text(column.field, words.field, words),
+                      text(column.note, words.note, words),
+                      text(column.variable, words.variable, words),
+                      text(column.meaning, words.meaning, words), column.type, index, axis});
+  };
+  std::visit(
+      [&](auto place) {
+        using Column = std::remove_cvref_t<decltype(std::declval<Points>().*place)>;
+        if constexpr (std::is_same_v<Column, decltype(Points::covariance)>) {
+          const bool deviation = column.is(PointColumn::kDerived);
+          for (const CovarianceTerm term : std::span(kVariancesFirst).first(deviation ? 3 : 6)) {
+            add(words_of_term(term, deviation), term);
+          }
+        } else if constexpr (std::is_same_v<Column, decltype(Points::rotation_angle)>) {
+          for (int k = 0; k < header.prisms; ++k) {
+            add({std::to_string(k + 1), {}, {prism_letter(k)}, {prism_capital(k)}}, k);
+          }
+        } else if constexpr (std::is_same_v<Column, decltype(Points::loading)>) {
+          for (std::size_t k = 0; k < header.factors.size(); ++k) {
+            for (std::size_t i = 0; i < 3; ++i) {
+              add({fmt::format("{}{}", k + 1, kCapitals[i]),
+                   {},
+                   {kAxes[i]},
+                   fmt::format("{}_m", kAxes[i])},
+                  k, i);
+            }
+          }
+        } else {
+          const std::size_t axis = kCapitals.find(column.axis);
+          const std::string word = axis < 3 ? header.frame.axes[axis] : std::string();
+          add({{}, word, {}, word});
+        }
+      },
+      column.place);
   return fields;
 }
 
 std::vector<PointField> all_fields(const CloudHeader& header) {
-  std::vector<PointField> fields = coordinate_fields(header);
-  for (auto& more : {sensor_fields(), uncertainty_fields(header), loading_fields(header)}) {
-    fields.insert(fields.end(), more.begin(), more.end());
+  std::vector<PointField> all;
+  for (const PointColumn& column : kPointColumns) {
+    if (column.field.empty()) continue;
+    std::ranges::move(fields_of(column, header), std::back_inserter(all));
   }
-  return fields;
+  std::stable_partition(all.begin(), all.end(), [](const PointField& field) {
+    return kCapitals.find(field.column->axis) < 3;
+  });
+  return all;
 }
 
 RecordPacker::RecordPacker(std::vector<PointField> fields) : fields_(std::move(fields)) {
@@ -182,18 +178,14 @@ RecordPacker::RecordPacker(std::vector<PointField> fields) : fields_(std::move(f
   }
 }
 
-void RecordPacker::pack(const Points& points, std::uint8_t* out, std::size_t stride) {
-  if (points.size() == 0) return;
-  values_.resize(points.size());
-  for (std::size_t k = 0; k < fields_.size(); ++k) {
-    fields_[k].values(points, 0, values_);
-    with_number_type(fields_[k].type, [&]<class T>() {
-      std::uint8_t* to = out + offsets_[k];
-      for (const double value : values_) {
-        io::store<T>(to, static_cast<T>(value));
-        to += stride;
-      }
-    });
+void RecordPacker::pack(const Points& points, std::size_t first, std::size_t rows,
+                        std::uint8_t* out, std::size_t stride) const {
+  for (const std::size_t end = first + rows; first < end; first += kPackedRows) {
+    const std::size_t count = std::min(kPackedRows, end - first);
+    for (std::size_t k = 0; k < fields_.size(); ++k) {
+      fields_[k].store(points, first, count, out + offsets_[k], stride);
+    }
+    out += count * stride;
   }
 }
 

@@ -75,7 +75,7 @@ RecordFile::RecordFile(const std::string& path, std::vector<PointField> fields, 
 
 void RecordFile::write(const Points& points) {
   records_.resize(points.size() * packer_.record_bytes());
-  packer_.pack(points, records_.data(), packer_.record_bytes());
+  packer_.pack(points, 0, points.size(), records_.data(), packer_.record_bytes());
   file_.append(records_.data(), records_.size());
   points_ += points.size();
 }
@@ -99,9 +99,9 @@ std::vector<std::string> header_notes(const CloudHeader& header,
   if (!header.frame.wkt.empty()) add_note(notes, "coordinate_system", header.frame.wkt);
   add_note(notes, "time_reference", recordings::to_string(header.time_reference));
   for (const PointField& field : fields) {
+    const std::string unit = field.unit();
     add_note(notes, field.name,
-             field.unit.empty() ? field.description
-                                : fmt::format("[{}] {}", field.unit, field.description));
+             unit.empty() ? field.note : fmt::format("[{}] {}", unit, field.note));
   }
   for (std::size_t i = 0; i < header.factors.size(); ++i) {
     add_note(notes, fmt::format("factor {}", i + 1), header.factors[i]);
@@ -117,17 +117,17 @@ std::vector<PointField> pcl_fields(const CloudHeader& header) {
         "allowed las-1.4, laz, netcdf, csv, npy");
   }
   std::vector<PointField> fields = all_fields(header);
-  const auto rename = [&fields](std::string_view from, std::string_view to, FieldType type) {
+  const auto rename = [&fields](std::string_view from, std::string_view to, PointType type) {
     const auto field =
         std::ranges::find_if(fields, [from](const PointField& one) { return one.name == from; });
     field->name = to;
     field->type = type;
   };
-  rename("X", "x", FieldType::float32);
-  rename("Y", "y", FieldType::float32);
-  rename("Z", "z", FieldType::float32);
-  rename("Intensity", "intensity", FieldType::float32);
-  rename("Time", "time", FieldType::float64);
+  rename("X", "x", PointType::float32);
+  rename("Y", "y", PointType::float32);
+  rename("Z", "z", PointType::float32);
+  rename("Intensity", "intensity", PointType::float32);
+  rename("Time", "time", PointType::float64);
   return fields;
 }
 

@@ -153,7 +153,7 @@ class RosbagWriter final : public CloudWriter {
   void write(const Points& points) override {
     const std::size_t step = point_bytes();
     records_.resize(points.size() * step);
-    packer_.pack(points, records_.data(), step);
+    packer_.pack(points, 0, points.size(), records_.data(), step);
     const std::size_t most = std::max<std::size_t>(kMessageBytes / step, 1) * step;
     std::size_t first = 0;  // of those not in message_ yet
     const auto take = [&](std::size_t end) {

@@ -49,28 +49,15 @@ struct NetcdfColumn {
 
 /// Calls a function with every column of the row table.
 template <class Rows, class Function>
-void for_each_column(Rows&& rows, Function&& f) {
-  f(NetcdfColumn{"time", "ns", "time of the shot"}, rows.time_ns);
-  f(NetcdfColumn{"azimuth", "radian", "azimuth from X towards Y"}, rows.azimuth);
-  f(NetcdfColumn{"zenith", "radian", "zenith angle from Z"}, rows.zenith);
-  f(NetcdfColumn{"range", "m", "range, 0 where the shot had no return"}, rows.range);
-  f(NetcdfColumn{"azimuth_resolution", "radian", "rounding step of the azimuth, 0 where unknown"},
-    rows.azimuth_resolution);
-  f(NetcdfColumn{"zenith_resolution", "radian",
-                 "rounding step of the zenith angle, 0 where unknown"},
-    rows.zenith_resolution);
-  f(NetcdfColumn{"range_resolution", "m", "rounding step of the range, 0 where unknown"},
-    rows.range_resolution);
-  f(NetcdfColumn{"intensity", "1", "intensity as the sensor reports it"}, rows.intensity);
-  f(NetcdfColumn{"return_number", "1", "number of the return within its shot, from 1"},
-    rows.return_number);
-  f(NetcdfColumn{"tag", "1", "tag byte of the sensor"}, rows.tag);
-  f(NetcdfColumn{"beam", "1", "firing beam, from 0"}, rows.beam);
-  f(NetcdfColumn{"device", "1", "row of the device table"}, rows.device);
-  f(NetcdfColumn{"valid", "1", "1 where the direction can be trusted"}, rows.valid);
+void for_each_row_column(Rows&& rows, const Function& f) {
+  for_each_entry<kObservationColumns>(
+      [&f](const ObservationColumn& entry, auto& column) {
+        f(NetcdfColumn{entry.variable, entry.unit, entry.meaning}, column);
+      },
+      rows);
 }
 
-/// As for_each_column(), of the tables of records: with the members that columns hold.
+/// As for_each_row_column(), of the tables of records: with the members that columns hold.
 template <class Function>
 void for_each_packet_column(Function&& f) {
   f(NetcdfColumn{"packet_rows", "1", "number of rows of the packet"}, &Packet::rows);

@@ -94,7 +94,7 @@ class NetcdfReader final : public Reader {
     row_count_ = row.length;
     packet_count_ = packet.length;
     imu_count_ = sample.length;
-    for_each_column(Observations{}, RequireColumns{file_, variables_, row, kRowBlock});
+    for_each_row_column(Observations{}, RequireColumns{file_, variables_, row, kRowBlock});
     for_each_packet_column(RequireColumns{file_, variables_, packet, kPacketBlock});
     for_each_imu_column(RequireColumns{file_, variables_, sample, kImuBlock});
   }
@@ -217,7 +217,7 @@ class NetcdfReader final : public Reader {
     while (rows.size() < count) {
       const std::size_t start = row_ + rows.size();
       const std::size_t length = std::min(kRowBlock - start % kRowBlock, count - rows.size());
-      for_each_column(block, GetColumns{file_, variables_, start, length});
+      for_each_row_column(block, GetColumns{file_, variables_, start, length});
       for (std::size_t i = 0; i < length; ++i) {
         require_known_device("device", block.device[i], start + i);
       }

@@ -148,7 +148,7 @@ class NetcdfWriter final : public Writer {
     }
     const auto device = file_.define_dimension(kDeviceDimension, header.devices.size());
     const auto row = file_.define_growing_dimension(kRowDimension);
-    for_each_column(rows_, DefineColumns{file_, variables_, inner, row, kRowBlock});
+    for_each_row_column(rows_, DefineColumns{file_, variables_, inner, row, kRowBlock});
     const auto packet = file_.define_growing_dimension(kPacketDimension);
     for_each_packet_column(DefineColumns{file_, variables_, inner, packet, kPacketBlock});
     const auto sample = file_.define_growing_dimension(kImuDimension);
@@ -190,7 +190,7 @@ class NetcdfWriter final : public Writer {
       std::uint64_t packets_end = rows_of_written_packets_;
       for (std::size_t i = 0; i < packets; ++i) packets_end += packets_[i].rows;
       if (rows > 0 && (packets == 0 || rows_written_ + rows <= packets_end)) {
-        for_each_column(rows_, PutColumns{file_, variables_, rows_written_, done, rows});
+        for_each_row_column(rows_, PutColumns{file_, variables_, rows_written_, done, rows});
         rows_written_ += rows;
         done += rows;
       } else if (packets > 0) {
@@ -204,7 +204,7 @@ class NetcdfWriter final : public Writer {
       }
     }
     if (done == 0) return;
-    for_each_column(rows_, [done](const NetcdfColumn&, auto& column) {
+    for_each_row_column(rows_, [done](const NetcdfColumn&, auto& column) {
       column.erase(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(done));
     });
   }
