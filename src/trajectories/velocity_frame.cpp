@@ -210,7 +210,7 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
       if (total(*own) > largest) {
         const bool other = total(best) <= largest && 3 * total(best) < total(*own);
         trajectory.warnings.push_back(
-            {{},
+            {kWarning.velocity_frame,
              fmt::format("velocities are stated as {} and differ from the change of the positions "
                          "by {} (north, east, down){}",
                          found.name, in_mm(*found.residual),

@@ -112,8 +112,8 @@ BinaryTableReader::BinaryTableReader(std::string path, std::string_view format, 
   } catch (const BadColumns& bad) {
     throw FileError(path_, {table_.columns_offset, {}}, bad.what());
   }
-  for (std::string& warning : table_.warnings) {
-    warn({table_.columns_offset, {}}, std::move(warning));
+  for (Warning& warning : table_.warnings) {
+    warn(warning.code, std::move(warning.message), {table_.columns_offset, {}});
   }
   open_lanes();
 }

@@ -47,7 +47,7 @@ std::size_t bytes_described(const std::uint8_t* descriptor) {
 
 class HeaderReader {
  public:
-  HeaderReader(io::BlockInput& input, std::vector<ReadWarning>& warnings)
+  HeaderReader(io::BlockInput& input, std::vector<Warning>& warnings)
       : input_(input), warnings_(warnings) {}
 
   PublicHeader read() {
@@ -80,8 +80,8 @@ class HeaderReader {
     throw FileError(input_.path(), {offset, {}}, problem);
   }
 
-  void warn(std::uint64_t offset, std::string message) {
-    warnings_.push_back({{offset, {}}, std::move(message), 0});
+  void warn(WarningCode code, std::uint64_t offset, std::string message) {
+    warnings_.push_back({code, std::move(message), {offset, {}}});
   }
 
   template <class T>
@@ -151,9 +151,10 @@ class HeaderReader {
     if (count == 0 && !is_modern(header_.point_format)) return;  // some fill in the old one alone
     header_.points = count;
     if (old_count == 0 || old_count == count) return;
-    warn(kCountAt, fmt::format("the header says {} points in its old counter and {} in that of LAS "
-                               "1.4; the latter is used",
-                               old_count, count));
+    warn(kWarning.header_contradicted, kCountAt,
+         fmt::format("the header says {} points in its old counter and {} in that of LAS "
+                     "1.4; the latter is used",
+                     old_count, count));
   }
 
   void step_over_records() {
@@ -189,7 +190,7 @@ class HeaderReader {
       const std::uint64_t length =
           left < kExtendedRecordHeaderBytes ? 0 : number<std::uint64_t>(at + 20);
       if (left < kExtendedRecordHeaderBytes || left - kExtendedRecordHeaderBytes < length) {
-        warn(kExtendedAt,
+        warn(kWarning.content_left_out, kExtendedAt,
              fmt::format("extended record {} of {}, at byte {}, does not lie between the points "
                          "and the end of the file; it and those after it were left out",
                          i + 1, count, at));
@@ -216,9 +217,10 @@ class HeaderReader {
       const std::uint8_t* const descriptor = input_.at(at, kDescriptorBytes);
       const std::size_t bytes = bytes_described(descriptor);
       if (place + bytes > header_.record_bytes) {
-        warn(at, fmt::format("the extra bytes described from here on lie beyond the end of the "
-                             "point records, which have {} bytes; they were left out",
-                             header_.record_bytes));
+        warn(kWarning.columns_unused, at,
+             fmt::format("the extra bytes described from here on lie beyond the end of the "
+                         "point records, which have {} bytes; they were left out",
+                         header_.record_bytes));
         return;
       }
       constexpr std::uint8_t kUint8 = 1;
@@ -231,7 +233,7 @@ class HeaderReader {
   }
 
   io::BlockInput& input_;
-  std::vector<ReadWarning>& warnings_;
+  std::vector<Warning>& warnings_;
   PublicHeader header_;
   std::uint64_t header_size_ = 0;
 };
@@ -248,7 +250,7 @@ std::optional<std::int64_t> utc_of_adjusted_gps(double seconds) {
   return utc_ns;
 }
 
-PublicHeader read_header(io::BlockInput& input, std::vector<ReadWarning>& warnings) {
+PublicHeader read_header(io::BlockInput& input, std::vector<Warning>& warnings) {
   return HeaderReader(input, warnings).read();
 }
 

@@ -187,8 +187,9 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   if (!head.layout.names.empty()) {
     head.layout.names_line = head.layout.rows_line;
     head.layout.warnings.push_back(
-        fmt::format("the columns have no names: behind a number of rows they were taken as {}",
-                    fmt::join(head.layout.names, ", ")));
+        {kWarning.columns_guessed,
+         fmt::format("the columns have no names: behind a number of rows they were taken as {}",
+                     fmt::join(head.layout.names, ", "))});
   }
   return head;
 }
