@@ -335,19 +335,16 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
         {kWarning.sigmas_too_small, residuals + ": the sigmas are too small by about that factor"});
   } else if (ratio < 0.93) {
     estimate.warnings.push_back(
-        {kWarning.unusual_noise,
-         residuals + ": the rotors' noise is set so high that they follow the noise, or "
-                     "the stated noise is too large"});
+        {kWarning.unusual_noise, residuals + ": the rotors' noise is set so high that they follow "
+                                             "the noise, or the stated noise is too large"});
   }
   if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * estimate.usual_noise) {
-    estimate.warnings.push_back(
-        {kWarning.unusual_noise,
-         fmt::format("the directions are {:.3g} times as noisy ({:.3g} deg, {}) as the preset says "
-                     "of a healthy unit ({:.3g} deg)",
-                     estimate.noise.value.rms() / estimate.usual_noise,
-                     degrees_from_radians(estimate.noise.value.rms()),
-                     offset_text(estimate.noise.value.rms()),
-                     degrees_from_radians(estimate.usual_noise))});
+    warn(estimate.warnings, kWarning.unusual_noise,
+         "the directions are {:.3g} times as noisy ({:.3g} deg, {}) as the preset says of a "
+         "healthy unit ({:.3g} deg)",
+         estimate.noise.value.rms() / estimate.usual_noise,
+         degrees_from_radians(estimate.noise.value.rms()), offset_text(estimate.noise.value.rms()),
+         degrees_from_radians(estimate.usual_noise));
     oddities.push_back(estimate.warnings.back().message);
   }
   double unevenness = 1.0;
@@ -358,35 +355,28 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
     uneven = k;
   }
   if (unevenness > kUneven * estimate.autocorrelation.factor) {
-    estimate.warnings.push_back(
-        {kWarning.model_incomplete,
-         fmt::format("residuals depend on the rotation angle of prism {} ({:.3g} times what chance "
-                     "would make of them): the model lacks something that this sensor has, or a "
-                     "parameter is held at a wrong "
-                     "value; the sigmas do not cover that",
-                     prism_letter(static_cast<int>(uneven)), unevenness)});
+    warn(estimate.warnings, kWarning.model_incomplete,
+         "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would make "
+         "of them): the model lacks something that this sensor has, or a parameter is held at a "
+         "wrong value; the sigmas do not cover that",
+         prism_letter(static_cast<int>(uneven)), unevenness);
     oddities.push_back(estimate.warnings.back().message);
   }
   if (estimate.autocorrelation.factor > 1.05) {
-    estimate.warnings.push_back(
-        {kWarning.sigmas_enlarged,
-         fmt::format(
-             "residuals of neighbouring shots are correlated ({:.2f} from one to the next): every "
-             "variance was multiplied by {:.3g}",
-             estimate.autocorrelation.rho.front(), estimate.autocorrelation.factor)});
+    warn(estimate.warnings, kWarning.sigmas_enlarged,
+         "residuals of neighbouring shots are correlated ({:.2f} from one to the next): every "
+         "variance was multiplied by {:.3g}",
+         estimate.autocorrelation.rho.front(), estimate.autocorrelation.factor);
   }
   if (estimate.unused_shots > 0) {
-    estimate.warnings.push_back(
-        {kWarning.shots_unused,
-         fmt::format("{} shots lie in pieces between clock resets or long gaps that are too short "
-                     "to find the "
-                     "rotors' phases, or run in the other speed combination; they were not used",
-                     estimate.unused_shots)});
+    warn(estimate.warnings, kWarning.shots_unused,
+         "{} shots lie in pieces between clock resets or long gaps that are too short to find the "
+         "rotors' phases, or run in the other speed combination; they were not used",
+         estimate.unused_shots);
   }
   if (estimate.converged && outlier_share > 0.02) {
-    estimate.warnings.push_back(
-        {kWarning.many_outliers,
-         fmt::format("{:.1f} % of the shots were left out as outliers", 100 * outlier_share)});
+    warn(estimate.warnings, kWarning.many_outliers,
+         "{:.1f} % of the shots were left out as outliers", 100 * outlier_share);
     oddities.push_back(estimate.warnings.back().message);
   }
   say_verdict(estimate, nominal, std::move(oddities), unusual_values(estimate, nominal));
@@ -461,10 +451,8 @@ void hold_mute_emitters(const PrismTrain& train, Estimate& estimate) {
     std::erase_if(estimate.free, [&](const FreeParameter& parameter) {
       return place::emitter(parameter.places.front(), train.prisms()) == emitter;
     });
-    estimate.warnings.push_back(
-        {kWarning.not_seen,
-         fmt::format("no shot is of emitter {}: its direction was held at the preset's",
-                     emitter + 1)});
+    warn(estimate.warnings, kWarning.not_seen,
+         "no shot is of emitter {}: its direction was held at the preset's", emitter + 1);
   }
 }
 
@@ -636,12 +624,10 @@ Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
       const auto longest = std::max_element(
           ranges.begin(), ranges.end(),
           [](const ShotRange& a, const ShotRange& b) { return a.size() < b.size(); });
-      estimate.warnings.push_back(
-          {kWarning.clock_reset,
-           fmt::format(
-               "the clock was reset or the recording paused {} times: the filter takes the longest "
-               "piece, {} of {} shots",
-               ranges.size() - 1, longest->size(), estimate.series.size())});
+      warn(estimate.warnings, kWarning.clock_reset,
+           "the clock was reset or the recording paused {} times: the filter takes the longest "
+           "piece, {} of {} shots",
+           ranges.size() - 1, longest->size(), estimate.series.size());
       head_is_used = longest == ranges.begin();
       estimate.series = estimate.series.rows(*longest);
     }
@@ -663,16 +649,14 @@ Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
       estimate.series.change([&](AngleSeries& rows) {
         add_half_steps(rows, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
       });
-      estimate.warnings.push_back(
-          {kWarning.coordinates_cut,
+      warn(estimate.warnings, kWarning.coordinates_cut,
            "the coordinates were cut off to whole steps and not rounded: half a step was added to "
-           "each"});
+           "each");
     }
   }
   if (estimate.mirrored) {
-    estimate.warnings.push_back(
-        {kWarning.mirrored,
-         "the recording is a mirror image (its elevation has the other sign) and was turned"});
+    warn(estimate.warnings, kWarning.mirrored,
+         "the recording is a mirror image (its elevation has the other sign) and was turned");
   }
   static_cast<Solution&>(estimate) = solve(estimate, options, progress);
   if (estimate.frame_turn) {

@@ -102,12 +102,11 @@ std::int64_t shift_of(const CalibratedFlight& result, const trajectories::Trajec
   const auto shift =
       utc ? trajectories::shift_from_utc_ns(trajectory, first_ns) : std::optional<std::int64_t>();
   if (!shift) {
-    warnings.push_back(
-        {kWarning.clock_unknown,
-         fmt::format("{}: its times are taken to be on the trajectory's clock, after adding the "
-                     "clock offset of the mount",
-                     utc ? "the trajectory does not say what its times count"
-                         : "the recordings do not say what their clock counts")});
+    warn(warnings, kWarning.clock_unknown,
+         "{}: its times are taken to be on the trajectory's clock, after adding the clock offset "
+         "of the mount",
+         utc ? "the trajectory does not say what its times count"
+             : "the recordings do not say what their clock counts");
   }
   return shift.value_or(0);
 }

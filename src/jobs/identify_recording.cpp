@@ -48,11 +48,10 @@ estimation::AngleSeries read(const recordings::Source& recording,
   warn_of_left_out(selector.counts(), result.warnings);
   result.cropped = input.choice.has_value();
   if (result.cropped) {
-    result.warnings.push_back(
-        {kWarning.packets_incomplete,
-         fmt::format("the optics of {} were used to find when the shots in packets with missing "
-                     "points were fired: what is found here is not independent of them",
-                     input.choice->sensor.name)});
+    warn(result.warnings, kWarning.packets_incomplete,
+         "the optics of {} were used to find when the shots in packets with missing points were "
+         "fired: what is found here is not independent of them",
+         input.choice->sensor.name);
   }
   return selector.take_series();
 }

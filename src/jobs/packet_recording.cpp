@@ -122,23 +122,18 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
       "was exported from";
   PlacedRows result;
   if (found.followed) {
-    result.warnings.push_back(
-        {kWarning.packets_incomplete,
-         fmt::format(
-             "{}: the rotors were followed, which shows when each of {} shots was fired; {} "
-             "shots that fit two places in their packet are left out",
-             lacking, told, unknown)});
+    warn(result.warnings, kWarning.packets_incomplete,
+         "{}: the rotors were followed, which shows when each of {} shots was fired; {} shots that "
+         "fit two places in their packet are left out",
+         lacking, told, unknown);
   } else if (untold == UntoldShots::guessed) {
     estimation::GuessedPlaces guess = estimation::guess_places(shots_, found.place);
     found.place = std::move(guess.place);
     result.time_uncertainty = guess.most_off / rate;
-    result.warnings.push_back(
-        {kWarning.times_guessed,
-         fmt::format("{}: they do not show how the rotors of the sensor {} turned. The times of {} "
-                     "of {} shots "
-                     "are guessed, in their order, and may be off by up to {:.2g} ms; {}",
-                     lacking, sensor.name, unknown, told + unknown, 1e3 * result.time_uncertainty,
-                     remedy)});
+    warn(result.warnings, kWarning.times_guessed,
+         "{}: they do not show how the rotors of the sensor {} turned. The times of {} of {} shots "
+         "are guessed, in their order, and may be off by up to {:.2g} ms; {}",
+         lacking, sensor.name, unknown, told + unknown, 1e3 * result.time_uncertainty, remedy);
   } else if (told < kFewestPackets * static_cast<std::size_t>(shots_.places)) {
     throw EstimationError(fmt::format(
         "{}: when the shots were fired is unknown, because they do not show how the rotors of the "
@@ -147,26 +142,22 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
         lacking, sensor.name, told, whole, kFewestPackets * static_cast<std::size_t>(shots_.places),
         remedy));
   } else {
-    result.warnings.push_back(
-        {kWarning.shots_unused,
-         fmt::format(
-             "{}: they do not show how the rotors of the sensor {} turned. Only {} of {} shots "
-             "are used, whose places are known without that, in {} whole packets and in "
-             "runs that continue from packet to packet; {}",
-             lacking, sensor.name, told, told + unknown, whole, remedy)});
+    warn(result.warnings, kWarning.shots_unused,
+         "{}: they do not show how the rotors of the sensor {} turned. Only {} of {} shots are "
+         "used, whose places are known without that, in {} whole packets and in runs that continue "
+         "from packet to packet; {}",
+         lacking, sensor.name, told, told + unknown, whole, remedy);
   }
   if (shot_rate) {
-    result.warnings.push_back(
-        {kWarning.packets_incomplete,
-         fmt::format("shots cannot be counted where points are missing: the packets keep their "
-                     "times, and {:.6g} shots per second hold within a packet only",
-                     *shot_rate)});
+    warn(result.warnings, kWarning.packets_incomplete,
+         "shots cannot be counted where points are missing: the packets keep their times, and "
+         "{:.6g} shots per second hold within a packet only",
+         *shot_rate);
   }
   if (found.cut_coordinates) {
-    result.warnings.push_back(
-        {kWarning.coordinates_cut,
+    warn(result.warnings, kWarning.coordinates_cut,
          "the coordinates of the points were evidently truncated towards zero, not rounded: half a "
-         "step was added back"});
+         "step was added back");
   }
   result.places = places_of_rows(found.place, rate, std::move(found.firing_order));
   result.places.cut_coordinates = found.cut_coordinates;

@@ -164,30 +164,26 @@ std::vector<Warning> warnings_of(const estimation::ShotCount& count, double rate
   std::size_t mended = 0;
   for (const recordings::ShotSlip& slip : count.slips) {
     if (!slip.counted) {
-      warnings.push_back(
-          {kWarning.shots_lost,
-           fmt::format("shots are missing before row {}, and the rotors do not show how many: the "
-                       "recording was cut there",
-                       slip.row)});
+      warn(warnings, kWarning.shots_lost,
+           "shots are missing before row {}, and the rotors do not show how many: the recording "
+           "was cut there",
+           slip.row);
       continue;
     }
     ++mended;
     lost += slip.shots;
   }
   if (mended > 0) {
-    warnings.push_back({kWarning.shots_lost,
-                        fmt::format("{} gap{} in the shot count {} found ({} shots lost), and the "
-                                    "times behind {} corrected",
-                                    mended, mended == 1 ? "" : "s", mended == 1 ? "was" : "were",
-                                    lost, mended == 1 ? "it" : "them")});
+    warn(warnings, kWarning.shots_lost,
+         "{} gap{} in the shot count {} found ({} shots lost), and the times behind {} corrected",
+         mended, mended == 1 ? "" : "s", mended == 1 ? "was" : "were", lost,
+         mended == 1 ? "it" : "them");
   }
   if (!warnings.empty() && !given) {
-    warnings.push_back(
-        {kWarning.times_corrected,
-         fmt::format(
-             "the times of the recording are evidently shot numbers: they were counted anew at "
-             "{:.6g} shots per second",
-             rate)});
+    warn(warnings, kWarning.times_corrected,
+         "the times of the recording are evidently shot numbers: they were counted anew at {:.6g} "
+         "shots per second",
+         rate);
   }
   bool in_turn = true;
   std::string order;
@@ -196,11 +192,8 @@ std::vector<Warning> warnings_of(const estimation::ShotCount& count, double rate
     order += fmt::format("{}{}", order.empty() ? "" : ", ", count.firing_order[i] + 1);
   }
   if (!in_turn) {
-    warnings.push_back(
-        {kWarning.firing_order,
-         fmt::format(
-             "the file names no emitters: from its first shot on, they fire in the order {}",
-             order)});
+    warn(warnings, kWarning.firing_order,
+         "the file names no emitters: from its first shot on, they fire in the order {}", order);
   }
   return warnings;
 }
@@ -276,12 +269,10 @@ void require_all_shots(const estimation::CountedShots& shots, const sensors::Sen
 void find_times(PreparedRecording& recording, const Preparation& wishes, const Progress& progress) {
   if (const auto sensor =
           sensor_to_count_by(recording.reader->header(), recording.reading, wishes.sensor)) {
-    recording.warnings.push_back(
-        {kWarning.times_corrected,
-         fmt::format(
-             "all times of the recording are the same: shots were counted at the {:.6g} shots "
-             "per second of {}",
-             sensor->shot_rate, sensor->name)});
+    warn(recording.warnings, kWarning.times_corrected,
+         "all times of the recording are the same: shots were counted at the {:.6g} shots per "
+         "second of {}",
+         sensor->shot_rate, sensor->name);
     recording.reading.shot_rate = sensor->shot_rate;
     recording.read_again(progress);
   }
@@ -303,12 +294,10 @@ void turn_back(PreparedRecording& recording, const Progress& progress) {
     recording.reading.extrinsics = roll_about_axis(choice.roll, choice.frame);
     recording.read_again(progress);
     recording.turned_back = true;
-    recording.warnings.push_back(
-        {kWarning.turned_back,
-         fmt::format("the recording is rotated about the optical axis by {:.1f} deg, as the "
-                     "positions of the "
-                     "sensor's emitters show: the shots were turned back by that angle",
-                     degrees_from_radians(choice.roll))});
+    warn(recording.warnings, kWarning.turned_back,
+         "the recording is rotated about the optical axis by {:.1f} deg, as the positions of the "
+         "sensor's emitters show: the shots were turned back by that angle",
+         degrees_from_radians(choice.roll));
     return;
   }
   recordings::ReadOptions turned_back = recording.reading;
@@ -333,15 +322,13 @@ void turn_back(PreparedRecording& recording, const Progress& progress) {
     recording.warnings.push_back(
         {kWarning.turned_back, found + ": the shots were turned back into the sensor's frame"});
   } else if (!decided) {
-    recording.warnings.push_back(
-        {kWarning.pose_undecided,
-         fmt::format("{}: that does not show whether the pose was applied to them; {}. {} decides "
-                     "it: give the "
-                     "pose, or 0,0,0 for shots in the sensor's frame",
-                     found,
-                     recording.turned_back ? "they were turned back, because a hub recorded them"
-                                           : "they were taken as they are",
-                     name_of(kSetting.extrinsics))});
+    warn(recording.warnings, kWarning.pose_undecided,
+         "{}: that does not show whether the pose was applied to them; {}. {} decides it: give the "
+         "pose, or 0,0,0 for shots in the sensor's frame",
+         found,
+         recording.turned_back ? "they were turned back, because a hub recorded them"
+                               : "they were taken as they are",
+         name_of(kSetting.extrinsics));
   }
 }
 

@@ -63,11 +63,10 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   result.counts = selector.counts();
   warn_of_left_out(result.counts, result.warnings);
   if (result.counts.clock_resets > 0) {
-    result.warnings.push_back(
-        {kWarning.clock_reset,
-         fmt::format("the clock of the recording jumps back {} times: the pieces share their "
-                     "parameters, and in each the rotors are found anew",
-                     result.counts.clock_resets)});
+    warn(result.warnings, kWarning.clock_reset,
+         "the clock of the recording jumps back {} times: the pieces share their parameters, and "
+         "in each the rotors are found anew",
+         result.counts.clock_resets);
   }
   result.head = selector.head();
   if (are_same_shots(result.head, input.first.head)) result.found = std::move(input.first.found);
@@ -77,18 +76,16 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
 
 void warn_of_left_out(const estimation::SelectionCounts& counts, std::vector<Warning>& warnings) {
   if (counts.out_of_order > 0) {
-    warnings.push_back(
-        {kWarning.shots_unused, fmt::format("{} of {} shots are a little earlier than the shot "
-                                            "before and were left out: packets came "
-                                            "late",
-                                            counts.out_of_order, counts.rows)});
+    warn(warnings, kWarning.shots_unused,
+         "{} of {} shots are a little earlier than the shot before and were left out: packets came "
+         "late",
+         counts.out_of_order, counts.rows);
   }
   if (counts.equal_times > 0) {
-    warnings.push_back(
-        {kWarning.shots_unused,
-         fmt::format("{} of {} shots have the time of the shot before, so that nobody knows when "
-                     "they were fired, and were left out: {} counts shots, where none is missing",
-                     counts.equal_times, counts.rows, name_of(kSetting.shot_rate))});
+    warn(warnings, kWarning.shots_unused,
+         "{} of {} shots have the time of the shot before, so that nobody knows when they were "
+         "fired, and were left out: {} counts shots, where none is missing",
+         counts.equal_times, counts.rows, name_of(kSetting.shot_rate));
   }
 }
 

@@ -97,10 +97,9 @@ std::vector<Warning> ResultFolder::commit() {
                       "stopped while it\nput its results in place. Run it again.\n");
   for (const std::string& name : left_over()) {
     const std::string aside = set_aside(path(name));
-    moves.push_back(
-        {kWarning.results_renamed,
-         fmt::format("{} is from an earlier run, and this run wrote none: it was renamed {}",
-                     path(name), aside)});
+    warn(moves, kWarning.results_renamed,
+         "{} is from an earlier run, and this run wrote none: it was renamed {}", path(name),
+         aside);
   }
   for (io::OutputFile& file : files_) file.commit();
   std::error_code code;

@@ -312,37 +312,34 @@ class JudgedReader final : public Reader {
     clock_wraps_ = inner_->clock_wraps();
     if (mixed_rows_ > 0) {
       warn(kWarning.rows_sorted,
-           fmt::format("{} rows are earlier than one before them: the rows do not stand in the "
-                       "order in which the shots were fired, and were sorted by their times",
-                       mixed_rows_));
+           "{} rows are earlier than one before them: the rows do not stand in the order in which "
+           "the shots were fired, and were sorted by their times",
+           mixed_rows_);
     }
     for (const Device& device : devices_) {
       if (device.order.order == RowOrder::begins_anew && !judgement_->counted) {
-        warn(
-            kWarning.times_corrected,
-            fmt::format("times begin anew with every message or packet and tell nothing beyond "
-                        "one: shots were counted in the order of the file, at the {:.6g} shots per "
-                        "second within messages; {} names another rate",
-                        1e9 / device.order.step_ns, name_of(kSetting.shot_rate)));
+        warn(kWarning.times_corrected,
+             "times begin anew with every message or packet and tell nothing beyond one: shots "
+             "were counted in the order of the file, at the {:.6g} shots per second within "
+             "messages; {} names another rate",
+             1e9 / device.order.step_ns, name_of(kSetting.shot_rate));
       } else if (device.order.order == RowOrder::constant && !judgement_->counted) {
-        warn(
-            kWarning.no_shot_times,
-            fmt::format("all times are the same, and tell nothing: shots are numbered in the order "
-                        "of the file; {} counts their times",
-                        name_of(kSetting.shot_rate)));
+        warn(kWarning.no_shot_times,
+             "all times are the same, and tell nothing: shots are numbered in the order of the "
+             "file; {} counts their times",
+             name_of(kSetting.shot_rate));
       } else if (device.order.order == RowOrder::overlapping) {
         warn(kWarning.devices_unclear,
              "pieces of the recording begin within the time of those before them: several sensors "
              "seem to share one stream, and nothing in the file tells them apart");
       } else if (device.grid) {
         if (const std::string words = device.grid->words(); !words.empty())
-          warn(kWarning.times_corrected, words);
+          warnings_.push_back({kWarning.times_corrected, words});
       }
     }
     if (off_grid_ > 0) {
       warn(kWarning.times_corrected,
-           fmt::format("{} shots do not stand on that grid, and their times were left as they are",
-                       off_grid_));
+           "{} shots do not stand on that grid, and their times were left as they are", off_grid_);
     }
     if (judgement_->in_packets) {
       warn(kWarning.content_left_out,
@@ -351,8 +348,8 @@ class JudgedReader final : public Reader {
     if (lost_samples_ > 0) {
       warn(kWarning.content_left_out,
            "inertial samples were left out: their times cannot be compared with those of counted "
-           "shots",
-           {}, lost_samples_);
+           "shots")
+          .lost_records = lost_samples_;
     }
   }
 

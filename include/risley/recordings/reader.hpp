@@ -56,9 +56,9 @@ class Reader {
   std::uint64_t clock_wraps_ = 0;
 
   /// Adds to warnings().
-  void warn(WarningCode code, std::string message, FilePlace place = {},
-            std::uint64_t lost_records = 0) {
-    warnings_.push_back({code, std::move(message), place, lost_records});
+  template <class... Values>
+  Warning& warn(WarningCode code, fmt::format_string<Values...> words, Values&&... values) {
+    return risley::warn(warnings_, code, words, std::forward<Values>(values)...);
   }
 };
 

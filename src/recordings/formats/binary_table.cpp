@@ -113,7 +113,8 @@ BinaryTableReader::BinaryTableReader(std::string path, std::string_view format, 
     throw FileError(path_, {table_.columns_offset, {}}, bad.what());
   }
   for (Warning& warning : table_.warnings) {
-    warn(warning.code, std::move(warning.message), {table_.columns_offset, {}});
+    warning.place.byte_offset = table_.columns_offset;
+    warnings_.push_back(std::move(warning));
   }
   open_lanes();
 }

@@ -143,9 +143,9 @@ class LasReader final : public Reader {
     // Equal but for the rounding of decimal fractions is equal.
     if (*most <= *least * (1 + 1e-9)) return;
     warn(kWarning.values_changed,
-         fmt::format("coordinates are multiples of {:g}, {:g} and {:g} m in x, y and z; {:g} m "
-                     "is used for all three",
-                     steps[0], steps[1], steps[2], step_));
+         "coordinates are multiples of {:g}, {:g} and {:g} m in x, y and z; {:g} m is used for all "
+         "three",
+         steps[0], steps[1], steps[2], step_);
   }
 
   /// Decides what GPS times are.
@@ -154,9 +154,8 @@ class LasReader final : public Reader {
     if (!gps_time_at(file_.point_format)) {
       header_.has_times = false;
       warn(kWarning.no_shot_times,
-           fmt::format(
-               "points of format {} have no times; they are taken to be in the order of firing",
-               file_.point_format));
+           "points of format {} have no times; they are taken to be in the order of firing",
+           file_.point_format);
       return;
     }
     std::size_t shots = 0, times = 0;
@@ -173,10 +172,10 @@ class LasReader final : public Reader {
       header_.has_times = false;
       header_.all_times_equal = times == 1;
       warn(kWarning.no_shot_times,
-           fmt::format("GPS times are not those of single shots: {} of the first {} shots {}; "
-                       "points are taken to be in the order of firing",
-                       times == 1 ? "all" : fmt::format("{} on average", shots / times), shots,
-                       times == 1 ? fmt::format("have {} s", first) : "share one"));
+           "GPS times are not those of single shots: {} of the first {} shots {}; points are taken "
+           "to be in the order of firing",
+           times == 1 ? "all" : fmt::format("{} on average", shots / times), shots,
+           times == 1 ? fmt::format("have {} s", first) : "share one");
       return;
     }
     if (times_fit(adjusted) && adjusted) header_.time_reference = TimeReference::utc;
@@ -214,9 +213,9 @@ class LasReader final : public Reader {
     }
     if (found.empty()) return true;
     warn(kWarning.clock_unknown,
-         fmt::format("GPS times of {:.3f} to {:.3f} s do not fit the header: {}. They are read "
-                     "as they are, without an origin",
-                     low, high, found));
+         "GPS times of {:.3f} to {:.3f} s do not fit the header: {}. They are read as they are, "
+         "without an origin",
+         low, high, found);
     return false;
   }
 
@@ -264,9 +263,9 @@ class LasReader final : public Reader {
     if (!intensity_reported_) {
       intensity_reported_ = true;
       warn(kWarning.values_changed,
-           fmt::format("the intensity of point {} is {}, but none of the first {} points has "
-                       "more than 255; higher intensities are read as 255",
-                       row_ + 1, point.intensity, kPointsLookedAt));
+           "the intensity of point {} is {}, but none of the first {} points has more than 255; "
+           "higher intensities are read as 255",
+           row_ + 1, point.intensity, kPointsLookedAt);
     }
     return UINT8_MAX;
   }

@@ -80,10 +80,6 @@ class HeaderReader {
     throw FileError(input_.path(), {offset, {}}, problem);
   }
 
-  void warn(WarningCode code, std::uint64_t offset, std::string message) {
-    warnings_.push_back({code, std::move(message), {offset, {}}});
-  }
-
   template <class T>
   T number(std::uint64_t offset) {
     return load<T>(input_.at(offset, sizeof(T)));
@@ -151,10 +147,11 @@ class HeaderReader {
     if (count == 0 && !is_modern(header_.point_format)) return;  // some fill in the old one alone
     header_.points = count;
     if (old_count == 0 || old_count == count) return;
-    warn(kWarning.header_contradicted, kCountAt,
-         fmt::format("the header says {} points in its old counter and {} in that of LAS "
-                     "1.4; the latter is used",
-                     old_count, count));
+    warn(warnings_, kWarning.header_contradicted,
+         "the header says {} points in its old counter and {} in that of LAS 1.4; the latter is "
+         "used",
+         old_count, count)
+        .place.byte_offset = kCountAt;
   }
 
   void step_over_records() {
@@ -190,10 +187,11 @@ class HeaderReader {
       const std::uint64_t length =
           left < kExtendedRecordHeaderBytes ? 0 : number<std::uint64_t>(at + 20);
       if (left < kExtendedRecordHeaderBytes || left - kExtendedRecordHeaderBytes < length) {
-        warn(kWarning.content_left_out, kExtendedAt,
-             fmt::format("extended record {} of {}, at byte {}, does not lie between the points "
-                         "and the end of the file; it and those after it were left out",
-                         i + 1, count, at));
+        warn(warnings_, kWarning.content_left_out,
+             "extended record {} of {}, at byte {}, does not lie between the points and the end of "
+             "the file; it and those after it were left out",
+             i + 1, count, at)
+            .place.byte_offset = kExtendedAt;
         return;
       }
       if (describes_extra_bytes(at)) find_extra_bytes(at + kExtendedRecordHeaderBytes, length);
@@ -217,10 +215,11 @@ class HeaderReader {
       const std::uint8_t* const descriptor = input_.at(at, kDescriptorBytes);
       const std::size_t bytes = bytes_described(descriptor);
       if (place + bytes > header_.record_bytes) {
-        warn(kWarning.columns_unused, at,
-             fmt::format("the extra bytes described from here on lie beyond the end of the "
-                         "point records, which have {} bytes; they were left out",
-                         header_.record_bytes));
+        warn(warnings_, kWarning.columns_unused,
+             "the extra bytes described from here on lie beyond the end of the point records, "
+             "which have {} bytes; they were left out",
+             header_.record_bytes)
+            .place.byte_offset = at;
         return;
       }
       constexpr std::uint8_t kUint8 = 1;

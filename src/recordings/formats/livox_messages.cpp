@@ -181,9 +181,9 @@ void MessageReader::choose_topics() {
     const bags::Topic& topic = topics()[i];
     if (topic.kind == MessageKind::cloud && wanted == MessageKind::points) {
       warn(kWarning.content_left_out,
-           fmt::format("the point clouds of topic {} were left out: the Livox driver's own "
-                       "messages have better times",
-                       topic.name));
+           "the point clouds of topic {} were left out: the Livox driver's own messages have "
+           "better times",
+           topic.name);
     }
     if (topic.kind != wanted) continue;
     if (header_.devices.size() > UINT8_MAX) {
@@ -236,9 +236,9 @@ void MessageReader::find_lidars() {
     if (sharing > 1) {
       lidars_[i].assign(seen[i].begin(), seen[i].end());
       warn(kWarning.devices_unclear,
-           fmt::format("{} lidars share the topic {}: they are told apart by the numbers that the "
-                       "driver gave them",
-                       sharing, topics()[i].name));
+           "{} lidars share the topic {}: they are told apart by the numbers that the driver gave "
+           "them",
+           sharing, topics()[i].name);
       device.serial.clear();
     }
     for (std::size_t lidar = 0; lidar < sharing; ++lidar) {
@@ -280,10 +280,10 @@ void MessageReader::choose_imu_topics() {
     } else if (imu_topics == 1 && header_.devices.size() == 1) {
       devices_[i] = std::uint8_t{0};
     } else {
-      warn(kWarning.content_left_out,
-           fmt::format("the inertial samples of topic {} were left out: nothing says to which "
-                       "lidar they belong",
-                       topics()[i].name));
+      warn(
+          kWarning.content_left_out,
+          "the inertial samples of topic {} were left out: nothing says to which lidar they belong",
+          topics()[i].name);
     }
   }
 }
@@ -348,9 +348,9 @@ void MessageReader::find_cloud_times() {
       unused_times_[i] = searches[i].problem();
     } else if (constexpr double kCoarse_ns = 100; cloud_times_[i]->step_ns >= kCoarse_ns) {
       warn(kWarning.times_coarse,
-           fmt::format("the times of the points of topic {} are floating-point numbers in steps of "
-                       "{:.0f} ns (field {})",
-                       topics()[i].name, cloud_times_[i]->step_ns, cloud_times_[i]->field));
+           "the times of the points of topic {} are floating-point numbers in steps of {:.0f} ns "
+           "(field {})",
+           topics()[i].name, cloud_times_[i]->step_ns, cloud_times_[i]->field);
     }
   }
 }
@@ -395,9 +395,9 @@ void MessageReader::describe() {
     } else if (!first[i].accelerations.empty() && median(first[i].accelerations) > kLongestInG) {
       acceleration_units_[i] = 1.0 / kStandardGravity;
       warn(kWarning.unit_guessed,
-           fmt::format("judging by their size, the accelerations of topic {} are in m/s^2; they "
-                       "were divided by {} m/s^2",
-                       topics()[i].name, kStandardGravity));
+           "judging by their size, the accelerations of topic {} are in m/s^2; they were divided "
+           "by {} m/s^2",
+           topics()[i].name, kStandardGravity);
     }
   }
   rewind();
@@ -443,10 +443,9 @@ void MessageReader::compare_clocks(std::uint8_t device, const FirstMessages& fir
   if (!grow) return;
   growth_from_ns_[device] = first.times_ns[0];
   warn(kWarning.times_corrected,
-       fmt::format("times are at fault: the offset times of topic {} do not begin anew with each "
-                   "message but grow as the time of the messages does; they were taken as counted "
-                   "from the first message",
-                   header_.devices[device].topic));
+       "times are at fault: the offset times of topic {} do not begin anew with each message but "
+       "grow as the time of the messages does; they were taken as counted from the first message",
+       header_.devices[device].topic);
 }
 
 /// Finds the shots per second and the returns per shot of a cloud topic from its points per
@@ -487,7 +486,7 @@ void MessageReader::settle_cloud_grid(std::size_t topic, FirstMessages& first) {
         "after them have wrong times",
         rate);
   }
-  warn(kWarning.no_shot_times, std::move(message));
+  warnings_.push_back({kWarning.no_shot_times, std::move(message)});
 }
 
 bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
@@ -515,8 +514,8 @@ void MessageReader::take_bag_warnings() {
   risley::append(warnings_, bag_->warnings());
   if (unknown_lidar_points_ == 0) return;
   warn(kWarning.content_left_out,
-       "points of lidars that are not among the first messages of their topic were left out", {},
-       unknown_lidar_points_);
+       "points of lidars that are not among the first messages of their topic were left out")
+      .lost_records = unknown_lidar_points_;
 }
 
 void MessageReader::append(const LidarMessage& message, Chunk& chunk) {
@@ -577,9 +576,9 @@ void MessageReader::append_points(const LidarMessage& message, std::uint8_t devi
     if (run > kMostReturns && !equal_times_reported_) {
       equal_times_reported_ = true;
       warn(kWarning.times_coarse,
-           fmt::format("{} points of topic {} have the same time; where more than {} do, each is "
-                       "taken as a separate shot",
-                       run, topics()[message.topic].name, kMostReturns));
+           "{} points of topic {} have the same time; where more than {} do, each is taken as a "
+           "separate shot",
+           run, topics()[message.topic].name, kMostReturns);
     }
     for (std::size_t i = 0; i < run; ++i, ++row) {
       const MessagePoint& point = points[first + i];
@@ -614,9 +613,9 @@ void MessageReader::append_imu(const LidarMessage& message, std::uint8_t device,
     if (std::isfinite(sample.angular_velocity[axis] + sample.acceleration_g[axis])) continue;
     if (!std::exchange(imu_without_numbers_reported_, true)) {
       warn(kWarning.content_left_out,
-           fmt::format("inertial samples of topic {} whose rates or accelerations are not finite "
-                       "numbers were left out",
-                       topics()[message.topic].name));
+           "inertial samples of topic {} whose rates or accelerations are not finite numbers were "
+           "left out",
+           topics()[message.topic].name);
     }
     return;
   }

@@ -241,14 +241,12 @@ double NamedColumns::length_unit(std::initializer_list<Role> roles, RecordingHea
   header.length_unit_assumed = true;
   if (!whole || largest < kFewMetres) return 1.0;
   const bool large = largest > kMillimetres;
-  warnings.push_back(
-      {kWarning.unit_guessed,
-       fmt::format(
-           "the columns {} have no unit and hold whole numbers up to {}: they were taken as "
-           "{}, so that the largest is {:.4g} m ({:.4g} m if they are centimetres); state the "
-           "unit in their names, as in {}_m, _cm or _mm",
-           names_of(roles), largest, large ? "millimetres" : "metres",
-           large ? largest / 1000.0 : largest, largest / 100.0, names_of({*roles.begin()}))});
+  warn(warnings, kWarning.unit_guessed,
+       "the columns {} have no unit and hold whole numbers up to {}: they were taken as {}, so "
+       "that the largest is {:.4g} m ({:.4g} m if they are centimetres); state the unit in their "
+       "names, as in {}_m, _cm or _mm",
+       names_of(roles), largest, large ? "millimetres" : "metres",
+       large ? largest / 1000.0 : largest, largest / 100.0, names_of({*roles.begin()}));
   return large ? 1000.0 : 1.0;
 }
 
@@ -317,12 +315,10 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
   constexpr double kShortest_ns = 1e3, kLongest_ns = 1e5;  // between shots; no other unit fits
   if (whole && step >= kShortest_ns && step <= kLongest_ns) {
     if (since_1970(9) && !gps) header.time_reference = TimeReference::utc;
-    warnings.push_back(
-        {kWarning.unit_guessed,
-         fmt::format(
-             "column {} was taken as nanoseconds, because it rises by {} from shot to shot; "
-             "state the unit in its name, as in time_ns",
-             name, step)});
+    warn(warnings, kWarning.unit_guessed,
+         "column {} was taken as nanoseconds, because it rises by {} from shot to shot; state the "
+         "unit in its name, as in time_ns",
+         name, step);
     return 9;
   }
   constexpr double kLongest_s = 0.1;
@@ -332,11 +328,9 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
     if (!since_1970(shift) || step > kLongest_s * std::pow(10.0, shift)) continue;
     if (!gps) header.time_reference = TimeReference::utc;
     if (shift != 0) {
-      warnings.push_back(
-          {kWarning.unit_guessed,
-           fmt::format(
-               "column {} was taken as {} since 1970; state the unit in its name, as in time_ns",
-               name, unit)});
+      warn(warnings, kWarning.unit_guessed,
+           "column {} was taken as {} since 1970; state the unit in its name, as in time_ns", name,
+           unit);
     }
     return shift;
   }
@@ -366,11 +360,10 @@ void NamedColumns::settle_time(RecordingHeader& header, std::vector<Warning>& wa
     }
   }
   if (!shared.empty()) {
-    warnings.push_back(
-        {kWarning.no_shot_times,
-         fmt::format("column {} holds one time for many shots, that of their packet or frame, and "
-                     "no times of single shots{}",
-                     printable(shared), chosen != nullptr ? "" : ": the recording has no times")});
+    warn(warnings, kWarning.no_shot_times,
+         "column {} holds one time for many shots, that of their packet or frame, and no times of "
+         "single shots{}",
+         printable(shared), chosen != nullptr ? "" : ": the recording has no times");
   }
   header.has_times = chosen != nullptr;
   header.all_times_equal = header.all_times_equal && !header.has_times;
@@ -390,10 +383,9 @@ void NamedColumns::settle_index(std::vector<Warning>& warnings) {
       last = cell.value;
       continue;
     }
-    warnings.push_back(
-        {kWarning.columns_unused,
-         fmt::format("column {} does not count shots: {} follows {}; rows were counted instead",
-                     printable(name_of(*index)), cell.value, last)});
+    warn(warnings, kWarning.columns_unused,
+         "column {} does not count shots: {} follows {}; rows were counted instead",
+         printable(name_of(*index)), cell.value, last);
     cell_of_[static_cast<std::size_t>(Role::index)].reset();
     return;
   }
@@ -417,16 +409,13 @@ void NamedColumns::settle_intensity(RecordingHeader& header, std::vector<Warning
   if (low < 0.0 || high > 255.0) {
     header.has_intensity = false;
     cell_of_[static_cast<std::size_t>(Role::intensity)].reset();
-    warnings.push_back(
-        {kWarning.columns_unused,
-         fmt::format(
-             "column {} holds {} to {}, expected intensities in [0, 255]; they were left out", name,
-             low, high)});
+    warn(warnings, kWarning.columns_unused,
+         "column {} holds {} to {}, expected intensities in [0, 255]; they were left out", name,
+         low, high);
   } else if (high <= 1.0 && !all_whole(intensity->samples)) {
     intensity_factor_ = 255.0;
-    warnings.push_back(
-        {kWarning.values_changed,
-         fmt::format("column {} holds {} to {}: it was multiplied by 255", name, low, high)});
+    warn(warnings, kWarning.values_changed, "column {} holds {} to {}: it was multiplied by 255",
+         name, low, high);
   }
 }
 
@@ -461,8 +450,7 @@ void NamedColumns::settle(RecordingHeader& header, std::vector<Warning>& warning
     for (const std::size_t column : unused_) {
       names += fmt::format("{}{}", names.empty() ? "" : ", ", columns_[column].name);
     }
-    warnings.push_back(
-        {kWarning.columns_unused, fmt::format("columns that were not used: {}", printable(names))});
+    warn(warnings, kWarning.columns_unused, "columns that were not used: {}", printable(names));
   }
   for (Source& source : sources_) source.samples = {};
 }

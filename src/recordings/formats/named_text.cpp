@@ -31,7 +31,8 @@ NamedTextReader::NamedTextReader(const io::InputFile& file, std::string_view for
     fail(layout_.names_line, bad.what());
   }
   for (Warning& warning : layout_.warnings) {
-    warn(warning.code, std::move(warning.message), {{}, layout_.names_line});
+    warning.place.line = layout_.names_line;
+    warnings_.push_back(std::move(warning));
   }
 }
 

@@ -94,9 +94,8 @@ class ScanSequenceReader final : public TextTableReader {
     if (all_shot_numbers) {
       header_.has_times = false;
       warn(kWarning.no_shot_times,
-           "column Time/s holds shot numbers instead of seconds; the time between shots is "
-           "unknown",
-           {{}, 2});
+           "column Time/s holds shot numbers instead of seconds; the time between shots is unknown")
+          .place.line = 2;
     }
   }
 

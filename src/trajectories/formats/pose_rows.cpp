@@ -156,10 +156,6 @@ void PoseRows::add(const PoseRow& row, const FilePlace& place) {
   places_.push_back(place);
 }
 
-void PoseRows::warn(WarningCode code, std::string message, const FilePlace& place) {
-  trajectory_.warnings.push_back({code, std::move(message), place});
-}
-
 void PoseRows::refuse(std::size_t row, const FilePlace& place, const std::string& problem) const {
   const bool placed = place.line || place.byte_offset;
   throw FileError(path_, place, placed ? problem : fmt::format("record {}: {}", row + 1, problem));
@@ -171,10 +167,10 @@ void PoseRows::make_times_run_on() {
   const int crossings = unwrap_times(trajectory_.time_ns, *period);
   trajectory_.week_crossings = crossings;
   if (crossings == 0) return;
-  warn(kWarning.clock_wrapped,
-       fmt::format("{} ends within the trajectory: times were continued beyond it",
-                   contents_.time_scale == TimeScale::gps_second_of_week ? "the GPS week (604800 s)"
-                                                                         : "the day (86400 s)"));
+  warn(warnings(), kWarning.clock_wrapped,
+       "{} ends within the trajectory: times were continued beyond it",
+       contents_.time_scale == TimeScale::gps_second_of_week ? "the GPS week (604800 s)"
+                                                             : "the day (86400 s)");
 }
 
 void PoseRows::put_in_order() {
@@ -190,7 +186,7 @@ void PoseRows::put_in_order() {
   }
   if (order.rows.empty()) return;
   const auto place_of = [this](std::size_t row) { return places_[row]; };
-  warn(order_warnings(told, trajectory_.size(), place_of));
+  append(warnings(), order_warnings(told, trajectory_.size(), place_of));
   reorder(wander_, order.rows);
   static_cast<void>(order_by_time(trajectory_));
 }

@@ -48,8 +48,7 @@ class PoseRows {
   /// @throws FileError for values that no platform has
   void add(const PoseRow& row, const FilePlace& place);
 
-  void warn(WarningCode code, std::string message, const FilePlace& place = {});
-  void warn(const std::vector<Warning>& warnings) { append(trajectory_.warnings, warnings); }
+  std::vector<Warning>& warnings() { return trajectory_.warnings; }
   std::size_t size() const { return trajectory_.size(); }
 
   /// Times that ran on beyond the end of the week or day; records in the order of their times;

@@ -229,9 +229,8 @@ void take_contents(PoseTable& table, std::vector<Warning>& warnings) {
       }
     }
     if (!there.empty()) {
-      warnings.push_back(
-          {kWarning.columns_unused, fmt::format("{} are incomplete (only {}) and were left out",
-                                                what, fmt::join(there, ", "))});
+      warn(warnings, kWarning.columns_unused, "{} are incomplete (only {}) and were left out", what,
+           fmt::join(there, ", "));
     }
     return false;
   };
@@ -264,7 +263,7 @@ Trajectory read_pose_table(const std::string& path, const PoseTable& table,
   while (lines.line_number() + 1 < table.first_row && lines.next(line)) {
   }
   PoseRows rows(path, table.contents);
-  rows.warn(warnings);
+  append(rows.warnings(), warnings);
   RowReader reader(table);
   std::vector<std::string_view> fields(fields_in_line(table.columns));
   std::optional<std::uint64_t> empty_line;
@@ -294,13 +293,15 @@ Trajectory read_pose_table(const std::string& path, const PoseTable& table,
     }
     const bool footer = table.has_footer && empty_line && !row;
     if (footer) {
-      rows.warn(kWarning.content_left_out, "text after the records was not read", place);
+      warn(rows.warnings(), kWarning.content_left_out, "text after the records was not read")
+          .place = place;
       break;
     }
     const bool cut = !lines.has_line_end() &&
                      (!row || (rows.size() > 0 && decimals_in(fields.back()) != last_decimals));
     if (cut) {
-      rows.warn(kWarning.cut_off, "the last line is cut off and was left out", place);
+      warn(rows.warnings(), kWarning.cut_off, "the last line is cut off and was left out").place =
+          place;
       break;
     }
     if (!problem.empty()) throw FileError(path, place, problem);

@@ -101,9 +101,8 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
     for (std::int64_t& time : records.time_ns) {
       if (time < week / 2) time += week;
     }
-    records.warnings.push_back(
-        {kWarning.clock_wrapped,
-         "the GPS week (604800 s) ends within the accuracies: times were continued beyond it"});
+    warn(records.warnings, kWarning.clock_wrapped,
+         "the GPS week (604800 s) ends within the accuracies: times were continued beyond it");
   }
   const RowOrder order = row_order(records.time_ns);
   const auto place_of = [](std::size_t row) {
