@@ -205,7 +205,7 @@ class WallCalibration {
                 ? ": what is flat in them lies on one line, and a wall has to fill an area"
                 : "");
         if (recordings_.size() == 1) throw EstimationError(why);
-        result_.warnings.push_back({kWarning.input_left_out, why + "; it is left out"});
+        warn(result_.warnings, kWarning.input_left_out, "{}; it is left out", why);
       }
     }
     if (found.empty()) throw EstimationError("no plane found in any recording");

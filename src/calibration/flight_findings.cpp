@@ -116,11 +116,11 @@ void judge_attitude_delay(double value, double sigma, FlightCalibration& c) {
   found.sigma = sigma;
   found.significant = std::abs(found.value) > kDelaySigmas * found.sigma;
   if (!found.significant) return;
-  c.warnings.push_back(
-      {kWarning.clocks_disagree,
-       in_words(found) + "; a clock offset moves positions and attitudes together and cannot "
-                         "describe that, so clock offset and lever arm are off by more than their "
-                         "sigmas. Correct the time stamps of the attitudes, and calibrate again"});
+  warn(c.warnings, kWarning.clocks_disagree,
+       "{}; a clock offset moves positions and attitudes together and cannot describe that, so "
+       "clock offset and lever arm are off by more than their sigmas. Correct the time stamps of "
+       "the attitudes, and calibrate again",
+       in_words(found));
 }
 
 void judge_clock_offset(FlightCalibration& c) {
@@ -129,9 +129,8 @@ void judge_clock_offset(FlightCalibration& c) {
   c.clock_contradicts = std::abs(clock.value - clock.start) >
                         kClockSigmas * std::hypot(clock.prior_sigma, clock.sigma);
   if (c.clock_contradicts) {
-    c.warnings.push_back(
-        {kWarning.clocks_disagree,
-         clock_in_words(c) + "; correct the times or what the mount states of them"});
+    warn(c.warnings, kWarning.clocks_disagree,
+         "{}; correct the times or what the mount states of them", clock_in_words(c));
   }
 }
 
@@ -171,10 +170,10 @@ void judge_control(const scenes::KnownGround& ground, SeenControl seen, FlightCa
 void warn_of_trajectory(std::int64_t begin_ns, FlightCalibration& c) {
   const TrajectoryFit& fit = c.trajectory_fit;
   for (const TrajectoryJump& jump : fit.jumps) {
-    c.warnings.push_back(
-        {kWarning.trajectory_jumps,
-         in_words(jump, begin_ns) + "; it has a step of its own in the adjustment. Is there a loss "
-                                    "of the GNSS fix, or an alignment, in the trajectory's log?"});
+    warn(c.warnings, kWarning.trajectory_jumps,
+         "{}; it has a step of its own in the adjustment. Is there a loss of the GNSS fix, or an "
+         "alignment, in the trajectory's log?",
+         in_words(jump, begin_ns));
   }
   for (int i = 0; i < kCorrections; ++i) {
     if (fit.factor[i] == 1) continue;

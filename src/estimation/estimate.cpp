@@ -328,15 +328,16 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
     fail("the last steps still moved parameters by more than a tenth of their sigma",
          EstimateCode::undecided);
   } else if (estimate.unit_variance > kEnlarged && estimate.variance_factor > 1.0) {
-    estimate.warnings.push_back(
-        {kWarning.sigmas_enlarged, residuals + ": the sigmas were enlarged by that factor"});
+    warn(estimate.warnings, kWarning.sigmas_enlarged, "{}: the sigmas were enlarged by that factor",
+         residuals);
   } else if (ratio > kNoticed) {
-    estimate.warnings.push_back(
-        {kWarning.sigmas_too_small, residuals + ": the sigmas are too small by about that factor"});
+    warn(estimate.warnings, kWarning.sigmas_too_small,
+         "{}: the sigmas are too small by about that factor", residuals);
   } else if (ratio < 0.93) {
-    estimate.warnings.push_back(
-        {kWarning.unusual_noise, residuals + ": the rotors' noise is set so high that they follow "
-                                             "the noise, or the stated noise is too large"});
+    warn(estimate.warnings, kWarning.unusual_noise,
+         "{}: the rotors' noise is set so high that they follow the noise, or the stated noise is "
+         "too large",
+         residuals);
   }
   if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * estimate.usual_noise) {
     warn(estimate.warnings, kWarning.unusual_noise,

@@ -43,8 +43,7 @@ estimation::AngleSeries read(const recordings::Source& recording,
     selector.add(chunk.observations);
     progress.report(reader->fraction_read());
   }
-  result.warnings = reader->warnings();
-  append(result.warnings, input.warnings);
+  result.warnings = input.all_warnings();
   warn_of_left_out(selector.counts(), result.warnings);
   result.cropped = input.choice.has_value();
   if (result.cropped) {

@@ -43,8 +43,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   result.header = reader->header();
   result.audit = audit.result();
   result.audit.pps_wraps = reader->clock_wraps();
-  result.warnings = reader->warnings();
-  append(result.warnings, input.warnings);
+  result.warnings = input.all_warnings();
   if (!removed.empty()) result.warnings.push_back({kWarning.shots_lost, removed});
   result.time_uncertainty = input.time_uncertainty;
   result.choice = std::move(input.choice);

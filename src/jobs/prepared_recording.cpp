@@ -319,8 +319,8 @@ void turn_back(PreparedRecording& recording, const Progress& progress) {
     recording.read_again(progress);
   }
   if (decided && recording.turned_back) {
-    recording.warnings.push_back(
-        {kWarning.turned_back, found + ": the shots were turned back into the sensor's frame"});
+    warn(recording.warnings, kWarning.turned_back,
+         "{}: the shots were turned back into the sensor's frame", found);
   } else if (!decided) {
     warn(recording.warnings, kWarning.pose_undecided,
          "{}: that does not show whether the pose was applied to them; {}. {} decides it: give the "

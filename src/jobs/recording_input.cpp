@@ -57,8 +57,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
                              result.series.append(selector.take_series());
                            }}});
   result.recording = {name, reader.header(), audit.result()};
-  result.warnings = reader.warnings();
-  append(result.warnings, input.warnings);
+  result.warnings = input.all_warnings();
   result.choice = *std::move(input.choice);
   result.counts = selector.counts();
   warn_of_left_out(result.counts, result.warnings);

@@ -14,7 +14,7 @@
 
 namespace risley {
 
-/// What a warning is about, for programs: its name in Warnings, which stays the same.
+/// What a warning is about, for programs: a name that stays the same.
 struct WarningCode {
   explicit constexpr WarningCode(std::string_view of) : name(of) {}
   std::string_view name;

@@ -46,6 +46,12 @@ struct PreparedRecording {
   bool turned_back = false;     ///< by a pose, stated or given, or a roll that was found
   bool cut_mended = false;      ///< points were moved to the middle of where they were before a cut
 
+  /// All so far, those of the reader first.
+  std::vector<Warning> all_warnings() const {
+    std::vector<Warning> all = reader->warnings();
+    append(all, warnings);
+    return all;
+  }
   /// Refuses damage that was met while questions were answered. @throws FileError
   void require_whole() const {
     if (const auto damage = source.damage()) throw FileError(*damage);
