@@ -5,8 +5,6 @@
 #include <array>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "risley/core/setting.hpp"
 #include "risley/jobs/prepared_recording.hpp"
 #include "risley/parallel/parallel.hpp"

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "risley/jobs/cloud_of_recording.hpp"
-#include "risley/jobs/recording_input.hpp"
 #include "risley/json/results.hpp"
 
 #include "json/parts.hpp"

@@ -18,7 +18,6 @@
 #include "risley/jobs/convert_trajectory.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/inspect_trajectory.hpp"
-#include "risley/jobs/recording_input.hpp"
 #include "risley/json/result_columns.hpp"
 #include "risley/recordings/writer.hpp"
 #include "risley/tables/table_file.hpp"

@@ -12,8 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "risley/core/saturating.hpp"
 #include "risley/core/setting.hpp"
 
