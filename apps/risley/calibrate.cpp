@@ -24,8 +24,8 @@
 #include "plan_flight.hpp"
 #include "platform_options.hpp"
 #include "reading_options.hpp"
-#include "recording_text.hpp"
 #include "result_folder.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {
@@ -124,8 +124,8 @@ ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& 
     return calibrate(bar.progress());
   }();
   const auto& c = outcome.calibration;
-  for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
-  for (const std::string& warning : c.warnings) spdlog::warn(warning);
+  log_warnings(outcome.warnings);
+  log_warnings(c.warnings);
   if (!c.converged) log_failure(c.reason, common);
   if (c.converged && !outcome.calibration_written && !options.many.output.empty()) {
     spdlog::warn("calibration.yaml was not written, because {}: --force writes it",

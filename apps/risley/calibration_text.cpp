@@ -9,9 +9,9 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/core/text.hpp"
 
 #include "command.hpp"
-#include "recording_text.hpp"
 #include "table.hpp"
 
 namespace risley::app {

@@ -14,12 +14,13 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/json/many_results.hpp"
 
 #include "command.hpp"
-#include "recording_text.hpp"
 #include "table.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {
@@ -114,7 +115,7 @@ ExitStatus tell_merged(const jobs::CampaignResult& merged, const CampaignCommand
   const std::string summary = (std::filesystem::path(options.folder) / "summary.json").string();
   io::write_text_file(summary, with_head(common, json).dump(2) + "\n");
   json["summary"] = summary;
-  for (const std::string& warning : merged.warnings) spdlog::warn(warning);
+  log_warnings(merged.warnings);
   if (common.json) {
     print_json(common, json::with_status(json, damage));
   } else {

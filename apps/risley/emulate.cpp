@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "risley/core/text.hpp"
 #include "risley/jobs/emulate_sensor.hpp"
 
 #include "command.hpp"
 #include "parameter_choice.hpp"
-#include "recording_text.hpp"
 #include "table.hpp"
 
 namespace risley::app {

@@ -11,15 +11,16 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/setting.hpp"
+#include "risley/core/text.hpp"
 #include "risley/jobs/estimate_recording.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
 #include "parameter_choice.hpp"
 #include "reading_options.hpp"
-#include "recording_text.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {
@@ -165,8 +166,8 @@ ExitStatus run_estimate(const EstimateCommandOptions& options, const CommonOptio
       outcome.counts.rows, outcome.recording.header.format, outcome.counts.invalid,
       outcome.counts.out_of_order, e.series.size(), outcome.nominal.name,
       degrees_from_radians(e.start.residual_rms));
-  for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
-  for (const std::string& warning : e.warnings) spdlog::warn(warning);
+  log_warnings(outcome.warnings);
+  log_warnings(e.warnings);
   if (!e.converged) log_failure(e.reason, common);
   if (common.json) {
     print_json(common, json::of(outcome), outcome.provenance);

@@ -10,14 +10,15 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/setting.hpp"
+#include "risley/core/text.hpp"
 #include "risley/identification/fitted_values.hpp"
 #include "risley/jobs/identify_recording.hpp"
 
 #include "command.hpp"
 #include "reading_options.hpp"
-#include "recording_text.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {
@@ -96,7 +97,7 @@ ExitStatus run_identify(const IdentifyCommandOptions& options, const CommonOptio
     ProgressBar bar("identifying", common);
     outcome = jobs::identify_recording(job, bar.progress());
   }
-  for (const std::string& warning : outcome.warnings) spdlog::warn(warning);
+  log_warnings(outcome.warnings);
   if (!options.output.empty() && !outcome.written) {
     spdlog::warn("{} was not written: {}; --force writes it all the same", options.output,
                  outcome.words);

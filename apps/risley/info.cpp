@@ -11,6 +11,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/inspect_trajectory.hpp"
 #include "risley/jobs/prepared_recording.hpp"
@@ -18,9 +19,9 @@
 #include "command.hpp"
 #include "many_files.hpp"
 #include "reading_options.hpp"
-#include "recording_text.hpp"
 #include "table.hpp"
 #include "trajectory_text.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {

@@ -10,12 +10,13 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/text.hpp"
 
 #include "command.hpp"
 #include "parameter_choice.hpp"
 #include "reading_options.hpp"
-#include "recording_text.hpp"
 #include "table.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {
@@ -98,7 +99,7 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
     ProgressBar bar("estimating", common);
     judged = jobs::judge_observability(job, bar.progress());
   }
-  for (const std::string& warning : judged.warnings) spdlog::warn(warning);
+  log_warnings(judged.warnings);
   if (!judged.converged) spdlog::warn("the estimate did not converge: {}", judged.reason);
   if (common.json) {
     print_json(common, json::of(judged));

@@ -15,12 +15,12 @@
 #include "risley/core/error.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/setting.hpp"
+#include "risley/core/text.hpp"
 #include "risley/jobs/pattern_details.hpp"
 #include "risley/jobs/write_pattern.hpp"
 #include "risley/report/pattern_page.hpp"
 
 #include "command.hpp"
-#include "recording_text.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
 

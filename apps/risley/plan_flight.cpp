@@ -9,13 +9,14 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 #include "risley/report/distribution_page.hpp"
 
 #include "distribution_text.hpp"
 #include "flight_text.hpp"
-#include "recording_text.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {
@@ -76,8 +77,8 @@ ExitStatus run_flight_plan(jobs::PlanFlightOptions options, const std::string& p
     ProgressBar bar("planning", common);
     planned = jobs::plan_flight(options, bar.progress());
   }
-  for (const std::string& warning : planned.warnings) spdlog::warn(warning);
-  for (const std::string& warning : planned.forecast.warnings) spdlog::warn(warning);
+  log_warnings(planned.warnings);
+  log_warnings(planned.forecast.warnings);
   if (!page.empty()) {
     if (!planned.distribution) throw InvalidArgument("--report: there are no points to draw");
     write_page_file(page,

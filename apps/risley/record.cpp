@@ -19,12 +19,12 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/text.hpp"
 #include "risley/jobs/record_sensors.hpp"
 #include "risley/report/watch_page.hpp"
 #include "risley/wire/event_server.hpp"
 
 #include "command.hpp"
-#include "recording_text.hpp"
 #include "table.hpp"
 
 namespace risley::app {

@@ -15,10 +15,10 @@
 
 #include "command.hpp"
 #include "reading_options.hpp"
-#include "recording_text.hpp"
 #include "reproduction/reproduction_page.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {
@@ -105,9 +105,7 @@ reproduction::RealRecording real_recording(const std::string& path, const Readin
   ProgressBar bar("reading", common);
   jobs::EstimationInput input =
       jobs::read_for_estimation({path, read_options(reading), {}, {}}, bar.progress());
-  for (const std::string& warning : input.warnings) {
-    spdlog::warn("{}: {}", path, warning);
-  }
+  log_warnings(path, input.warnings);
   return {std::filesystem::path(path).filename().string(), std::move(input.choice.sensor),
           input.series.rows(), std::move(input.head)};
 }
@@ -136,7 +134,7 @@ ExitStatus run_reproduce(const ReproduceCommandOptions& options, const CommonOpt
   folder.add_text({"report.html", reproduction::reproduction_page(found, provenance)});
   folder.add_text(
       {"reproduction.json", object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"});
-  for (const std::string& move : folder.commit()) spdlog::warn("{}", move);
+  log_warnings(folder.commit());
   if (common.json) {
     print_json(common, object);
   } else {

@@ -10,13 +10,13 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/text.hpp"
 #include "risley/jobs/simulation_settings.hpp"
 #include "risley/simulation/truth_file.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
 #include "parameter_choice.hpp"
-#include "recording_text.hpp"
 #include "table.hpp"
 
 namespace risley::app {

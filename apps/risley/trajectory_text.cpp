@@ -9,10 +9,10 @@
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/text.hpp"
 #include "risley/trajectories/trajectory_audit.hpp"
 
 #include "command.hpp"
-#include "recording_text.hpp"
 #include "table.hpp"
 
 namespace risley::app {
@@ -23,7 +23,6 @@ using trajectories::PoseAccuracy;
 using trajectories::RecordTimes;
 using trajectories::Trajectory;
 using trajectories::TrajectoryAudit;
-using trajectories::TrajectoryWarning;
 
 std::string extent_text(const Extent& extent, double scale, int decimals, std::string_view unit) {
   return fmt::format("{:.{}f} to {:.{}f} {}", extent.min * scale, decimals, extent.max * scale,
@@ -89,12 +88,6 @@ void print_poses(const Trajectory& trajectory, const TrajectoryAudit& audit, Tab
 }
 
 }  // namespace
-
-void log_warnings(const std::string& file, const std::vector<TrajectoryWarning>& warnings) {
-  for (const TrajectoryWarning& warning : warnings) {
-    spdlog::warn("{}: {}", file, trajectories::warning_text(warning));
-  }
-}
 
 void print_trajectory(const jobs::InspectedTrajectory& found) {
   Table table;

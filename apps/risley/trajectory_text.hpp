@@ -10,10 +10,6 @@
 
 namespace risley::app {
 
-/// Warnings on stderr, each with the name of the file.
-void log_warnings(const std::string& file,
-                  const std::vector<trajectories::TrajectoryWarning>& warnings);
-
 /// What a trajectory or a file of accuracies holds, on stdout.
 void print_trajectory(const jobs::InspectedTrajectory& found);
 

@@ -17,7 +17,7 @@ from risley._optics import (Directions, Inverse, Linearisation, Rays, invert, li
                             rays)
 from risley._recordings import from_arrays, read, read_chunks, write
 from risley._results import (Calibration, Cloud, Estimate, FlightCalibration, Identification,
-                             Pattern, Plan, Simulation, Solution, Verdict)
+                             Pattern, Plan, Simulation, Solution, Verdict, Warning)
 from risley._risley import (Cancelled, ChunkReader, Device, EstimationError, FileError,
                             MissingFileError, NetworkError, PrismTrain, Recording,
                             RecordingHeader, Sensor, Stop, __version__)
@@ -28,7 +28,7 @@ __all__ = [
     "EstimationError", "FileError", "FlightCalibration", "Identification", "Inverse",
     "Linearisation", "ManyResults", "MissingFileError", "NetworkError", "Pattern", "Plan",
     "PrismTrain", "Rays", "Recording", "RecordingHeader", "Sensor", "Simulation", "Solution",
-    "Stop", "Verdict", "__version__", "calibrate", "calibrate_many", "campaign", "cloud",
+    "Stop", "Verdict", "Warning", "__version__", "calibrate", "calibrate_many", "campaign", "cloud",
     "cloud_many", "compare", "convert_many", "coverage", "emulate", "estimate",
     "estimate_many", "find_sensors", "from_arrays", "identify", "info", "info_many", "invert",
     "linearise", "load_sensor", "observability", "observe", "pattern", "plan", "presets",

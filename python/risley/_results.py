@@ -37,6 +37,36 @@ class Verdict(NamedTuple):
     to_do: str
 
 
+class Warning(NamedTuple):
+    """What a user should know that does not make an answer useless; as a text, its message.
+
+    Attributes
+    ----------
+    code : str
+        Stable, for programs; docs/files.md lists all.
+    message : str
+        What it is, in words, with the place in the file.
+    byte_offset, line : int
+        Where in the file, if it is known.
+    lost_records : int
+        Records that are known to be missing.
+    """
+
+    code: str
+    message: str
+    byte_offset: Optional[int] = None
+    line: Optional[int] = None
+    lost_records: int = 0
+
+    def __str__(self) -> str:
+        return self.message
+
+
+def warnings_of(found: List[Dict[str, Any]]) -> List[Warning]:
+    """Warnings as results have them."""
+    return [Warning(**one) for one in found]
+
+
 class Fields(Dict[str, Any]):
     """A part of a result whose keys are attributes, too."""
 
@@ -48,7 +78,8 @@ class Fields(Dict[str, Any]):
 
 def _with_attributes(value: Any) -> Any:
     if isinstance(value, dict):
-        return Fields({key: _with_attributes(one) for key, one in value.items()})
+        return Fields({key: warnings_of(one) if key == "warnings" else _with_attributes(one)
+                       for key, one in value.items()})
     return [_with_attributes(one) for one in value] if isinstance(value, list) else value
 
 
@@ -76,10 +107,9 @@ class _Answer:
         return dict(self._dict)
 
     @property
-    def warnings(self) -> List[str]:
-        """Warnings, as sentences."""
-        return [one["message"] if isinstance(one, dict) else one
-                for one in self._dict.get("warnings", [])]
+    def warnings(self) -> List[Warning]:
+        """What to know before the result is used."""
+        return warnings_of(self._dict.get("warnings", []))
 
 
 class _Columns(_Answer):

@@ -6,6 +6,8 @@ from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tupl
 import numpy as np
 import numpy.typing as npt
 
+from risley._results import Warning
+
 _Floats = npt.NDArray[np.float64]
 _Singles = npt.NDArray[np.float32]
 _Bytes = npt.NDArray[np.uint8]
@@ -66,7 +68,7 @@ class Recording:
     @property
     def header(self) -> RecordingHeader: ...
     @property
-    def warnings(self) -> List[str]: ...
+    def warnings(self) -> List[Warning]: ...
     @property
     def time_ns(self) -> npt.NDArray[np.int64]: ...
     @property
@@ -105,7 +107,7 @@ class ChunkReader:
     @property
     def header(self) -> RecordingHeader: ...
     @property
-    def warnings(self) -> List[str]: ...
+    def warnings(self) -> List[Warning]: ...
     @property
     def fraction_read(self) -> float: ...
 

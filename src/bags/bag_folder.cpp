@@ -151,8 +151,8 @@ class BagFolder final : public Bag {
         return true;
       }
       const std::string name = fs::path(part_->path()).filename().string();
-      for (const BagWarning& warning : part_->warnings()) {
-        warnings_.push_back({warning.place, fmt::format("{}: {}", name, warning.message)});
+      for (const Warning& warning : part_->warnings()) {
+        warnings_.push_back(of_file(name, warning));
       }
       part_.reset();
       ++read_;

@@ -594,10 +594,11 @@ class McapBag final : public Bag {
             ? "the record that begins here is incomplete; everything before it was read"
             : "everything up to here was read";
     warnings_.push_back(
-        {{offset_, {}},
+        {kWarning.cut_off,
          fmt::format(
              "the file was not closed or is cut off: it ends at byte {} without a footer; {}",
-             file_.size(), part)});
+             file_.size(), part),
+         {offset_, {}}});
   }
 
   static constexpr std::uint64_t kBlock = BlockInput::kBlockBytes;

@@ -204,7 +204,7 @@ class WallCalibration {
                 ? ": what is flat in them lies on one line, and a wall has to fill an area"
                 : "");
         if (recordings_.size() == 1) throw EstimationError(why);
-        result_.warnings.push_back(why + "; it is left out");
+        warn(result_.warnings, kWarning.input_left_out, "{}; it is left out", why);
       }
     }
     if (found.empty()) throw EstimationError("no plane found in any recording");
@@ -221,8 +221,7 @@ class WallCalibration {
     result_.same_walls = !poses.stations.empty();
     if (result_.same_walls) problem_.stations[poses.reference].sigma = 0;
     problem_.stations_known = matching.stations_known;
-    result_.warnings.insert(result_.warnings.end(), matching.warnings.begin(),
-                            matching.warnings.end());
+    append(result_.warnings, matching.warnings);
     const bool planes = std::ranges::any_of(
         problem_.walls, [](const Wall& wall) { return wall.normal_sigma >= 0; });
     const bool stations =
@@ -412,9 +411,7 @@ void WallCalibration::fill_result(const PlanarSolution& solution) {
   result_.converged = result_.reason.empty();
   result_.tolerance = options_.tolerance.value_or(options_.sensor.pointing_tolerance);
   result_.verdict = verdict_of(result_);
-  for (std::string& warning : warnings_of(result_, solution, recordings_)) {
-    result_.warnings.push_back(std::move(warning));
-  }
+  append(result_.warnings, warnings_of(result_, solution, recordings_));
   for (LabelledShots& own : all_) result_.plane_of_shot.push_back(std::move(own.labels.view));
 }
 

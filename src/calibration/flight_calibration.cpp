@@ -323,11 +323,11 @@ class FlightCalibrator {
     hold(Unlocked::all);
     const double spacing = final_knot_spacing(options_, model_.knots, full_.shots.strips());
     if (spacing > options_.knot_spacing) {
-      result_.warnings.push_back(fmt::format(
-          "corrections of the trajectory have knots every {:.2f} s instead of {:g} s, because the "
-          "flight would need more than {} of them; the sigmas account for what happens between "
-          "them",
-          spacing, options_.knot_spacing, options_.most_knots));
+      warn(result_.warnings, kWarning.coarse_knots,
+           "corrections of the trajectory have knots every {:.2f} s instead of {:g} s, because the "
+           "flight would need more than {} of them; the sigmas account for what happens between "
+           "them",
+           spacing, options_.knot_spacing, options_.most_knots);
     }
     // The trajectory first, with shots that are enough for it.
     set_knots(coarse_.shots, spacing);

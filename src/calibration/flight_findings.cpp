@@ -101,13 +101,13 @@ void judge_clock_drift(double value, double sigma, double seconds, FlightCalibra
   found.seconds = seconds;
   found.significant = std::abs(found.value) > kTestedSigmas * found.sigma;
   if (!found.significant) return;
-  c.warnings.push_back(fmt::format(
-      "the clocks of sensor and trajectory drift apart: the trajectory's gains {:.2g} +- {:.1g} "
-      "ppm on the recording's, {:.2g} ms over the {:.0f} s between the first shot and the last. A "
-      "constant clock offset cannot describe that, and the results are off by more than their "
-      "sigmas. Synchronise the sensor's clock by PPS or PTP, or calibrate shorter parts of the "
-      "flight",
-      1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds));
+  warn(c.warnings, kWarning.clocks_disagree,
+       "the clocks of sensor and trajectory drift apart: the trajectory's gains {:.2g} +- {:.1g} "
+       "ppm on the recording's, {:.2g} ms over the {:.0f} s between the first shot and the last. A "
+       "constant clock offset cannot describe that, and the results are off by more than their "
+       "sigmas. Synchronise the sensor's clock by PPS or PTP, or calibrate shorter parts of the "
+       "flight",
+       1e6 * found.value, 1e6 * found.sigma, 1e3 * found.value * found.seconds, found.seconds);
 }
 
 void judge_attitude_delay(double value, double sigma, FlightCalibration& c) {
@@ -116,11 +116,11 @@ void judge_attitude_delay(double value, double sigma, FlightCalibration& c) {
   found.sigma = sigma;
   found.significant = std::abs(found.value) > kDelaySigmas * found.sigma;
   if (!found.significant) return;
-  c.warnings.push_back(
-      in_words(found) +
-      "; a clock offset moves positions and attitudes together and cannot describe that, so clock "
-      "offset and lever arm are off by more than their sigmas. Correct the time stamps of the "
-      "attitudes, and calibrate again");
+  warn(c.warnings, kWarning.clocks_disagree,
+       "{}; a clock offset moves positions and attitudes together and cannot describe that, so "
+       "clock offset and lever arm are off by more than their sigmas. Correct the time stamps of "
+       "the attitudes, and calibrate again",
+       in_words(found));
 }
 
 void judge_clock_offset(FlightCalibration& c) {
@@ -129,8 +129,8 @@ void judge_clock_offset(FlightCalibration& c) {
   c.clock_contradicts = std::abs(clock.value - clock.start) >
                         kClockSigmas * std::hypot(clock.prior_sigma, clock.sigma);
   if (c.clock_contradicts) {
-    c.warnings.push_back(clock_in_words(c) +
-                         "; correct the times or what the mount states of them");
+    warn(c.warnings, kWarning.clocks_disagree,
+         "{}; correct the times or what the mount states of them", clock_in_words(c));
   }
 }
 
@@ -138,10 +138,10 @@ void judge_held(HeldParameter held, const sensors::Sensor& sensor, FlightCalibra
   held.significant =
       std::abs(held.told - held.held) > kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
   if (held.significant) {
-    c.warnings.push_back(fmt::format(
-        "the strips contradict what is held: {}; the results are off by more than their "
-        "sigmas. Estimate it as well ({})",
-        in_words(held, sensor), name_of(kSetting.free)));
+    warn(c.warnings, kWarning.held_contradicted,
+         "the strips contradict what is held: {}; the results are off by more than their sigmas. "
+         "Estimate it as well ({})",
+         in_words(held, sensor), name_of(kSetting.free));
   }
   c.held.push_back(std::move(held));
 }
@@ -149,19 +149,20 @@ void judge_held(HeldParameter held, const sensors::Sensor& sensor, FlightCalibra
 void judge_control(const scenes::KnownGround& ground, SeenControl seen, FlightCalibration& c) {
   seen.significant = seen.used && std::abs(seen.off) > kTestedSigmas * seen.sigma;
   if (!seen.used) {
-    c.warnings.push_back(
-        fmt::format("known ground \"{}\" is left out: {} shots within {:g} m of it{}", ground.name,
-                    seen.shots, ground.radius,
-                    seen.shots < GroundCellOptions{}.least_shots
-                        ? fmt::format(", at least {} are needed; is it on the map that is stated?",
-                                      GroundCellOptions{}.least_shots)
-                        : " are not on a plane"));
+    warn(c.warnings, kWarning.control_doubtful,
+         "known ground \"{}\" is left out: {} shots within {:g} m of it{}", ground.name, seen.shots,
+         ground.radius,
+         seen.shots < GroundCellOptions{}.least_shots
+             ? fmt::format(", at least {} are needed; is it on the map that is stated?",
+                           GroundCellOptions{}.least_shots)
+             : " are not on a plane");
   } else if (seen.significant) {
-    c.warnings.push_back(fmt::format(
+    warn(
+        c.warnings, kWarning.control_doubtful,
         "known ground \"{}\" contradicts the flight: the strips see it {:.3f} m {} what is stated, "
         "{:.0f} of its sigmas. Is the place right, and is the ground flat within {:g} m of it?",
         ground.name, std::abs(seen.off), seen.off > 0 ? "above" : "below",
-        std::abs(seen.off) / seen.sigma, ground.radius));
+        std::abs(seen.off) / seen.sigma, ground.radius);
   }
   c.control.push_back(std::move(seen));
 }
@@ -169,18 +170,19 @@ void judge_control(const scenes::KnownGround& ground, SeenControl seen, FlightCa
 void warn_of_trajectory(std::int64_t begin_ns, FlightCalibration& c) {
   const TrajectoryFit& fit = c.trajectory_fit;
   for (const TrajectoryJump& jump : fit.jumps) {
-    c.warnings.push_back(in_words(jump, begin_ns) +
-                         "; it has a step of its own in the adjustment. Is there a loss of "
-                         "the GNSS fix, or an alignment, in the trajectory's log?");
+    warn(c.warnings, kWarning.trajectory_jumps,
+         "{}; it has a step of its own in the adjustment. Is there a loss of the GNSS fix, or an "
+         "alignment, in the trajectory's log?",
+         in_words(jump, begin_ns));
   }
   for (int i = 0; i < kCorrections; ++i) {
     if (fit.factor[i] == 1) continue;
-    c.warnings.push_back(fmt::format(
-        "the trajectory's error {} is {:.2g} times as large as stated (chi2 of its corrections "
-        "{:.3g}, {:.3g} expected); the adjustment counts it as that large, and the sigmas with it",
-        correction_name(i), fit.factor[i], fit.chi2[i], fit.expected[i]));
+    warn(c.warnings, kWarning.trajectory_errors,
+         "the trajectory's error {} is {:.2g} times as large as stated (chi2 of its corrections "
+         "{:.3g}, {:.3g} expected); the adjustment counts it as that large, and the sigmas with it",
+         correction_name(i), fit.factor[i], fit.chi2[i], fit.expected[i]);
   }
-  if (!fit.fits) c.warnings.push_back(misfit_in_words(c));
+  if (!fit.fits) c.warnings.push_back({kWarning.model_incomplete, misfit_in_words(c)});
 }
 
 trajectories::Trajectory corrected(const trajectories::Trajectory& trajectory,

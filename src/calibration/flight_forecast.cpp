@@ -346,8 +346,8 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   result.points = point_errors(work, system);
   for (std::size_t s = 0; s < result.strip_shots.size(); ++s) {
     if (result.strip_shots[s] > 0) continue;
-    result.warnings.push_back(
-        fmt::format("no shot of strip {} meets the terrain", result.strips[s].name));
+    warn(result.warnings, kWarning.not_seen, "no shot of strip {} meets the terrain",
+         result.strips[s].name);
   }
   progress.report(1);
   return result;

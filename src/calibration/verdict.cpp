@@ -340,30 +340,30 @@ bool improves(CalibrationCode code) {
   return code == CalibrationCode::bent || code == CalibrationCode::off_within_tolerance;
 }
 
-std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution& solution,
-                                     const std::vector<RangedRecording>& recordings) {
-  std::vector<std::string> warnings;
+std::vector<Warning> warnings_of(const Calibration& c, const PlanarSolution& solution,
+                                 const std::vector<RangedRecording>& recordings) {
+  std::vector<Warning> warnings;
   const double boresight = std::hypot(c.datum.sigma_pitch, c.datum.sigma_yaw);
   if (boresight > kPoorDatum) {
-    warnings.push_back(fmt::format(
-        "the direction that all beams share is known only to {} degrees, {} (pitch {}, yaw {}); "
-        "their directions relative to one another to {} degrees, {}",
-        plain_text(degrees_from_radians(boresight), 2), offset_text(boresight),
-        plain_text(degrees_from_radians(c.datum.sigma_pitch), 2),
-        plain_text(degrees_from_radians(c.datum.sigma_yaw), 2),
-        plain_text(degrees_from_radians(c.datum.shape), 2), offset_text(c.datum.shape)));
+    warn(warnings, kWarning.poor_datum,
+         "the direction that all beams share is known only to {} degrees, {} (pitch {}, yaw {}); "
+         "their directions relative to one another to {} degrees, {}",
+         plain_text(degrees_from_radians(boresight), 2), offset_text(boresight),
+         plain_text(degrees_from_radians(c.datum.sigma_pitch), 2),
+         plain_text(degrees_from_radians(c.datum.sigma_yaw), 2),
+         plain_text(degrees_from_radians(c.datum.shape), 2), offset_text(c.datum.shape));
   }
   for (const SurfaceStep& step : c.steps) {
-    warnings.push_back(fmt::format(
-        "{}: a region of {:.2g} degrees stands {:.0f} mm off plane {} (azimuth {:.1f}, zenith "
-        "{:.1f}); its {} shots are left out",
-        recordings[step.recording].name, degrees_from_radians(step.size), 1e3 * step.height,
-        c.planes[step.plane].name, degrees_from_radians(step.azimuth),
-        degrees_from_radians(step.zenith), step.points));
+    warn(warnings, kWarning.uneven_plane,
+         "{}: a region of {:.2g} degrees stands {:.0f} mm off plane {} (azimuth {:.1f}, zenith "
+         "{:.1f}); its {} shots are left out",
+         recordings[step.recording].name, degrees_from_radians(step.size), 1e3 * step.height,
+         c.planes[step.plane].name, degrees_from_radians(step.azimuth),
+         degrees_from_radians(step.zenith), step.points);
   }
   if (solution.lost > 0) {
-    warnings.push_back(
-        fmt::format("{} shots do not meet the plane they were assigned to", solution.lost));
+    warn(warnings, kWarning.shots_unused, "{} shots do not meet the plane they were assigned to",
+         solution.lost);
   }
   return warnings;
 }

@@ -40,7 +40,7 @@ std::string in_words(const PointingError& error);
 std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor);
 
 /// What a user should know of a calibration beside its numbers.
-std::vector<std::string> warnings_of(const Calibration& c, const PlanarSolution& solution,
-                                     const std::vector<RangedRecording>& recordings);
+std::vector<Warning> warnings_of(const Calibration& c, const PlanarSolution& solution,
+                                 const std::vector<RangedRecording>& recordings);
 
 }  // namespace risley::calibration

@@ -71,9 +71,9 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
     }
     station.scene_from_sensor = station.stated;
     if (!stations.empty() && pose.sigma == 0.0) {
-      result.warnings.push_back(fmt::format(
-          "station {} has no sigma_deg: its rotation is taken as exact and is not tested",
-          pose.name));
+      warn(result.warnings, kWarning.taken_as_exact,
+           "station {} has no sigma_deg: its rotation is taken as exact and is not tested",
+           pose.name);
     }
     result.stations.push_back(std::move(station));
   }
@@ -135,8 +135,8 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
     known_given = known_given || known;
     known_seen = known_seen || (known && !seen_by[w].empty());
     if (seen_by[w].empty()) {
-      result.warnings.push_back(fmt::format("plane {} is not seen in any recording ({})",
-                                            result.walls[w].name, normal_text(where[w])));
+      warn(result.warnings, kWarning.not_seen, "plane {} is not seen in any recording ({})",
+           result.walls[w].name, normal_text(where[w]));
     }
   }
   if (known_given && !known_seen && !found.empty()) {

@@ -26,7 +26,7 @@ struct WallMatching {
   std::vector<Wall> walls;
   std::vector<StationPose> stations;  ///< [recordings]
   bool stations_known = false;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Without stations and known planes every found plane is a wall of its own: nothing is known of

@@ -312,40 +312,41 @@ void Georeference::apply(Points& points, const SensorPoses& poses, InstructionSe
   }
 }
 
-std::vector<std::string> Georeference::warnings() const {
+std::vector<Warning> Georeference::warnings() const {
   const State& s = *state_;
-  std::vector<std::string> words;
+  std::vector<Warning> warnings;
   if (!s.errors) {
-    words.emplace_back(
-        "nobody says how wrong the trajectory may be: covariances hold the sensor's and the "
-        "mount's part alone");
+    warn(warnings, kWarning.taken_as_exact,
+         "nobody says how wrong the trajectory may be: covariances hold the sensor's and the "
+         "mount's part alone");
   }
   if (!s.clock_known) {
-    words.push_back(fmt::format(
-        "the recording does not say what its clock counts: its times, with the mount's offset of "
-        "{:g} s, are taken as the trajectory's ({}); a sensor that is set by PPS and NMEA "
-        "counts UTC, 18 s less than GPS time",
-        s.platform.mount.clock_offset.value, words_of(s.platform.trajectory.time_scale)));
+    warn(warnings, kWarning.clock_unknown,
+         "the recording does not say what its clock counts: its times, with the mount's offset of "
+         "{:g} s, are taken as the trajectory's ({}); a sensor that is set by PPS and NMEA counts "
+         "UTC, 18 s less than GPS time",
+         s.platform.mount.clock_offset.value, words_of(s.platform.trajectory.time_scale));
   }
-  if (!s.beyond_area.empty()) words.push_back(s.beyond_area);
+  if (!s.beyond_area.empty()) warnings.push_back({kWarning.outside_map, s.beyond_area});
   if (s.map && s.platform.crs.empty()) {
-    words.push_back(
-        fmt::format("no map was named: points are in {} with ellipsoidal heights", s.map->name()));
+    warn(warnings, kWarning.map_assumed,
+         "no map was named: points are in {} with ellipsoidal heights", s.map->name());
   }
   if (s.map) {
     const std::string operation = s.map->operation();
     if (!operation.empty()) {
-      words.push_back(fmt::format("the datum was changed on the way to the map: {}", operation));
+      warn(warnings, kWarning.datum_changed, "the datum was changed on the way to the map: {}",
+           operation);
     }
   }
   for (const trajectories::TrajectoryGap& gap : s.interpolation.gaps()) {
-    words.push_back(fmt::format(
-        "the trajectory has no records for {:.3f} s from {:.3f} s on: shots of that time have no "
-        "points",
-        1e-9 * static_cast<double>(gap.end_ns - gap.begin_ns),
-        1e-9 * static_cast<double>(gap.begin_ns)));
+    warn(warnings, kWarning.trajectory_gaps,
+         "the trajectory has no records for {:.3f} s from {:.3f} s on: shots of that time have no "
+         "points",
+         1e-9 * static_cast<double>(gap.end_ns - gap.begin_ns),
+         1e-9 * static_cast<double>(gap.begin_ns));
   }
-  return words;
+  return warnings;
 }
 
 std::int64_t Georeference::clock_shift_ns() const { return state_->shift_ns; }

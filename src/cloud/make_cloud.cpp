@@ -213,10 +213,9 @@ class CloudMaker {
       model_ = pointing_model(calibration_, *belief_, options_.pointing, mount());
       if (calibration_.reference != model_.reference &&
           model_.reference == sensors::CalibrationReference::planes) {
-        summary_.warnings.emplace_back(
-            "the recording's own directions do not agree with this sensor's parameters within "
-            "their "
-            "sigmas: points go where the parameters send the beam");
+        warn(summary_.warnings, kWarning.calibration_doubtful,
+             "the recording's own directions do not agree with this sensor's parameters within "
+             "their sigmas: points go where the parameters send the beam");
       }
       piece.tracker = std::make_unique<RotorTracker>(*belief_, options_.rate);
     } else {
@@ -225,9 +224,9 @@ class CloudMaker {
     }
     for (const CommonFactor& factor : model_.factors) summary_.factors.push_back(factor.name);
     if (model_.mount_of_another) {
-      summary_.warnings.emplace_back(
-          "the mount was found together with another calibration than this one: what errors of "
-          "both have in common is not known, and points are stated as if that were nothing");
+      warn(summary_.warnings, kWarning.taken_as_exact,
+           "the mount was found together with another calibration than this one: what errors of "
+           "both have in common is not known, and points are stated as if that were nothing");
     }
     if (options_.platform) {
       georeference_ = std::make_unique<Georeference>(
@@ -236,17 +235,17 @@ class CloudMaker {
     }
     has_intensity_ = reader_.header().has_intensity;
     if (!has_intensity_ && calibration_.range_errors.per_decade != 0) {
-      summary_.warnings.push_back(fmt::format(
-          "the recording has no intensities: ranges are not corrected by the {:.1f} mm that they "
-          "are longer for each tenth of the intensity",
-          1e3 * calibration_.range_errors.per_decade));
+      warn(summary_.warnings, kWarning.ranges_uncorrected,
+           "the recording has no intensities: ranges are not corrected by the {:.1f} mm that they "
+           "are longer for each tenth of the intensity",
+           1e3 * calibration_.range_errors.per_decade);
     }
     surfaces_ = std::make_unique<ShotSurfaces>(calibration_, model_.angle_noise, has_intensity_,
                                                georeference_.get());
     const recordings::Device& device = reader_.header().devices.front();
     if (device.extrinsic_enabled) {
-      summary_.warnings.emplace_back(
-          "the recording's extrinsics are not applied: points stand in the frame of the sensor");
+      warn(summary_.warnings, kWarning.pose_unused,
+           "the recording's extrinsics are not applied: points stand in the frame of the sensor");
     }
     header_.sensor = fmt::format("{} {}", calibration_.manufacturer, calibration_.model);
     header_.serial = device.serial;
@@ -286,9 +285,8 @@ class CloudMaker {
     for (std::size_t row = piece_->done; row < piece_->end; ++row) {
       ++(has_return(piece_->rows, row) ? summary_.without_rotation_angle : summary_.no_return);
     }
-    summary_.warnings.push_back(fmt::format("no points from observations {} to {}: {}",
-                                            piece_->first_row + piece_->done,
-                                            piece_->first_row + piece_->end - 1, *piece_->failure));
+    warn(summary_.warnings, kWarning.points_missing, "no points from observations {} to {}: {}",
+         piece_->first_row + piece_->done, piece_->first_row + piece_->end - 1, *piece_->failure);
   }
 
   /// Looks up where the sensor is at every row of a block, and takes out rows that have no pose.
@@ -443,7 +441,8 @@ class CloudMaker {
 
   void no_distribution(std::string_view why) {
     distribution_.reset();
-    summary_.warnings.push_back(fmt::format("how points lie on the ground is not told: {}", why));
+    warn(summary_.warnings, kWarning.distribution_unknown,
+         "how points lie on the ground is not told: {}", why);
   }
 
   void count_on_ground(const Points& points) {
@@ -509,15 +508,11 @@ class CloudMaker {
   }
 
   void finish() {
-    summary_.read_warnings = reader_.warnings();
     if (!writer_) {
       if (summary_.damage) throw FileError(*summary_.damage);
       throw EstimationError("the recording holds no valid shot");
     }
-    if (georeference_) {
-      const std::vector<std::string> more = georeference_->warnings();
-      summary_.warnings.insert(summary_.warnings.end(), more.begin(), more.end());
-    }
+    if (georeference_) append(summary_.warnings, georeference_->warnings());
     if (summary_.points == 0 && summary_.without_pose > 0) {
       const std::int64_t shift = georeference_->clock_shift_ns();
       throw EstimationError(trajectories::no_overlap_words(
@@ -526,7 +521,7 @@ class CloudMaker {
     }
     if (summary_.points == 0) {
       throw EstimationError(summary_.warnings.empty() ? std::string("no shot has a point")
-                                                      : summary_.warnings.back());
+                                                      : summary_.warnings.back().message);
     }
     const auto n = static_cast<double>(summary_.points);
     summary_.azimuth_residual_rms = std::sqrt(summary_.azimuth_residual_rms / n);

@@ -329,22 +329,25 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
     fail("the last steps still moved parameters by more than a tenth of their sigma",
          EstimateCode::undecided);
   } else if (estimate.unit_variance > kEnlarged && estimate.variance_factor > 1.0) {
-    estimate.warnings.push_back(residuals + ": the sigmas were enlarged by that factor");
+    warn(estimate.warnings, kWarning.sigmas_enlarged, "{}: the sigmas were enlarged by that factor",
+         residuals);
   } else if (ratio > kNoticed) {
-    estimate.warnings.push_back(residuals + ": the sigmas are too small by about that factor");
+    warn(estimate.warnings, kWarning.sigmas_too_small,
+         "{}: the sigmas are too small by about that factor", residuals);
   } else if (ratio < 0.93) {
-    estimate.warnings.push_back(residuals +
-                                ": the rotors' noise is set so high that they follow the noise, or "
-                                "the stated noise is too large");
+    warn(estimate.warnings, kWarning.unusual_noise,
+         "{}: the rotors' noise is set so high that they follow the noise, or the stated noise is "
+         "too large",
+         residuals);
   }
   if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * estimate.usual_noise) {
-    estimate.warnings.push_back(fmt::format(
-        "the directions are {:.3g} times as noisy ({:.3g} deg, {}) as the preset says "
-        "of a healthy unit ({:.3g} deg)",
-        estimate.noise.value.rms() / estimate.usual_noise,
-        degrees_from_radians(estimate.noise.value.rms()), offset_text(estimate.noise.value.rms()),
-        degrees_from_radians(estimate.usual_noise)));
-    oddities.push_back(estimate.warnings.back());
+    warn(estimate.warnings, kWarning.unusual_noise,
+         "the directions are {:.3g} times as noisy ({:.3g} deg, {}) as the preset says of a "
+         "healthy unit ({:.3g} deg)",
+         estimate.noise.value.rms() / estimate.usual_noise,
+         degrees_from_radians(estimate.noise.value.rms()), offset_text(estimate.noise.value.rms()),
+         degrees_from_radians(estimate.usual_noise));
+    oddities.push_back(estimate.warnings.back().message);
   }
   double unevenness = 1.0;
   std::size_t uneven = 0;
@@ -354,30 +357,29 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
     uneven = k;
   }
   if (unevenness > kUneven * estimate.autocorrelation.factor) {
-    estimate.warnings.push_back(
-        fmt::format("residuals depend on the rotation angle of prism {} ({:.3g} times what chance "
-                    "would make of them): the model lacks something that this sensor has, or a "
-                    "parameter is held at a wrong "
-                    "value; the sigmas do not cover that",
-                    prism_letter(static_cast<int>(uneven)), unevenness));
-    oddities.push_back(estimate.warnings.back());
+    warn(estimate.warnings, kWarning.model_incomplete,
+         "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would make "
+         "of them): the model lacks something that this sensor has, or a parameter is held at a "
+         "wrong value; the sigmas do not cover that",
+         prism_letter(static_cast<int>(uneven)), unevenness);
+    oddities.push_back(estimate.warnings.back().message);
   }
   if (estimate.autocorrelation.factor > 1.05) {
-    estimate.warnings.push_back(fmt::format(
-        "residuals of neighbouring shots are correlated ({:.2f} from one to the next): every "
-        "variance was multiplied by {:.3g}",
-        estimate.autocorrelation.rho.front(), estimate.autocorrelation.factor));
+    warn(estimate.warnings, kWarning.sigmas_enlarged,
+         "residuals of neighbouring shots are correlated ({:.2f} from one to the next): every "
+         "variance was multiplied by {:.3g}",
+         estimate.autocorrelation.rho.front(), estimate.autocorrelation.factor);
   }
   if (estimate.unused_shots > 0) {
-    estimate.warnings.push_back(fmt::format(
-        "{} shots lie in pieces between clock resets or long gaps that are too short to find the "
-        "rotors' phases, or run in the other speed combination; they were not used",
-        estimate.unused_shots));
+    warn(estimate.warnings, kWarning.shots_unused,
+         "{} shots lie in pieces between clock resets or long gaps that are too short to find the "
+         "rotors' phases, or run in the other speed combination; they were not used",
+         estimate.unused_shots);
   }
   if (estimate.converged && outlier_share > 0.02) {
-    estimate.warnings.push_back(
-        fmt::format("{:.1f} % of the shots were left out as outliers", 100 * outlier_share));
-    oddities.push_back(estimate.warnings.back());
+    warn(estimate.warnings, kWarning.many_outliers,
+         "{:.1f} % of the shots were left out as outliers", 100 * outlier_share);
+    oddities.push_back(estimate.warnings.back().message);
   }
   say_verdict(estimate, nominal, std::move(oddities), unusual_values(estimate, nominal));
 }
@@ -451,8 +453,8 @@ void hold_mute_emitters(const PrismTrain& train, Estimate& estimate) {
     std::erase_if(estimate.free, [&](const FreeParameter& parameter) {
       return place::emitter(parameter.places.front(), train.prisms()) == emitter;
     });
-    estimate.warnings.push_back(fmt::format(
-        "no shot is of emitter {}: its direction was held at the preset's", emitter + 1));
+    warn(estimate.warnings, kWarning.not_seen,
+         "no shot is of emitter {}: its direction was held at the preset's", emitter + 1);
   }
 }
 
@@ -624,10 +626,10 @@ Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
       const auto longest = std::max_element(
           ranges.begin(), ranges.end(),
           [](const ShotRange& a, const ShotRange& b) { return a.size() < b.size(); });
-      estimate.warnings.push_back(fmt::format(
-          "the clock was reset or the recording paused {} times: the filter takes the longest "
-          "piece, {} of {} shots",
-          ranges.size() - 1, longest->size(), estimate.series.size()));
+      warn(estimate.warnings, kWarning.clock_reset,
+           "the clock was reset or the recording paused {} times: the filter takes the longest "
+           "piece, {} of {} shots",
+           ranges.size() - 1, longest->size(), estimate.series.size());
       head_is_used = longest == ranges.begin();
       estimate.series = estimate.series.rows(*longest);
     }
@@ -649,19 +651,19 @@ Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
       estimate.series.change([&](AngleSeries& rows) {
         add_half_steps(rows, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
       });
-      estimate.warnings.push_back(
-          "the coordinates were cut off to whole steps and not rounded: half a step was added to "
-          "each");
+      warn(estimate.warnings, kWarning.coordinates_cut,
+           "the coordinates were cut off to whole steps and not rounded: half a step was added to "
+           "each");
     }
   }
   if (estimate.mirrored) {
-    estimate.warnings.push_back(
-        "the recording is a mirror image (its elevation has the other sign) and was turned");
+    warn(estimate.warnings, kWarning.mirrored,
+         "the recording is a mirror image (its elevation has the other sign) and was turned");
   }
   static_cast<Solution&>(estimate) = solve(estimate, options, progress);
   if (estimate.frame_turn) {
     take_frame(estimate);
-    estimate.warnings.push_back(frame_words(estimate));
+    estimate.warnings.push_back({kWarning.frame_turned, frame_words(estimate)});
   }
   estimate.states = states_of_knots(estimate, estimate.series);
   estimate.usual_noise = options.sensor.angle_noise;

@@ -94,7 +94,7 @@ std::vector<scenes::KnownGround> control_of(const std::string& path,
 
 /// What is added to the recordings' times to get those of the trajectory, ns.
 std::int64_t shift_of(const CalibratedFlight& result, const trajectories::Trajectory& trajectory,
-                      std::int64_t first_ns, std::vector<std::string>& warnings) {
+                      std::int64_t first_ns, std::vector<Warning>& warnings) {
   const bool utc =
       std::all_of(result.recordings.begin(), result.recordings.end(), [](const auto& recording) {
         return recording.header.time_reference == recordings::TimeReference::utc;
@@ -102,11 +102,11 @@ std::int64_t shift_of(const CalibratedFlight& result, const trajectories::Trajec
   const auto shift =
       utc ? trajectories::shift_from_utc_ns(trajectory, first_ns) : std::optional<std::int64_t>();
   if (!shift) {
-    warnings.push_back(
-        fmt::format("{}: its times are taken to be on the trajectory's clock, after adding the "
-                    "clock offset of the mount",
-                    utc ? "the trajectory does not say what its times count"
-                        : "the recordings do not say what their clock counts"));
+    warn(warnings, kWarning.clock_unknown,
+         "{}: its times are taken to be on the trajectory's clock, after adding the clock offset "
+         "of the mount",
+         utc ? "the trajectory does not say what its times count"
+             : "the recordings do not say what their clock counts");
   }
   return shift.value_or(0);
 }
@@ -157,7 +157,7 @@ void write_flight(const CalibrateFlightOptions& options, CalibratedFlight& resul
     for (const NamedText& text : options.texts(result)) folder.add_text(text);
   }
   progress.check();
-  for (std::string& text : folder.commit()) result.warnings.push_back(std::move(text));
+  append(result.warnings, folder.commit());
 }
 
 }  // namespace
@@ -173,8 +173,8 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
   cloud::MovingPlatform platform = platform_of(options, progress.stage("reading"));
   result.mount = platform.mount;
   result.errors = *platform.errors;
-  for (const trajectories::TrajectoryWarning& warning : platform.trajectory.warnings) {
-    result.warnings.push_back(fmt::format("{}: {}", options.platform.trajectory, warning.message));
+  for (const Warning& warning : platform.trajectory.warnings) {
+    result.warnings.push_back(of_file(options.platform.trajectory, warning));
   }
   std::vector<scenes::KnownGround> control = control_of(options.control, platform.trajectory);
   result.strips = trajectories::flown_strips(trajectories::Interpolation(platform.trajectory));

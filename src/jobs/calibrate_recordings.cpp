@@ -61,7 +61,7 @@ void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings
     for (const NamedText& text : options.texts(result)) folder.add_text(text);
   }
   progress.check();
-  for (std::string& text : folder.commit()) result.warnings.push_back(std::move(text));
+  append(result.warnings, folder.commit());
 }
 
 }  // namespace

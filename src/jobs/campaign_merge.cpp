@@ -309,7 +309,7 @@ std::vector<SoundChunk> find_chunks(const CampaignPlan& plan, const CampaignOpti
       check(head);
       sound.push_back({file, head});
     } catch (const FileError& error) {
-      result.warnings.push_back(fmt::format("{}; this chunk does not count", error.what()));
+      warn(result.warnings, kWarning.input_left_out, "{}; this chunk does not count", error.what());
     }
   }
   std::stable_sort(sound.begin(), sound.end(), [](const SoundChunk& a, const SoundChunk& b) {

@@ -95,8 +95,9 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
   RecordingCloud result{
       options.recording.name(), options.output, options.calibration, calibration.reference,
       cloud::make_cloud(*input.reader, calibration, options.output, settings, progress)};
-  std::vector<std::string>& warnings = result.summary.warnings;
-  warnings.insert(warnings.begin(), input.warnings.begin(), input.warnings.end());
+  std::vector<Warning> warnings = input.all_warnings();
+  append(warnings, result.summary.warnings);
+  result.summary.warnings = std::move(warnings);
   return result;
 }
 

@@ -74,8 +74,7 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
   writer->close();
   result.left_out = writer->left_out();
   result.input_format = reader->header().format;
-  result.warnings = reader->warnings();
-  for (const std::string& words : input.warnings) result.warnings.push_back({{}, words});
+  result.warnings = input.all_warnings();
   result.time_uncertainty = input.time_uncertainty;
   return result;
 }

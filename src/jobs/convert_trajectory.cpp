@@ -17,7 +17,7 @@ ConvertedTrajectory convert_trajectory(const ConvertTrajectoryOptions& options,
     const trajectories::AccuracyRecords records =
         trajectories::load_accuracies(options.accuracy, progress.stage("reading"));
     trajectories::add_accuracies(trajectory, records, options.accuracy);
-    result.warnings.insert(result.warnings.end(), records.warnings.begin(), records.warnings.end());
+    append(result.warnings, records.warnings);
   }
   progress.stage("writing").report(0);
   result.left_out = trajectories::write_trajectory(options.output, trajectory, options.format);

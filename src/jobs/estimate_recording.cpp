@@ -38,7 +38,7 @@ void write_files(const EstimateRecordingOptions& options, EstimatedRecording& re
     for (const NamedText& text : options.texts(result)) folder.add_text(text);
   }
   progress.check();
-  for (std::string& text : folder.commit()) result.warnings.push_back(std::move(text));
+  append(result.warnings, folder.commit());
 }
 
 /// What rotors say of the clock that turn too fast or too slowly all by the same factor.
@@ -146,7 +146,8 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
                            progress.stage("estimating"), std::move(input.found));
   result.solving_time = watch.seconds();
   if (const auto& factor = result.estimate.speed_factor) {
-    result.warnings.push_back(clock_words(*factor, result.recording.header.counted_rate));
+    result.warnings.push_back(
+        {kWarning.clock_rate, clock_words(*factor, result.recording.header.counted_rate)});
   }
   const Progress judging = progress.stage("judging");
   judging.check();

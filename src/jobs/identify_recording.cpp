@@ -31,26 +31,26 @@ estimation::AngleSeries read(const recordings::Source& recording,
                              const IdentifyRecordingOptions& options, IdentifiedRecording& result,
                              const Progress& progress) {
   PreparedRecording input = prepare_recording(recording, options.reading, {}, progress);
-  input.close_questions();
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const recordings::RecordingHeader& header = reader->header();
   recordings::require_one_device(header, options.recording.name());
   recordings::require_times(header);
+  input.require_whole();
+  input.close_questions();
   estimation::ShotSelector selector({});
   recordings::Chunk chunk;
   while (reader->read(chunk)) {
     selector.add(chunk.observations);
     progress.report(reader->fraction_read());
   }
-  for (const auto& warning : reader->warnings()) result.warnings.push_back(warning_text(warning));
-  result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
-  add_left_out_words(selector.counts(), result.warnings);
+  result.warnings = input.all_warnings();
+  warn_of_left_out(selector.counts(), result.warnings);
   result.cropped = input.choice.has_value();
   if (result.cropped) {
-    result.warnings.push_back(
-        fmt::format("the optics of {} were used to find when the shots in packets with missing "
-                    "points were fired: what is found here is not independent of them",
-                    input.choice->sensor.name));
+    warn(result.warnings, kWarning.packets_incomplete,
+         "the optics of {} were used to find when the shots in packets with missing points were "
+         "fired: what is found here is not independent of them",
+         input.choice->sensor.name);
   }
   return selector.take_series();
 }
@@ -187,7 +187,8 @@ IdentifiedRecording identify_recording(const IdentifyRecordingOptions& options,
   } catch (const EstimationError& error) {
     const bool is_scan = !recordings::not_a_scan(series.azimuth, series.zenith, {});
     if (is_scan || result.warnings.empty()) throw;
-    throw EstimationError(fmt::format("{}: {}", result.warnings.front(), error.what()));
+    throw EstimationError(
+        fmt::format("{}: {}", warning_text(result.warnings.front()), error.what()));
   }
   result.solving_time = solving.seconds();
   find_like(result);

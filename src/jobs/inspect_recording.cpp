@@ -43,14 +43,12 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   result.header = reader->header();
   result.audit = audit.result();
   result.audit.pps_wraps = reader->clock_wraps();
-  result.warnings = reader->warnings();
-  for (const std::string& words : input.warnings) result.warnings.push_back({{}, words});
-  if (!removed.empty()) result.warnings.push_back({{}, removed});
+  result.warnings = input.all_warnings();
+  if (!removed.empty()) result.warnings.push_back({kWarning.shots_lost, removed});
   result.time_uncertainty = input.time_uncertainty;
   result.choice = std::move(input.choice);
   if (result.audit.shots == 0) result.choice.reset();
-  if (!result.choice) return result;
-  for (const std::string& words : result.choice->warnings) result.warnings.push_back({{}, words});
+  if (result.choice) append(result.warnings, result.choice->warnings);
   return result;
 }
 

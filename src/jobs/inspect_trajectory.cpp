@@ -40,9 +40,7 @@ InspectedTrajectory inspect_trajectory(const InspectTrajectoryOptions& options,
     trajectories::AccuracyRecords records =
         trajectories::load_accuracies(path, progress.stage("reading"));
     result.accuracies = trajectories::audit_accuracies(records);
-    for (const trajectories::TrajectoryWarning& warning : records.warnings) {
-      result.warnings.push_back(warning);
-    }
+    append(result.warnings, records.warnings);
     return records;
   };
   if (trajectories::trajectory_file_kind(options.trajectory) == TrajectoryFileKind::accuracies) {

@@ -68,8 +68,7 @@ JudgedObservability judge_observability(const ObservabilityOptions& options,
         estimation::estimate(estimation::Method::map, std::move(input.series), input.head, settings,
                              estimating, std::move(input.found));
     result.warnings = std::move(input.warnings);
-    result.warnings.insert(result.warnings.end(), estimate.warnings.begin(),
-                           estimate.warnings.end());
+    append(result.warnings, estimate.warnings);
     result.converged = estimate.converged;
     result.reason = estimate.reason;
     result.observability = estimation::observability_of_estimate(estimate, progress.silent());

@@ -33,30 +33,27 @@ std::optional<PacketRecording> PacketRecording::open(const PreparedRecording& re
   shots.places = reader->header().packet_shots;
   shots.cartesian = reader->header().cartesian && !as_it_is.extrinsics;
   recordings::Chunk chunk;
-  try {
-    while (reader->read(chunk)) {
-      const recordings::Observations& rows = chunk.observations;
-      auto begin = chunk.packet_begins.begin();
-      for (std::size_t row = 0; row < rows.size(); ++row) {
-        if (begin != chunk.packet_begins.end() && *begin == row) {
-          result.first_row_.push_back(result.index_.size());
-          shots.packets.push_back({rows.time_ns[row], 0});
-          ++begin;
-        }
-        const bool is_new = rows.return_number[row] <= 1 || shots.packets.back().shots == 0;
-        if (is_new) ++shots.packets.back().shots;
-        result.index_.push_back(static_cast<std::uint8_t>(shots.packets.back().shots - 1));
-        result.last_beam_ = std::max(result.last_beam_, rows.beam[row]);
-        if (!is_new || rows.valid[row] == 0) continue;
-        shots.series.append(rows.time_ns[row], rows.azimuth[row], rows.zenith[row], 0,
-                            variance(rows.azimuth_resolution[row]),
-                            variance(rows.zenith_resolution[row]));
-        shots.packet.push_back(shots.packets.size() - 1);
-        shots.precedent.push_back(result.index_.back());
+  while (reader->read_sound(chunk)) {
+    const recordings::Observations& rows = chunk.observations;
+    auto begin = chunk.packet_begins.begin();
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      if (begin != chunk.packet_begins.end() && *begin == row) {
+        result.first_row_.push_back(result.index_.size());
+        shots.packets.push_back({rows.time_ns[row], 0});
+        ++begin;
       }
-      progress.check();
+      const bool is_new = rows.return_number[row] <= 1 || shots.packets.back().shots == 0;
+      if (is_new) ++shots.packets.back().shots;
+      result.index_.push_back(static_cast<std::uint8_t>(shots.packets.back().shots - 1));
+      result.last_beam_ = std::max(result.last_beam_, rows.beam[row]);
+      if (!is_new || rows.valid[row] == 0) continue;
+      shots.series.append(rows.time_ns[row], rows.azimuth[row], rows.zenith[row], 0,
+                          variance(rows.azimuth_resolution[row]),
+                          variance(rows.zenith_resolution[row]));
+      shots.packet.push_back(shots.packets.size() - 1);
+      shots.precedent.push_back(result.index_.back());
     }
-  } catch (const FileError&) {  // a later pass reports it
+    progress.check();
   }
   if (!result.lacks_points()) return std::nullopt;
   return result;
@@ -125,18 +122,18 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
       "was exported from";
   PlacedRows result;
   if (found.followed) {
-    result.words.push_back(
-        fmt::format("{}: the rotors were followed, which shows when each of {} shots was fired; {} "
-                    "shots that fit two places in their packet are left out",
-                    lacking, told, unknown));
+    warn(result.warnings, kWarning.packets_incomplete,
+         "{}: the rotors were followed, which shows when each of {} shots was fired; {} shots that "
+         "fit two places in their packet are left out",
+         lacking, told, unknown);
   } else if (untold == UntoldShots::guessed) {
     estimation::GuessedPlaces guess = estimation::guess_places(shots_, found.place);
     found.place = std::move(guess.place);
     result.time_uncertainty = guess.most_off / rate;
-    result.words.push_back(fmt::format(
-        "{}: they do not show how the rotors of the sensor {} turned. The times of {} of {} shots "
-        "are guessed, in their order, and may be off by up to {:.2g} ms; {}",
-        lacking, sensor.name, unknown, told + unknown, 1e3 * result.time_uncertainty, remedy));
+    warn(result.warnings, kWarning.times_guessed,
+         "{}: they do not show how the rotors of the sensor {} turned. The times of {} of {} shots "
+         "are guessed, in their order, and may be off by up to {:.2g} ms; {}",
+         lacking, sensor.name, unknown, told + unknown, 1e3 * result.time_uncertainty, remedy);
   } else if (told < kFewestPackets * static_cast<std::size_t>(shots_.places)) {
     throw EstimationError(fmt::format(
         "{}: when the shots were fired is unknown, because they do not show how the rotors of the "
@@ -145,22 +142,22 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
         lacking, sensor.name, told, whole, kFewestPackets * static_cast<std::size_t>(shots_.places),
         remedy));
   } else {
-    result.words.push_back(fmt::format(
-        "{}: they do not show how the rotors of the sensor {} turned. Only {} of {} shots "
-        "are used, whose places are known without that, in {} whole packets and in "
-        "runs that continue from packet to packet; {}",
-        lacking, sensor.name, told, told + unknown, whole, remedy));
+    warn(result.warnings, kWarning.shots_unused,
+         "{}: they do not show how the rotors of the sensor {} turned. Only {} of {} shots are "
+         "used, whose places are known without that, in {} whole packets and in runs that continue "
+         "from packet to packet; {}",
+         lacking, sensor.name, told, told + unknown, whole, remedy);
   }
   if (shot_rate) {
-    result.words.push_back(
-        fmt::format("shots cannot be counted where points are missing: the packets keep their "
-                    "times, and {:.6g} shots per second hold within a packet only",
-                    *shot_rate));
+    warn(result.warnings, kWarning.packets_incomplete,
+         "shots cannot be counted where points are missing: the packets keep their times, and "
+         "{:.6g} shots per second hold within a packet only",
+         *shot_rate);
   }
   if (found.cut_coordinates) {
-    result.words.emplace_back(
-        "the coordinates of the points were evidently truncated towards zero, not rounded: half a "
-        "step was added back");
+    warn(result.warnings, kWarning.coordinates_cut,
+         "the coordinates of the points were evidently truncated towards zero, not rounded: half a "
+         "step was added back");
   }
   result.places = places_of_rows(found.place, rate, std::move(found.firing_order));
   result.places.cut_coordinates = found.cut_coordinates;

@@ -19,8 +19,8 @@ namespace risley::jobs {
 /// When the rows of a recording were fired, as far as it is known.
 struct PlacedRows {
   recordings::PacketPlaces places;
-  std::vector<std::string> words;  ///< what was done about missing points
-  double time_uncertainty = 0;     ///< by which guessed times may be off, s; 0: there are none
+  std::vector<Warning> warnings;  ///< what was done about missing points
+  double time_uncertainty = 0;    ///< by which guessed times may be off, s; 0: there are none
 };
 
 /// A recording of one sensor with one time for each packet, some of which lack points: all of its

@@ -131,24 +131,24 @@ PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress
     planned.terrain = *options.terrain;
   } else {
     planned.terrain.ground = scenes::Ground{};
-    result.warnings.emplace_back(
-        "no terrain is given: the ground is taken to be level at a height of 0, from which the "
-        "least can be learned; roofs show more");
+    warn(result.warnings, kWarning.terrain_assumed,
+         "no terrain is given: the ground is taken to be level at a height of 0, from which the "
+         "least can be learned; roofs show more");
   }
   const bool all_held =
       std::all_of(options.mount.boresight.begin(), options.mount.boresight.end(),
                   [](const trajectories::StatedValue& angle) { return angle.sigma == 0; });
   if (all_held) {
-    result.warnings.emplace_back(
-        "the mount gives its boresight a sigma of 0, so it counts as known and is not estimated: "
-        "for a mount as built, state a sigma of 3 degrees");
+    warn(result.warnings, kWarning.taken_as_exact,
+         "the mount gives its boresight a sigma of 0, so it counts as known and is not estimated: "
+         "for a mount as built, state a sigma of 3 degrees");
   }
   result.forecast = calibration::forecast(planned, wanted, progress.stage("calibration"));
   try {
     result.distribution = distribution_of(planned, options, progress.stage("points"));
   } catch (const InvalidArgument& error) {
-    result.warnings.push_back(
-        fmt::format("how densely points cover the ground is not reported: {}", error.what()));
+    warn(result.warnings, kWarning.distribution_unknown,
+         "how densely points cover the ground is not reported: {}", error.what());
   }
   return result;
 }

@@ -134,15 +134,12 @@ std::optional<estimation::CountedShots> counted_shots(const recordings::Source& 
   EvenTimes even(sensor.shot_rate);
   recordings::Chunk chunk;
   bool named = false;
-  try {
-    while (reader->read(chunk)) {
-      if (!options.shot_rate && !even.add(chunk)) return std::nullopt;
-      selector.add(chunk.observations);
-      const auto& beam = chunk.observations.beam;
-      named = named || std::any_of(beam.begin(), beam.end(), [](auto one) { return one != 0; });
-      progress.check();
-    }
-  } catch (const FileError&) {  // a later pass reports it
+  while (reader->read_sound(chunk)) {
+    if (!options.shot_rate && !even.add(chunk)) return std::nullopt;
+    selector.add(chunk.observations);
+    const auto& beam = chunk.observations.beam;
+    named = named || std::any_of(beam.begin(), beam.end(), [](auto one) { return one != 0; });
+    progress.check();
   }
   const std::optional<double> rate = options.shot_rate ? options.shot_rate : even.rate();
   if (!rate) return std::nullopt;
@@ -156,38 +153,38 @@ std::optional<estimation::CountedShots> counted_shots(const recordings::Source& 
 estimation::ShotCount count_of(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
                                const Progress& progress) {
   for (const std::uint8_t beam : shots.series.beam) {
-    if (beam >= sensor.train.emitters()) return {};  // a later pass reports it
+    if (beam >= sensor.train.emitters()) return {};  // who estimates refuses it
   }
   return estimation::find_slips(shots, sensor, progress);
 }
 
-/// What was found wrong with a count, in words.
-std::vector<std::string> count_words(const estimation::ShotCount& count, double rate, bool given) {
-  std::vector<std::string> words;
+/// What was found wrong with a count.
+std::vector<Warning> warnings_of(const estimation::ShotCount& count, double rate, bool given) {
+  std::vector<Warning> warnings;
   std::int64_t lost = 0;
   std::size_t mended = 0;
   for (const recordings::ShotSlip& slip : count.slips) {
     if (!slip.counted) {
-      words.push_back(
-          fmt::format("shots are missing before row {}, and the rotors do not show how many: the "
-                      "recording was cut there",
-                      slip.row));
+      warn(warnings, kWarning.shots_lost,
+           "shots are missing before row {}, and the rotors do not show how many: the recording "
+           "was cut there",
+           slip.row);
       continue;
     }
     ++mended;
     lost += slip.shots;
   }
   if (mended > 0) {
-    words.push_back(fmt::format(
-        "{} gap{} in the shot count {} found ({} shots lost), and the times behind {} corrected",
-        mended, mended == 1 ? "" : "s", mended == 1 ? "was" : "were", lost,
-        mended == 1 ? "it" : "them"));
+    warn(warnings, kWarning.shots_lost,
+         "{} gap{} in the shot count {} found ({} shots lost), and the times behind {} corrected",
+         mended, mended == 1 ? "" : "s", mended == 1 ? "was" : "were", lost,
+         mended == 1 ? "it" : "them");
   }
-  if (!words.empty() && !given) {
-    words.push_back(fmt::format(
-        "the times of the recording are evidently shot numbers: they were counted anew at "
-        "{:.6g} shots per second",
-        rate));
+  if (!warnings.empty() && !given) {
+    warn(warnings, kWarning.times_corrected,
+         "the times of the recording are evidently shot numbers: they were counted anew at {:.6g} "
+         "shots per second",
+         rate);
   }
   bool in_turn = true;
   std::string order;
@@ -196,10 +193,10 @@ std::vector<std::string> count_words(const estimation::ShotCount& count, double 
     order += fmt::format("{}{}", order.empty() ? "" : ", ", count.firing_order[i] + 1);
   }
   if (!in_turn) {
-    words.push_back(fmt::format(
-        "the file names no emitters: from its first shot on, they fire in the order {}", order));
+    warn(warnings, kWarning.firing_order,
+         "the file names no emitters: from its first shot on, they fire in the order {}", order);
   }
-  return words;
+  return warnings;
 }
 
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
@@ -273,10 +270,10 @@ void require_all_shots(const estimation::CountedShots& shots, const sensors::Sen
 void find_times(PreparedRecording& recording, const Preparation& wishes, const Progress& progress) {
   if (const auto sensor =
           sensor_to_count_by(recording.reader->header(), recording.reading, wishes.sensor)) {
-    recording.warnings.push_back(fmt::format(
-        "all times of the recording are the same: shots were counted at the {:.6g} shots "
-        "per second of {}",
-        sensor->shot_rate, sensor->name));
+    warn(recording.warnings, kWarning.times_corrected,
+         "all times of the recording are the same: shots were counted at the {:.6g} shots per "
+         "second of {}",
+         sensor->shot_rate, sensor->name);
     recording.reading.shot_rate = sensor->shot_rate;
     recording.read_again(progress);
   }
@@ -298,10 +295,10 @@ void turn_back(PreparedRecording& recording, const Progress& progress) {
     recording.reading.extrinsics = roll_about_axis(choice.roll, choice.frame);
     recording.read_again(progress);
     recording.turned_back = true;
-    recording.warnings.push_back(fmt::format(
-        "the recording is rotated about the optical axis by {:.1f} deg, as the positions of the "
-        "sensor's emitters show: the shots were turned back by that angle",
-        degrees_from_radians(choice.roll)));
+    warn(recording.warnings, kWarning.turned_back,
+         "the recording is rotated about the optical axis by {:.1f} deg, as the positions of the "
+         "sensor's emitters show: the shots were turned back by that angle",
+         degrees_from_radians(choice.roll));
     return;
   }
   recordings::ReadOptions turned_back = recording.reading;
@@ -323,15 +320,16 @@ void turn_back(PreparedRecording& recording, const Progress& progress) {
     recording.read_again(progress);
   }
   if (decided && recording.turned_back) {
-    recording.warnings.push_back(found + ": the shots were turned back into the sensor's frame");
+    warn(recording.warnings, kWarning.turned_back,
+         "{}: the shots were turned back into the sensor's frame", found);
   } else if (!decided) {
-    recording.warnings.push_back(fmt::format(
-        "{}: that does not show whether the pose was applied to them; {}. {} decides it: give the "
-        "pose, or 0,0,0 for shots in the sensor's frame",
-        found,
-        recording.turned_back ? "they were turned back, because a hub recorded them"
-                              : "they were taken as they are",
-        name_of(kSetting.extrinsics)));
+    warn(recording.warnings, kWarning.pose_undecided,
+         "{}: that does not show whether the pose was applied to them; {}. {} decides it: give the "
+         "pose, or 0,0,0 for shots in the sensor's frame",
+         found,
+         recording.turned_back ? "they were turned back, because a hub recorded them"
+                               : "they were taken as they are",
+         name_of(kSetting.extrinsics));
   }
 }
 
@@ -353,8 +351,7 @@ void mend_count(PreparedRecording& recording, const Progress& progress) {
   require_all_shots(*shots, sensor, recording.source.name());
   estimation::ShotCount count = count_of(*shots, sensor, progress);
   if (!given && count.slips.empty() && count.firing_order.empty()) return;
-  const auto words = count_words(count, shots->shot_rate, given);
-  recording.warnings.insert(recording.warnings.end(), words.begin(), words.end());
+  append(recording.warnings, warnings_of(count, shots->shot_rate, given));
   reading.shot_rate = shots->shot_rate;
   reading.emitters = emitters;
   reading.slips = std::move(count.slips);
@@ -379,12 +376,9 @@ const SensorChoice& PreparedRecording::choose(const std::optional<sensors::Senso
 std::string PreparedRecording::removed_shots_words(const Progress& progress) const {
   constexpr std::size_t kMost = 100'000;
   estimation::ShotSelector selector({.rate = std::nullopt, .ranges = false, .rows = true});
-  try {
-    const auto own = recordings::open_recording(source, reading, progress);
-    recordings::Chunk chunk;
-    while (selector.rows().size() < kMost && own->read(chunk)) selector.add(chunk.observations);
-  } catch (const FileError&) {  // a later pass reports it
-  }
+  const auto own = recordings::open_recording(source, reading, progress);
+  recordings::Chunk chunk;
+  while (selector.rows().size() < kMost && own->read_sound(chunk)) selector.add(chunk.observations);
   const estimation::CountedShots shots{selector.take_series(), selector.rows(), 0, false};
   return words_of_removed(shots, estimation::emitters_in_turn(shots));
 }
@@ -408,7 +402,7 @@ PreparedRecording prepare_recording(const recordings::Source& source,
     find_times(result, wishes, progress);
     const SensorChoice& choice = result.choose(wishes.sensor, progress);
     require_possible(choice, source.name());
-    result.warnings.insert(result.warnings.end(), choice.warnings.begin(), choice.warnings.end());
+    append(result.warnings, choice.warnings);
     if (choice.times_at_fault) {
       result.reading.shot_rate = choice.sensor.shot_rate;
       result.read_again(progress);
@@ -423,7 +417,7 @@ PreparedRecording prepare_recording(const recordings::Source& source,
   }
   PlacedRows placed = packets->place_rows(result.choose(wishes.sensor, progress).sensor,
                                           options.shot_rate, wishes.untold, progress);
-  result.warnings.insert(result.warnings.end(), placed.words.begin(), placed.words.end());
+  append(result.warnings, placed.warnings);
   result.time_uncertainty = placed.time_uncertainty;
   result.cut_mended = placed.places.cut_coordinates;
   result.reading.packet_places = std::move(placed.places);

@@ -72,9 +72,7 @@ RangedRecording read_ranged(recordings::Source source, const RangedInputOptions&
     result.nominal = settings.sensor;
     result.choice = input.choice;
   }
-  for (const std::string& text : input.warnings) {
-    result.warnings.push_back(fmt::format("{}: {}", path, text));
-  }
+  for (const Warning& warning : input.warnings) result.warnings.push_back(of_file(path, warning));
   const Stopwatch watch;
   const Progress angles =
       progress.stage(fmt::format("rotation angles {}/{}", number + 1, options.recordings.size()));
@@ -86,8 +84,8 @@ RangedRecording read_ranged(recordings::Source source, const RangedInputOptions&
       throw EstimationError(fmt::format("{}: {}", path, error.what()));
     }
   }();
-  for (const std::string& text : estimate.warnings) {
-    result.warnings.push_back(fmt::format("{}: {}", path, text));
+  for (const Warning& warning : estimate.warnings) {
+    result.warnings.push_back(of_file(path, warning));
   }
   RangedRecording recording =
       calibration::ranged_recording(estimate, path, input.recording.serial());

@@ -64,11 +64,7 @@ void RecordedScan::open() {
 bool RecordedScan::find_row() {
   while (row_ >= chunk_.observations.size()) {
     row_ = 0;
-    try {
-      if (!reader_->read(chunk_)) return false;
-    } catch (const FileError&) {  // what came before the damage was sent
-      return false;
-    }
+    if (!reader_->read_sound(chunk_)) return false;  // what came before damage was sent
   }
   return true;
 }

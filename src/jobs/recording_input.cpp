@@ -5,8 +5,6 @@
 #include <array>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "risley/core/setting.hpp"
 #include "risley/jobs/prepared_recording.hpp"
 #include "risley/parallel/parallel.hpp"
@@ -34,6 +32,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   recordings::Reader& reader = *input.reader;
   const std::string name = input.source.name();
   recordings::require_one_device(reader.header(), name);
+  input.require_whole();
   input.source = {};  // the rows are read for the last time
   EstimationInput result;
   result.whole_steps = reader.header().cartesian && !input.turned_back && !input.cut_mended;
@@ -56,16 +55,15 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
                              result.series.append(selector.take_series());
                            }}});
   result.recording = {name, reader.header(), audit.result()};
-  for (const auto& warning : reader.warnings()) result.warnings.push_back(warning_text(warning));
-  result.warnings.insert(result.warnings.end(), input.warnings.begin(), input.warnings.end());
+  result.warnings = input.all_warnings();
   result.choice = *std::move(input.choice);
   result.counts = selector.counts();
-  add_left_out_words(result.counts, result.warnings);
+  warn_of_left_out(result.counts, result.warnings);
   if (result.counts.clock_resets > 0) {
-    result.warnings.push_back(
-        fmt::format("the clock of the recording jumps back {} times: the pieces share their "
-                    "parameters, and in each the rotors are found anew",
-                    result.counts.clock_resets));
+    warn(result.warnings, kWarning.clock_reset,
+         "the clock of the recording jumps back {} times: the pieces share their parameters, and "
+         "in each the rotors are found anew",
+         result.counts.clock_resets);
   }
   result.head = selector.head();
   if (are_same_shots(result.head, input.first.head)) result.found = std::move(input.first.found);
@@ -73,27 +71,19 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   return result;
 }
 
-void add_left_out_words(const estimation::SelectionCounts& counts,
-                        std::vector<std::string>& words) {
+void warn_of_left_out(const estimation::SelectionCounts& counts, std::vector<Warning>& warnings) {
   if (counts.out_of_order > 0) {
-    words.push_back(fmt::format(
-        "{} of {} shots are a little earlier than the shot before and were left out: packets came "
-        "late",
-        counts.out_of_order, counts.rows));
+    warn(warnings, kWarning.shots_unused,
+         "{} of {} shots are a little earlier than the shot before and were left out: packets came "
+         "late",
+         counts.out_of_order, counts.rows);
   }
   if (counts.equal_times > 0) {
-    words.push_back(
-        fmt::format("{} of {} shots have the time of the shot before, so that nobody knows when "
-                    "they were fired, and were left out: {} counts shots, where none is missing",
-                    counts.equal_times, counts.rows, name_of(kSetting.shot_rate)));
+    warn(warnings, kWarning.shots_unused,
+         "{} of {} shots have the time of the shot before, so that nobody knows when they were "
+         "fired, and were left out: {} counts shots, where none is missing",
+         counts.equal_times, counts.rows, name_of(kSetting.shot_rate));
   }
-}
-
-std::string warning_text(const recordings::ReadWarning& warning) {
-  std::string text = warning.message;
-  if (warning.place.byte_offset) text += fmt::format(" (at byte {})", *warning.place.byte_offset);
-  if (warning.place.line) text += fmt::format(" (line {})", *warning.place.line);
-  return text;
 }
 
 }  // namespace risley::jobs

@@ -86,8 +86,8 @@ void ResultFolder::add_text(const NamedText& text) {
   if (!folder_.empty()) write(text.name, text.text);
 }
 
-std::vector<std::string> ResultFolder::commit() {
-  std::vector<std::string> moves;
+std::vector<Warning> ResultFolder::commit() {
+  std::vector<Warning> moves;
   if (folder_.empty()) return moves;
   for (io::OutputFile& file : files_) file.sync();
   committed_ = true;
@@ -97,9 +97,9 @@ std::vector<std::string> ResultFolder::commit() {
                       "stopped while it\nput its results in place. Run it again.\n");
   for (const std::string& name : left_over()) {
     const std::string aside = set_aside(path(name));
-    moves.push_back(
-        fmt::format("{} is from an earlier run, and this run wrote none: it was renamed {}",
-                    path(name), aside));
+    warn(moves, kWarning.results_renamed,
+         "{} is from an earlier run, and this run wrote none: it was renamed {}", path(name),
+         aside);
   }
   for (io::OutputFile& file : files_) file.commit();
   std::error_code code;

@@ -154,9 +154,9 @@ void try_variants(FirstShots& shots, SensorChoice& choice) {
 void call_it_a_guess(SensorChoice& choice, const std::string& why) {
   choice.chosen_by = ChosenBy::guess;
   choice.words = why;
-  choice.warnings.push_back(fmt::format(
-      "the file does not say which sensor recorded it: {} is a guess, {}; {} decides it",
-      choice.sensor.name, why, name_of(kSetting.sensor)));
+  warn(choice.warnings, kWarning.sensor_guessed,
+       "the file does not say which sensor recorded it: {} is a guess, {}; {} decides it",
+       choice.sensor.name, why, name_of(kSetting.sensor));
 }
 
 /// Where the values of a calibration are from; empty for other presets.
@@ -201,10 +201,10 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
   choice.fits = false;
   choice.misfits = best_two(*found, candidates);
   choice.words = "no built-in preset describes the scan: " + comparison(choice.misfits);
-  choice.warnings.push_back(
-      fmt::format("{}; {} is assumed. {} names the sensor, by a preset or a calibration file; the "
-                  "prisms of an unknown sensor can be found with identify",
-                  choice.words, choice.sensor.name, name_of(kSetting.sensor)));
+  warn(choice.warnings, kWarning.sensor_unknown,
+       "{}; {} is assumed. {} names the sensor, by a preset or a calibration file; the prisms of "
+       "an unknown sensor can be found with identify",
+       choice.words, choice.sensor.name, name_of(kSetting.sensor));
 }
 
 std::string span_text(double from, double to) {
@@ -347,11 +347,10 @@ bool is_at_fault_by_count(std::span<const Sensor> some, double misfit, Count&& c
   }
   take(*found, some, choice);
   choice.times_at_fault = true;
-  choice.warnings.push_back(
-      fmt::format("the times of the recording are at fault: by them its scan is not that of a {}, "
-                  "and counted at "
-                  "{:.6g} shots per second it is",
-                  choice.sensor.model, choice.sensor.shot_rate));
+  warn(choice.warnings, kWarning.times_corrected,
+       "the times of the recording are at fault: by them its scan is not that of a {}, and counted "
+       "at {:.6g} shots per second it is",
+       choice.sensor.model, choice.sensor.shot_rate);
   return true;
 }
 
@@ -385,10 +384,10 @@ SensorChoice choose_by_name(FirstShots& shots, const Sensor& named, Types&& type
     if (candidates[match.candidate].name != named.name) continue;
     choice.misfits.push_back({named.name, misfit_of(match)});
   }
-  choice.warnings.push_back(
-      fmt::format("the file names a {}, but its scan is that of a {}: {}; {} decides which it was",
-                  named.model, candidates[found->matches.front().candidate].model,
-                  comparison(choice.misfits), name_of(kSetting.sensor)));
+  warn(choice.warnings, kWarning.sensor_contradicted,
+       "the file names a {}, but its scan is that of a {}: {}; {} decides which it was",
+       named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits),
+       name_of(kSetting.sensor));
   return choice;
 }
 
@@ -481,10 +480,10 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
       if (counted.fits != true) return choice;
       choice = std::move(counted);
       choice.times_at_fault = true;
-      choice.warnings.push_back(fmt::format(
-          "the times of the recording are at fault: by them no built-in preset describes its scan; "
-          "counted at {:.6g} shots per second, {} does",
-          choice.sensor.shot_rate, choice.sensor.name));
+      warn(choice.warnings, kWarning.times_corrected,
+           "the times of the recording are at fault: by them no built-in preset describes its "
+           "scan; counted at {:.6g} shots per second, {} does",
+           choice.sensor.shot_rate, choice.sensor.name);
     }
   }
   return choice;
@@ -527,14 +526,11 @@ AngleSeries first_second(const recordings::Source& source, const recordings::Rea
                          const Progress& progress) {
   // One shot a second, and all of the head.
   estimation::ShotSelector selector({.rate = 1.0, .ranges = true, .rows = false});
-  try {
-    const auto reader = recordings::open_recording(source, options, progress);
-    recordings::Chunk chunk;
-    while (selector.series().size() < 2 && reader->read(chunk)) {
-      selector.add(chunk.observations);
-      progress.check();
-    }
-  } catch (const FileError&) {  // a later pass reports it
+  const auto reader = recordings::open_recording(source, options, progress);
+  recordings::Chunk chunk;
+  while (selector.series().size() < 2 && reader->read_sound(chunk)) {
+    selector.add(chunk.observations);
+    progress.check();
   }
   return selector.head();
 }
@@ -567,7 +563,7 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
   // What no sensor reaches the reader tells.
   if (!choice.beyond_reach.empty() &&
       !recordings::beyond_reach(shots.head.range, recordings::kFarthestReach, "")) {
-    choice.warnings.push_back(choice.beyond_reach);
+    choice.warnings.push_back({kWarning.implausible_values, choice.beyond_reach});
   }
   return choice;
 }

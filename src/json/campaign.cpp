@@ -55,8 +55,9 @@ Json of(const jobs::CampaignResult& merged) {
   Json settings = Json::array(), missing = Json::array();
   for (const jobs::SettingSummary& one : merged.settings) settings.push_back(setting_json(one));
   for (const auto& [first, last] : merged.missing) missing.push_back({first, last});
-  return {{"cells", merged.cells}, {"done", merged.done},         {"table", merged.table},
-          {"missing", missing},    {"warnings", merged.warnings}, {"settings", settings}};
+  return {{"cells", merged.cells},           {"done", merged.done},
+          {"table", merged.table},           {"missing", missing},
+          {"warnings", of(merged.warnings)}, {"settings", settings}};
 }
 
 }  // namespace risley::json

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "risley/jobs/cloud_of_recording.hpp"
-#include "risley/jobs/recording_input.hpp"
 #include "risley/json/results.hpp"
 
 #include "json/parts.hpp"
@@ -66,8 +65,6 @@ Json distribution_json(const PointDistributionSummary& d) {
 
 Json of(const jobs::RecordingCloud& made) {
   const cloud::CloudSummary& s = made.summary;
-  std::vector<std::string> warnings = s.warnings;
-  for (const auto& warning : s.read_warnings) warnings.push_back(jobs::warning_text(warning));
   Json json = {
       {"points", s.points},
       {"format", s.format},
@@ -88,7 +85,7 @@ Json of(const jobs::RecordingCloud& made) {
       {"repointing_deg", {{"rms", deg(s.repointing_rms)}}},
       {"common_factors", s.factors},
       {"slips", slips_json(s.slips)},
-      {"warnings", warnings},
+      {"warnings", of(s.warnings)},
   };
   if (s.damage) json.update(of(*s.damage));
   const bool is_none = made.calibrated_against == sensors::CalibrationReference::none;

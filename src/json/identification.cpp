@@ -61,7 +61,7 @@ Json of(const jobs::IdentifiedRecording& found) {
       {"rotor_segments_s", identified.motion.length},
       {"lines", lines},
       {"unobservable", found.unobservable},
-      {"warnings", found.warnings},
+      {"warnings", of(found.warnings)},
       {"seconds", {{"read", found.reading_time}, {"solve", found.solving_time}}}};
   if (!found.like.empty()) object["preset"] = found.like;
   return object;

@@ -18,7 +18,6 @@
 #include "risley/jobs/convert_trajectory.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/inspect_trajectory.hpp"
-#include "risley/jobs/recording_input.hpp"
 #include "risley/json/result_columns.hpp"
 #include "risley/recordings/writer.hpp"
 #include "risley/tables/table_file.hpp"
@@ -32,8 +31,6 @@ using jobs::InputJob;
 using jobs::InputOutcome;
 using jobs::InputResult;
 using jobs::InputWork;
-using jobs::warning_text;
-using trajectories::warning_text;
 
 std::string text_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -59,13 +56,9 @@ InputWork work_of(std::string verb, std::string label) {
   return work;
 }
 
-void tell_all(const Tell& tell, const std::string& file, const std::vector<std::string>& warnings) {
-  for (const std::string& words : warnings) tell(fmt::format("{}: {}", file, words), false);
-}
-template <class Warning>
 void tell_all(const Tell& tell, const std::string& file, const std::vector<Warning>& warnings) {
   for (const Warning& warning : warnings) {
-    tell(fmt::format("{}: {}", file, warning_text(warning)), false);
+    tell(warning_text(of_file(file, warning)), false);
   }
 }
 
@@ -174,7 +167,9 @@ InputOutcome convert_poses(const InputJob& job, const ConvertEachOptions& option
   const jobs::ConvertedTrajectory done = jobs::convert_trajectory(
       {job.input, job.output, options.format, options.accuracy, options.topic}, progress);
   tell_all(tell, job.input, done.warnings);
-  tell_all(tell, job.output, done.left_out);
+  for (const std::string& one : done.left_out) {
+    tell(fmt::format("{}: {}", job.output, one), false);
+  }
   Json json = of(done);
   json.update({{"input", job.input}, {"output", job.output}});
   return {jobs::kDone, text_of(json),
@@ -235,7 +230,6 @@ InputOutcome make_cloud(const InputJob& job, jobs::CloudOfRecordingOptions optio
   options.output = job.output;
   const jobs::RecordingCloud made = jobs::cloud_of_recording(options, progress);
   const cloud::CloudSummary& s = made.summary;
-  tell_all(tell, job.input, s.read_warnings);
   tell_all(tell, job.input, s.warnings);
   if (s.damage) {
     tell(fmt::format("{}; the {} points before it are saved in {}", s.damage->what(), s.points,

@@ -58,7 +58,8 @@ Json of(const jobs::JudgedObservability& judged) {
           {"rate_hz", o.rate},
           {"frame", nullptr},
           {"slips", nullptr},
-          {"words", judged.words}};
+          {"words", judged.words},
+          {"warnings", of(judged.warnings)}};
 }
 
 }  // namespace risley::json

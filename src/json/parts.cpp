@@ -21,7 +21,7 @@ Json choice_json(const jobs::SensorChoice& choice) {
            {{"words", choice.words},
             {"fits", choice.fits ? Json(*choice.fits) : Json()},
             {"misfits", misfits},
-            {"warnings", choice.warnings}}}};
+            {"warnings", of(choice.warnings)}}}};
 }
 
 Json value_json(double value, double sigma) {
@@ -47,11 +47,14 @@ Json slips_json(const std::vector<recordings::ShotSlip>& slips) {
   return list;
 }
 
-Json warnings_json(const std::vector<recordings::ReadWarning>& warnings) {
+Json of(const std::vector<Warning>& warnings) {
   Json list = Json::array();
-  for (const recordings::ReadWarning& warning : warnings) {
-    list.push_back(
-        {{"message", jobs::warning_text(warning)}, {"lost_records", warning.lost_records}});
+  for (const Warning& warning : warnings) {
+    list.push_back({{"code", warning.code.name}, {"message", warning_text(warning)}});
+    const auto add = [&](const char* key, std::uint64_t value) { list.back()[key] = value; };
+    if (warning.place.byte_offset) add("byte_offset", *warning.place.byte_offset);
+    if (warning.place.line) add("line", *warning.place.line);
+    if (warning.lost_records > 0) add("lost_records", warning.lost_records);
   }
   return list;
 }
@@ -62,11 +65,9 @@ Json weak_direction_json(const estimation::WeakDirection& direction) {
   return {{"direction", weights}, {"ratio", direction.ratio}, {"sigma", direction.sigma}};
 }
 
-std::vector<std::string> all_warnings(const std::vector<std::string>& of_job,
-                                      const std::vector<std::string>& own) {
-  std::vector<std::string> warnings = of_job;
-  warnings.insert(warnings.end(), own.begin(), own.end());
-  return warnings;
+Json all_warnings(std::vector<Warning> of_job, const std::vector<Warning>& own) {
+  append(of_job, own);
+  return of(of_job);
 }
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }

@@ -47,14 +47,11 @@ Json slips_json(const std::vector<recordings::ShotSlip>& slips);
 /// Slips of all recordings, each with the name of its own.
 Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings);
 
-Json warnings_json(const std::vector<recordings::ReadWarning>& warnings);
-
 /// A combination of parameters that data do not tell.
 Json weak_direction_json(const estimation::WeakDirection& direction);
 
 /// Those of a job, then those of what it computed.
-std::vector<std::string> all_warnings(const std::vector<std::string>& of_job,
-                                      const std::vector<std::string>& own);
+Json all_warnings(std::vector<Warning> of_job, const std::vector<Warning>& own);
 
 /// How far directions are off, with sigmas.
 Json pointing_json(const calibration::PointingError& pointing);

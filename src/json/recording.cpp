@@ -109,8 +109,7 @@ Json of(const jobs::InspectedRecording& found) {
                  {"sensor", found.choice ? jobs::sensor_name(*found.choice)
                                          : jobs::sensor_name(found.header)}};
   object.update(audit_json(found.header, found.audit, found.time_uncertainty));
-  object.update(
-      {{"frame", nullptr}, {"slips", nullptr}, {"warnings", warnings_json(found.warnings)}});
+  object.update({{"frame", nullptr}, {"slips", nullptr}, {"warnings", of(found.warnings)}});
   if (found.choice) object.update(choice_json(*found.choice));
   if (found.excerpt) object["excerpt"] = excerpt_json(*found.excerpt);
   if (found.damage) object.update(of(*found.damage));
@@ -130,7 +129,7 @@ Json of(const jobs::ConvertedRecording& done) {
                  {"time_uncertainty_s", done.time_uncertainty},
                  {"frame", nullptr},
                  {"slips", nullptr},
-                 {"warnings", warnings_json(done.warnings)}};
+                 {"warnings", of(done.warnings)}};
   if (done.choice) {
     object["sensor_chosen_by"] = to_string(done.choice->chosen_by);
     object["sensor"] = jobs::sensor_name(*done.choice);

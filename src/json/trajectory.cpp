@@ -19,7 +19,6 @@ using trajectories::PoseAccuracy;
 using trajectories::RecordTimes;
 using trajectories::Trajectory;
 using trajectories::TrajectoryAudit;
-using trajectories::TrajectoryWarning;
 
 constexpr double kSecondsPerNanosecond = 1e-9;
 
@@ -93,14 +92,6 @@ Json poses_json(const Trajectory& trajectory, const TrajectoryAudit& audit) {
   return object;
 }
 
-Json warnings_json(const std::vector<TrajectoryWarning>& warnings) {
-  Json list = Json::array();
-  for (const TrajectoryWarning& warning : warnings) {
-    list.push_back({{"message", trajectories::warning_text(warning)}});
-  }
-  return list;
-}
-
 }  // namespace
 
 Json of(const jobs::InspectedTrajectory& found) {
@@ -113,7 +104,7 @@ Json of(const jobs::InspectedTrajectory& found) {
     object["accuracy"] = accuracy_json(found.accuracies->median);
     object["worst_accuracy"] = accuracy_json(found.accuracies->worst);
   }
-  object["warnings"] = warnings_json(found.warnings);
+  object["warnings"] = of(found.warnings);
   return object;
 }
 
@@ -121,7 +112,7 @@ Json of(const jobs::ConvertedTrajectory& done) {
   return {{"records", done.records},
           {"left_out", done.left_out},
           {"input_format", done.input_format},
-          {"warnings", warnings_json(done.warnings)}};
+          {"warnings", of(done.warnings)}};
 }
 
 }  // namespace risley::json

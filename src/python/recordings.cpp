@@ -14,11 +14,12 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <pybind11/stl.h>
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/jobs/recording_input.hpp"
+#include "risley/json/results.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/recordings/writer.hpp"
@@ -26,6 +27,7 @@
 #include "python/arrays.hpp"
 #include "python/bind.hpp"
 #include "python/call.hpp"
+#include "python/json.hpp"
 #include "python/reading.hpp"
 
 namespace risley::python {
@@ -36,11 +38,9 @@ using recordings::Recording;
 using recordings::RecordingHeader;
 using SharedRecording = std::shared_ptr<Recording>;
 
-std::vector<std::string> texts_of(const std::vector<recordings::ReadWarning>& warnings) {
-  std::vector<std::string> texts;
-  texts.reserve(warnings.size());
-  for (const auto& warning : warnings) texts.push_back(jobs::warning_text(warning));
-  return texts;
+/// As results have them.
+py::object warnings_of(const std::vector<Warning>& warnings) {
+  return py::module_::import("risley._results").attr("warnings_of")(python_of(json::of(warnings)));
 }
 
 /// Pieces that nobody looks at any more, to be filled again: memory that is used for the first time
@@ -121,9 +121,9 @@ class ChunkReader {
     const Turn turn(busy_);
     return reader_ ? reader_->header() : header_;
   }
-  std::vector<std::string> warnings() {
+  std::vector<Warning> warnings() {
     const Turn turn(busy_);
-    return texts_of(reader_ ? reader_->warnings() : warnings_);
+    return reader_ ? reader_->warnings() : warnings_;
   }
   double fraction_read() {
     const Turn turn(busy_);
@@ -156,7 +156,7 @@ class ChunkReader {
   std::unique_ptr<recordings::Reader> reader_;
   // Of a reader that was closed.
   RecordingHeader header_;
-  std::vector<recordings::ReadWarning> warnings_;
+  std::vector<Warning> warnings_;
   double fraction_ = 0;
 };
 
@@ -314,8 +314,8 @@ void bind_recordings(py::module_& module) {
   type.def("__len__", [](const Recording& recording) { return recording.data.observations.size(); })
       .def_readonly("header", &Recording::header, "What is known of the whole recording.")
       .def_property_readonly(
-          "warnings", [](const Recording& recording) { return texts_of(recording.warnings); },
-          "Problems that leave the recording usable, in sentences.")
+          "warnings", [](const Recording& recording) { return warnings_of(recording.warnings); },
+          "Problems that leave the recording usable.")
       .def("__repr__", [](const Recording& recording) {
         return fmt::format("<risley.Recording {}, {} rows>", recording.header.format,
                            recording.data.observations.size());
@@ -338,8 +338,9 @@ void bind_recordings(py::module_& module) {
       .def("close", &ChunkReader::close, "Closes the file; there are no further pieces.")
       .def_property_readonly("header", &ChunkReader::header,
                              "What is known of the whole recording.")
-      .def_property_readonly("warnings", &ChunkReader::warnings,
-                             "Problems found so far that leave the recording usable.")
+      .def_property_readonly(
+          "warnings", [](ChunkReader& reader) { return warnings_of(reader.warnings()); },
+          "Problems found so far that leave the recording usable.")
       .def_property_readonly("fraction_read", &ChunkReader::fraction_read,
                              "Part of the file that was read, 0 to 1.");
 

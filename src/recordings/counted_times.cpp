@@ -41,9 +41,10 @@ class CountingReader final : public DecoratingReader {
     header_.time_reference = TimeReference::relative;
     clock_wraps_ = 0;
     if (lost_samples_ == 0) return;
-    warnings_.push_back({{},
+    warnings_.push_back({kWarning.content_left_out,
                          "inertial samples were left out: their times cannot be compared with "
                          "those of counted shots",
+                         {},
                          lost_samples_});
   }
 

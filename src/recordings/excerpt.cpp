@@ -317,7 +317,7 @@ Excerpt write_excerpt(const Source& recording, const std::string& path,
   std::optional<FileError> damage;
   auto reader = open_recording(recording, reading, progress);
   const Stretch stretch = best_stretch(*reader, options, progress, damage);
-  std::vector<ReadWarning> warnings = reader->warnings();
+  std::vector<Warning> warnings = reader->warnings();
   if (stretch.valid == 0) {
     if (damage) throw FileError(*damage);
     throw FileError(recording.name(), {},

@@ -55,12 +55,10 @@ class SensorFrameReader final : public DecoratingReader {
       device.roll_pitch_yaw_deg = device.translation_m = {};
     }
     if (not_moved_ == 0) return;
-    warnings_.push_back(
-        {{},
-         fmt::format("{} directions without a range were turned into the sensor's frame but not "
-                     "moved: the translation of {:.6g} {:.6g} {:.6g} m is left out",
-                     not_moved_, translation_.x, translation_.y, translation_.z),
-         0});
+    warn(kWarning.pose_unused,
+         "{} directions without a range were turned into the sensor's frame but not moved: the "
+         "translation of {:.6g} {:.6g} {:.6g} m is left out",
+         not_moved_, translation_.x, translation_.y, translation_.z);
   }
 
   std::optional<FileError> change(Chunk& chunk) override {

@@ -12,8 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "risley/core/saturating.hpp"
 #include "risley/core/setting.hpp"
 
@@ -84,16 +82,12 @@ class TimesJudge {
  private:
   void look_ahead(Observations& rows, const Progress& progress) {
     Chunk chunk;
-    try {
-      while (rows.size() < (result_.in_packets ? kRowsOfPacketsJudged : kRowsJudged)) {
-        ended_ = !reader_.read(chunk);
-        if (ended_) return;
-        result_.in_packets = result_.in_packets || !chunk.packets.empty();
-        rows.append(chunk.observations);
-        progress.check();
-      }
-    } catch (const FileError&) {  // a later pass reports it
-      ended_ = true;
+    while (rows.size() < (result_.in_packets ? kRowsOfPacketsJudged : kRowsJudged)) {
+      ended_ = !reader_.read_sound(chunk);
+      if (ended_) return;
+      result_.in_packets = result_.in_packets || !chunk.packets.empty();
+      rows.append(chunk.observations);
+      progress.check();
     }
   }
 
@@ -314,47 +308,46 @@ class JudgedReader final : public Reader {
   void describe() {
     warnings_ = inner_->warnings();
     clock_wraps_ = inner_->clock_wraps();
-    const auto warn = [this](std::string message, std::uint64_t lost = 0) {
-      warnings_.push_back({{}, std::move(message), lost});
-    };
     if (mixed_rows_ > 0) {
-      warn(
-          fmt::format("{} rows are earlier than one before them: the rows do not stand in the "
-                      "order in which the shots were fired, and were sorted by their times",
-                      mixed_rows_));
+      warn(kWarning.rows_sorted,
+           "{} rows are earlier than one before them: the rows do not stand in the order in which "
+           "the shots were fired, and were sorted by their times",
+           mixed_rows_);
     }
     for (const Device& device : devices_) {
       if (device.order.order == RowOrder::begins_anew && !judgement_->counted) {
-        warn(
-            fmt::format("times begin anew with every message or packet and tell nothing beyond "
-                        "one: shots were counted in the order of the file, at the {:.6g} shots per "
-                        "second within messages; {} names another rate",
-                        1e9 / device.order.step_ns, name_of(kSetting.shot_rate)));
+        warn(kWarning.times_corrected,
+             "times begin anew with every message or packet and tell nothing beyond one: shots "
+             "were counted in the order of the file, at the {:.6g} shots per second within "
+             "messages; {} names another rate",
+             1e9 / device.order.step_ns, name_of(kSetting.shot_rate));
       } else if (device.order.order == RowOrder::constant && !judgement_->counted) {
-        warn(
-            fmt::format("all times are the same, and tell nothing: shots are numbered in the order "
-                        "of the file; {} counts their times",
-                        name_of(kSetting.shot_rate)));
+        warn(kWarning.no_shot_times,
+             "all times are the same, and tell nothing: shots are numbered in the order of the "
+             "file; {} counts their times",
+             name_of(kSetting.shot_rate));
       } else if (device.order.order == RowOrder::overlapping) {
-        warn(
-            "pieces of the recording begin within the time of those before them: several sensors "
-            "seem to share one stream, and nothing in the file tells them apart");
+        warn(kWarning.devices_unclear,
+             "pieces of the recording begin within the time of those before them: several sensors "
+             "seem to share one stream, and nothing in the file tells them apart");
       } else if (device.grid) {
-        if (const std::string words = device.grid->words(); !words.empty()) warn(words);
+        if (const std::string words = device.grid->words(); !words.empty())
+          warnings_.push_back({kWarning.times_corrected, words});
       }
     }
     if (off_grid_ > 0) {
-      warn(fmt::format("{} shots do not stand on that grid, and their times were left as they are",
-                       off_grid_));
+      warn(kWarning.times_corrected,
+           "{} shots do not stand on that grid, and their times were left as they are", off_grid_);
     }
     if (judgement_->in_packets) {
-      warn("packet headers hold the times that were put right, and were left out");
+      warn(kWarning.content_left_out,
+           "packet headers hold the times that were put right, and were left out");
     }
     if (lost_samples_ > 0) {
-      warn(
-          "inertial samples were left out: their times cannot be compared with those of counted "
-          "shots",
-          lost_samples_);
+      warn(kWarning.content_left_out,
+           "inertial samples were left out: their times cannot be compared with those of counted "
+           "shots")
+          .lost_records = lost_samples_;
     }
   }
 

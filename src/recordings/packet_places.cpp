@@ -24,7 +24,8 @@ class PlacingReader final : public DecoratingReader {
 
  private:
   void describe() override {
-    std::erase_if(warnings_, [](const ReadWarning& one) { return one.answered_by_places; });
+    std::erase_if(warnings_,
+                  [](const Warning& one) { return one.code == kWarning.packets_incomplete; });
   }
 
   std::optional<FileError> change(Chunk& chunk) override {

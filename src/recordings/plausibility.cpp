@@ -200,16 +200,16 @@ class PlausibilityReader final : public DecoratingReader {
     const bool own = has_packets_ || header_.devices.front().type != kUnknownDeviceType;
     const auto problem = own && !far ? std::nullopt : not_a_scan(azimuth_, zenith_, range_);
     if (problem) {
-      found_.push_back({{}, *problem});
+      found_.push_back({kWarning.implausible_values, *problem});
     } else if (const auto beyond = beyond_reach(range_, kFarthestReach, "these sensors")) {
-      found_.push_back({{}, *beyond});
+      found_.push_back({kWarning.implausible_values, *beyond});
     }
     azimuth_ = zenith_ = range_ = {};
   }
 
   bool judged_ = false, has_packets_ = false;
   std::vector<double> azimuth_, zenith_, range_;
-  std::vector<ReadWarning> found_;
+  std::vector<Warning> found_;
 };
 
 }  // namespace

@@ -14,6 +14,14 @@
 
 namespace risley::recordings {
 
+bool Reader::read_sound(Chunk& chunk, std::size_t max_rows) {
+  try {
+    return read(chunk, max_rows);
+  } catch (const FileError&) {
+    return false;
+  }
+}
+
 std::unique_ptr<Reader> open_recording(const Source& source, const ReadOptions& options,
                                        const Progress& progress) {
   const std::string& path = source.name();

@@ -67,8 +67,10 @@ class SharedReader final : public Reader {
     }
     if (!rest_) {
       if (read_held(chunk, max_rows)) return true;
-      if (first_.failure) throw FileError(*first_.failure);
-      if (first_.ended) return false;
+      if (first_.ended) {
+        if (const auto damage = input_->damage()) throw FileError(*damage);
+        return false;
+      }
       rest_ = input_->behind(first_, progress_);
     }
     const auto take_over = [this] {
@@ -80,7 +82,8 @@ class SharedReader final : public Reader {
       const bool more = rest_->read(chunk, max_rows);
       take_over();
       return more;
-    } catch (const FileError&) {
+    } catch (const FileError& damage) {
+      input_->keep(damage);
       take_over();
       throw;
     }
@@ -213,14 +216,15 @@ std::shared_ptr<const FirstRows> SharedInput::first_rows(const Progress& progres
       first.chunks.push_back(std::move(chunk));
       progress.check();
     }
-  } catch (const FileError& error) {
-    first.failure = error;
+  } catch (const FileError& damage) {
+    keep(damage);
+    first.ended = true;
   }
   first.header = rest_->header();
   first.warnings = rest_->warnings();
   first.clock_wraps = rest_->clock_wraps();
   first.fraction = rest_->fraction_read();
-  if (first.ended || first.failure) rest_.reset();
+  if (first.ended) rest_.reset();
   first_ = std::make_shared<const FirstRows>(std::move(first));
   return first_;
 }

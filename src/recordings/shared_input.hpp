@@ -21,14 +21,13 @@ struct TimesJudgement;  // judged_times.cpp
 /// The first rows of a recording, and what was known behind them.
 struct FirstRows {
   RecordingHeader header;
-  std::vector<ReadWarning> warnings;
+  std::vector<Warning> warnings;
   std::vector<std::shared_ptr<const Chunk>> chunks;
   std::size_t rows = 0;
   bool are_decoded = false;  ///< in chunks of kDefaultChunkRows, and not columns in memory
   std::uint64_t clock_wraps = 0;
   double fraction = 1;  ///< of the file that they are
-  bool ended = true;    ///< there are no more
-  std::optional<FileError> failure = {};
+  bool ended = true;    ///< there are no more sound ones
 };
 
 /// What the copies of a Source share: a file that is opened once and the first rows of it, which
@@ -44,6 +43,11 @@ class SharedInput : public std::enable_shared_from_this<SharedInput> {
   io::InputFile file();
   /// All rows as the file has them.
   std::unique_ptr<Reader> read(const Progress& progress);
+  /// What ended a pass over the rows before all were read.
+  std::optional<FileError> damage() const {
+    const std::lock_guard lock(damaging_);
+    return damage_;
+  }
   /// What was judged of the times of a device's first rows.
   /// @param judge  does it where nobody has
   template <class Judge>
@@ -57,12 +61,18 @@ class SharedInput : public std::enable_shared_from_this<SharedInput> {
 
  private:
   friend class SharedReader;
+  void keep(const FileError& damage) {
+    const std::lock_guard lock(damaging_);
+    damage_.emplace(damage);
+  }
   std::unique_ptr<Reader> open(const Progress& progress);
   std::shared_ptr<const FirstRows> first_rows(const Progress& progress);
   std::unique_ptr<Reader> behind(const FirstRows& first, const Progress& progress);
 
   std::string path_;
   std::mutex mutex_, opening_, judging_;
+  mutable std::mutex damaging_;
+  std::optional<FileError> damage_;  ///< of the file; the same for every pass
   std::optional<io::InputFile> file_;
   std::shared_ptr<const FirstRows> first_;
   std::unique_ptr<Reader> rest_;   ///< behind the first rows, until somebody reads on

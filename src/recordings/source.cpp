@@ -67,6 +67,10 @@ Source Source::held_open() const {
   return result;
 }
 
+std::optional<FileError> Source::damage() const {
+  return shared_ ? shared_->damage() : std::nullopt;
+}
+
 io::InputFile Source::open_file(const std::string& path) const {
   return path == name_ ? shared()->file() : io::InputFile(path);
 }

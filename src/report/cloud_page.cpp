@@ -169,8 +169,10 @@ std::string cloud_page(const CloudSummary& cloud, const std::string& recording,
   Figures figures;
   std::string head = overview_html(key_numbers(cloud), {points_chart(*cloud.sample)}, figures);
   if (!cloud.warnings.empty()) {
-    head += "<section class=\"verdict care\"><strong>With care:</strong>" +
-            list_html(cloud.warnings) + "</section>\n";
+    std::vector<std::string> texts;
+    std::ranges::transform(cloud.warnings, std::back_inserter(texts), warning_text);
+    head += "<section class=\"verdict care\"><strong>With care:</strong>" + list_html(texts) +
+            "</section>\n";
   }
   Sections sections;
   sections.add("Uncertainty of the points", uncertainty_html(*cloud.sample, figures),

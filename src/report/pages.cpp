@@ -117,7 +117,9 @@ Verdict verdict_of(const View& report) {
   verdict.code = report["verdict"]["code"].text();
   verdict.words = report["verdict"]["words"].text();
   verdict.to_do = report["verdict"]["to_do"].text();
-  verdict.warnings = report["warnings"].texts();
+  for (const View& one : report["warnings"].list()) {
+    verdict.warnings.push_back(one["message"].text());
+  }
   return verdict;
 }
 

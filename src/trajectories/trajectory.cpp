@@ -187,11 +187,4 @@ TimeOrder order_by_time(Trajectory& trajectory) {
   return order.told;
 }
 
-std::string warning_text(const TrajectoryWarning& warning) {
-  std::string text = warning.message;
-  if (warning.place.byte_offset) text += fmt::format(" (at byte {})", *warning.place.byte_offset);
-  if (warning.place.line) text += fmt::format(" (line {})", *warning.place.line);
-  return text;
-}
-
 }  // namespace risley::trajectories

@@ -107,44 +107,42 @@ TrajectoryAudit audit_trajectory(const Trajectory& t, const InterpolationOptions
     }
     widest_turn = std::max(widest_turn, turn);
   }
-  const auto warn = [&](std::string message) {
-    audit.warnings.push_back({{}, std::move(message)});
-  };
   if (!audit.times.gaps.empty()) {
     const auto longest = std::ranges::max_element(
         audit.times.gaps,
         [](const auto& a, const auto& b) { return a.end_ns - a.begin_ns < b.end_ns - b.begin_ns; });
-    warn(
-        fmt::format("{} {} without records, the longest {:.3f} s from {}: there are no poses in "
-                    "them",
-                    audit.times.gaps.size(), audit.times.gaps.size() == 1 ? "gap" : "gaps",
-                    kSecondsPerNs * static_cast<double>(longest->end_ns - longest->begin_ns),
-                    time_words(longest->begin_ns)));
+    warn(audit.warnings, kWarning.trajectory_gaps,
+         "{} {} without records, the longest {:.3f} s from {}: there are no poses in them",
+         audit.times.gaps.size(), audit.times.gaps.size() == 1 ? "gap" : "gaps",
+         kSecondsPerNs * static_cast<double>(longest->end_ns - longest->begin_ns),
+         time_words(longest->begin_ns));
   }
   constexpr double kImpossibleSpeed = 1000;             // m/s
   constexpr double kWideTurn = 30 * kRadiansPerDegree;  // between records
   constexpr double kImpossibleTurning = 1500 * kRadiansPerDegree;
   if (audit.fastest > kImpossibleSpeed) {
-    warn(fmt::format("the position moves by {:.0f} m/s at {}: it jumps", audit.fastest,
-                     time_words(t.time_ns[fastest_at])));
+    warn(audit.warnings, kWarning.trajectory_jumps,
+         "the position moves by {:.0f} m/s at {}: it jumps", audit.fastest,
+         time_words(t.time_ns[fastest_at]));
   }
   if (audit.fastest_turning > kImpossibleTurning) {
-    warn(fmt::format("the attitude turns by {:.0f} degrees per second at {}: it jumps",
-                     degrees_from_radians(audit.fastest_turning),
-                     time_words(t.time_ns[turning_at])));
+    warn(audit.warnings, kWarning.trajectory_jumps,
+         "the attitude turns by {:.0f} degrees per second at {}: it jumps",
+         degrees_from_radians(audit.fastest_turning), time_words(t.time_ns[turning_at]));
   } else if (widest_turn > kWideTurn) {
-    warn(
-        fmt::format("the attitude turns by up to {:.0f} degrees between records: they are too few "
-                    "for poses between them",
-                    degrees_from_radians(widest_turn)));
+    warn(audit.warnings, kWarning.trajectory_gaps,
+         "the attitude turns by up to {:.0f} degrees between records: they are too few for poses "
+         "between them",
+         degrees_from_radians(widest_turn));
   }
   if (t.velocity_frame && t.velocity_frame->name == "undecided") {
-    warn(fmt::format("velocities are left out: {}", t.velocity_frame->reason));
+    warn(audit.warnings, kWarning.velocity_frame, "velocities are left out: {}",
+         t.velocity_frame->reason);
   }
   if (t.time_scale == TimeScale::unknown) {
-    warn(
-        "nothing says what the times count from: a clock offset must bring the recording's clock "
-        "to them");
+    warn(audit.warnings, kWarning.clock_unknown,
+         "nothing says what the times count from: a clock offset must bring the recording's clock "
+         "to them");
   }
   if (!t.accuracy.empty()) audit.accuracy = for_each_accuracy(t.accuracy, median);
   return audit;

@@ -209,14 +209,13 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
       const auto& best = candidates.front();
       if (total(*own) > largest) {
         const bool other = total(best) <= largest && 3 * total(best) < total(*own);
-        trajectory.warnings.push_back(
-            {{},
-             fmt::format("velocities are stated as {} and differ from the change of the positions "
-                         "by {} (north, east, down){}",
-                         found.name, in_mm(*found.residual),
-                         other ? fmt::format("; as {} they would by {}", words_of(best.first),
-                                             in_mm(best.second.rms(spans)))
-                               : "")});
+        warn(trajectory.warnings, kWarning.velocity_frame,
+             "velocities are stated as {} and differ from the change of the positions by {} "
+             "(north, east, down){}",
+             found.name, in_mm(*found.residual),
+             other ? fmt::format("; as {} they would by {}", words_of(best.first),
+                                 in_mm(best.second.rms(spans)))
+                   : "");
       }
     }
     turn(trajectory, wander, *stated);

@@ -9,6 +9,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "risley/calibration/flight_calibration.hpp"
@@ -17,6 +18,7 @@
 #include "calibration/flights.hpp"
 #include "calibration/process_check.hpp"
 #include "seeds.hpp"
+#include "warning_codes.hpp"
 
 namespace risley::calibration::flight_faults_test {
 
@@ -56,12 +58,6 @@ FlightCalibration calibrated(const SimulatedFlight& flight, double stated = 1) {
   options.knot_spacing = 0.5;
   for (trajectories::ErrorTerm& term : options.errors.terms) *term.sigma *= stated;
   return calibrate_flight(flight.shots, flight.trajectory, options);
-}
-
-bool warned(const FlightCalibration& found, const std::string& words) {
-  return std::ranges::any_of(found.warnings, [&](const std::string& warning) {
-    return warning.find(words) != std::string::npos;
-  });
 }
 
 /// True over stated errors of the flights that are not undecided.
@@ -110,7 +106,7 @@ TEST(FlightFaults, JumpsAreNamedAndMended) {
     honesty.add(flight, settings, found);
     const TrajectoryFit& fit = found.trajectory_fit;
     EXPECT_TRUE(fit.fits);
-    EXPECT_TRUE(warned(found, "the trajectory jumps by"));
+    EXPECT_THAT(codes_of(found.warnings), ::testing::Contains("trajectory_jumps"));
     // The position there and back, and the attitude, each at its time and of its size.
     const auto seen_at = [&](std::size_t strip, double time) {
       return std::ranges::find_if(fit.jumps, [&](const TrajectoryJump& jump) {
@@ -167,7 +163,7 @@ TEST(FlightFaults, ErrorsLargerThanStatedAreCountedAsTheyAre) {
     if (found.verdict.code == CalibrationCode::undecided) continue;
     const auto& factor = found.trajectory_fit.factor;
     EXPECT_GT(*std::ranges::max_element(factor), 2);
-    EXPECT_TRUE(warned(found, "times as large as stated"));
+    EXPECT_THAT(codes_of(found.warnings), ::testing::Contains("trajectory_errors"));
   }
   honesty.expect("errors stated too small by 4");
 }
@@ -182,7 +178,7 @@ TEST(FlightFaults, LateAttitudesAreSaid) {
     EXPECT_NEAR(found.attitude_delay.value, 0.005, 4 * found.attitude_delay.sigma);
     EXPECT_LT(found.attitude_delay.sigma, 0.0015);
     if (found.attitude_delay.significant) {
-      EXPECT_TRUE(warned(found, "attitudes of the trajectory are late by"));
+      EXPECT_THAT(codes_of(found.warnings), ::testing::Contains("clocks_disagree"));
       EXPECT_NE(found.verdict.words.find("late by"), std::string::npos);
     }
     honesty.add(flight, settings, found);

@@ -26,6 +26,11 @@ def run(*arguments, folder=None):
     return done
 
 
+def codes_of(result):
+    """What its warnings are about."""
+    return [one["code"] for one in result["warnings"]]
+
+
 class CommandTest(unittest.TestCase):
     """A test with a folder of its own."""
 

@@ -171,7 +171,7 @@ class StoryTest(CommandTest):
         # It points where it believes; its noise does not make it bent.
         self.assertIn(found["verdict"]["code"], ("as_believed", "not_better"))
         self.assertLess(found["pointing_error"]["total_deg"]["value"], 0.02)
-        for text in (said.stderr, self.page_of("noisy-2")[0], " ".join(found["warnings"])):
+        for text in (said.stderr, self.page_of("noisy-2")[0], " ".join(one["message"] for one in found["warnings"])):
             self.assertIn(noise, text)
         if found["verdict"]["code"] == "not_better":
             self.check_pointing(found, said, "noisy-2")

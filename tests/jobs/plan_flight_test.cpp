@@ -14,6 +14,7 @@
 
 #include "refusal.hpp"
 #include "source_tree.hpp"
+#include "warning_codes.hpp"
 
 namespace risley::jobs::plan_flight_test {
 
@@ -42,8 +43,7 @@ PlanFlightOptions small_flight() {
 TEST(PlanFlight, TellsAccuracyAndPoints) {
   const PlannedFlightResult planned = plan_flight(small_flight());
   EXPECT_EQ(planned.sensor.name, "mid-40");
-  ASSERT_EQ(planned.warnings.size(), 1U);
-  EXPECT_THAT(planned.warnings[0], HasSubstr("no terrain"));
+  EXPECT_THAT(codes_of(planned.warnings), ::testing::ElementsAre("terrain_assumed"));
   ASSERT_TRUE(planned.distribution.has_value());
   ASSERT_EQ(planned.distribution->strips.size(), 2U);
   EXPECT_NEAR(planned.distribution->strips[0].density, 100'000 / (2 * 20 * 0.3485 * 10), 40);
@@ -66,7 +66,7 @@ TEST(PlanFlight, HasNoDistributionWhereTheSensorDoesNotLookDown) {
   options.plan.strips[1].heading = options.plan.strips[0].heading;
   const PlannedFlightResult planned = plan_flight(options);
   EXPECT_FALSE(planned.distribution.has_value());
-  EXPECT_THAT(planned.warnings.back(), HasSubstr("horizon"));
+  EXPECT_EQ(planned.warnings.back().code, kWarning.distribution_unknown);
 }
 
 TEST(PlanFlight, RefusesWhatMakesNoSense) {

@@ -49,6 +49,19 @@ def test_columns_outlive_the_recording(path):
     assert len(others) == 3
 
 
+def test_warnings_have_codes(tmp_path):
+    name = tmp_path / "cut.csv"
+    name.write_text("time_s,x_m,y_m,z_m,colour\n0.1,1,2,3,7\n0.2,1,2,3,7\n0.3,1", encoding="utf-8")
+    unused, cut = risley.read(name).warnings
+    assert (unused.code, cut.code) == ("columns_unused", "cut_off")
+    assert (unused.line, cut.line, cut.lost_records) == (1, 4, 1)
+    assert str(cut) == cut.message and "line 4" in cut.message
+    with risley.read_chunks(name, rows=10) as reader:
+        list(reader)
+        assert reader.warnings == [unused, cut]
+    assert risley.info(name)["warnings"][1]["code"] == "cut_off"
+
+
 def test_chunks_are_the_whole(path):
     whole = risley.read(path)
     with risley.read_chunks(path, rows=1000) as reader:

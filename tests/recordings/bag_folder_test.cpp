@@ -74,7 +74,7 @@ class BagFolder {
 struct Read {
   Observations rows;
   std::size_t samples = 0;
-  std::vector<ReadWarning> warnings;
+  std::vector<Warning> warnings;
   std::string format, error;
 };
 

@@ -93,7 +93,7 @@ inline Outcome read_text(const Format& format, std::string_view bytes,
 /// The words of a recording's warnings.
 inline std::vector<std::string> warnings_of(const Outcome& outcome) {
   std::vector<std::string> texts;
-  for (const ReadWarning& warning : outcome.recording.warnings) texts.push_back(warning.message);
+  for (const Warning& warning : outcome.recording.warnings) texts.push_back(warning.message);
   return texts;
 }
 

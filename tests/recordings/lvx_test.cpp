@@ -513,7 +513,7 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
     const bool between = cut == file.size() || cut == frames[1] || cut == frames[2];
     ASSERT_EQ(result.recording.warnings.size(), between ? 0U : 1U);
     if (between) continue;
-    const ReadWarning& warning = result.recording.warnings[0];
+    const Warning& warning = result.recording.warnings[0];
     ASSERT_TRUE(warning.place.byte_offset);
     EXPECT_LE(*warning.place.byte_offset, cut);
     // Eleven bytes of a package tell how many records it had.

@@ -52,7 +52,7 @@ std::vector<std::string> warnings(const std::string& bytes, std::size_t chunk_ro
   while (reader->read(chunk, chunk_rows)) rows += chunk.observations.size();
   EXPECT_EQ(rows, kRows);
   std::vector<std::string> texts;
-  for (const ReadWarning& warning : reader->warnings()) texts.push_back(warning.message);
+  for (const Warning& warning : reader->warnings()) texts.push_back(warning.message);
   return texts;
 }
 

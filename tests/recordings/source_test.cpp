@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -147,6 +148,28 @@ std::string problem_of(Change&& change) {
     return error.what();
   }
   return "none";
+}
+
+TEST(SourceTest, DamageThatAQuestionMeetsIsKept) {
+  const TestFolder folder;
+  std::string text = "time_s,x_m,y_m,z_m\n";
+  constexpr int kSound = 300'000;  // more than the first rows
+  for (int row = 0; row < kSound; ++row) text += fmt::format("{:.5f},1,2,3\n", 1e-5 * row);
+  format_tests::put_bytes(folder.file("a.csv"), text + "damage\n");
+  const Source source = Source(folder.file("a.csv")).held_open(), copy = source;
+  Chunk chunk;
+  std::size_t rows = 0;
+  const auto asking = open_recording(source);
+  EXPECT_FALSE(source.damage());
+  while (asking->read_sound(chunk)) rows += chunk.observations.size();
+  EXPECT_EQ(rows, kSound);
+  ASSERT_TRUE(copy.damage());
+  EXPECT_EQ(copy.damage()->place().line, kSound + 2U);
+  const auto reader = open_recording(copy);  // who needs them all meets it all the same
+  for (rows = 0; reader->read_sound(chunk);) rows += chunk.observations.size();
+  EXPECT_EQ(rows, kSound);
+  EXPECT_THROW(reader->read(chunk), FileError);
+  EXPECT_FALSE(Source(folder.file("a.csv")).damage());  // of another job
 }
 
 TEST(SourceTest, WrongColumnsAreNamed) {

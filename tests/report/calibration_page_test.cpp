@@ -159,7 +159,7 @@ struct Page {
   Calibration calibration = example();
   std::vector<jobs::SamplePoint> sample;
   std::optional<jobs::BeamComparison> truth;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 
   explicit Page(std::size_t points = 2000) : sample(sample_on(calibration.planes, 2, points)) {}
 
@@ -333,7 +333,7 @@ TEST(CalibrationPage, HasEverySection) {
 
 TEST(CalibrationPage, EscapesNames) {
   Page page;
-  page.warnings = {"<script>alert(1)</script>"};
+  page.warnings = {{kWarning.shots_lost, "<script>alert(1)</script>"}};
   const std::string html = page.html(), shown = visible(html);
   expect_sound(html);
   EXPECT_THAT(shown, HasSubstr("front &lt;wall&gt; &amp; door"));
@@ -346,11 +346,11 @@ TEST(CalibrationPage, EscapesNames) {
 
 TEST(CalibrationPage, AnyWarningAsksForCare) {
   Page page;
-  page.calibration.warnings = {"the walls are uneven"};
-  page.warnings = {"a gap of 2 s"};
+  page.calibration.warnings = {{kWarning.uneven_plane, "the walls are uneven"}};
+  page.warnings = {{kWarning.shots_lost, "a gap of 2 s", {{}, 3}}};
   const std::string shown = visible(page.html());
   EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
-  EXPECT_THAT(shown, HasSubstr("<li>a gap of 2 s</li><li>the walls are uneven</li>"));
+  EXPECT_THAT(shown, HasSubstr("<li>a gap of 2 s (line 3)</li><li>the walls are uneven</li>"));
 }
 
 TEST(CalibrationPage, APoorDatumSaysWhatHelps) {
@@ -377,7 +377,7 @@ TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
   page.calibration.sensor = sensors::load_sensor("mid-40");
   page.calibration.believed = page.calibration.sensor.train;
   page.calibration.reason = "the walls do not determine pitch & yaw";
-  page.calibration.warnings = {"a single wall"};
+  page.calibration.warnings = {{kWarning.poor_datum, "a single wall"}};
   page.calibration.rms_after = kNaN;
   page.calibration.datum.sigma_pitch = std::numeric_limits<double>::infinity();
   page.calibration.unobservable = {

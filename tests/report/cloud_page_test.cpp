@@ -37,7 +37,7 @@ cloud::CloudSummary some_cloud() {
 
 TEST(CloudPage, SaysHowSureThePointsAre) {
   cloud::CloudSummary cloud = some_cloud();
-  cloud.warnings = {"a <warning>"};
+  cloud.warnings = {{kWarning.points_missing, "a <warning>"}};
   const std::string page = cloud_page(cloud, "a <scan>", {{"command", "risley"}});
   for (const char* words : {"a &lt;scan&gt;", "of the &lt;sensor&gt;", "a &lt;warning&gt;",
                             "50.0 mm", "95.0 mm", "forward − 691000 m", "\"left, m\"",

@@ -177,7 +177,7 @@ struct Flight {
   trajectories::Mount mount;
   jobs::FlightDetails details = details_example();
   std::optional<jobs::FlightTruth> truth;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::string recording = "strips <1>.lvx";
 
   Flight() {
@@ -513,7 +513,7 @@ TEST(FlightPage, AFailureSaysWhyAndWhatToDo) {
   flight.calibration.sensor = sensors::load_sensor("mid-40");
   flight.calibration.reason = "the adjustment had not converged & more";
   flight.calibration.rms_before = flight.calibration.rms_after = kNaN;
-  flight.calibration.warnings = {"a warning"};
+  flight.calibration.warnings = {{kWarning.shots_lost, "a warning"}};
   flight.details = {};
   const std::string html = flight.html(), shown = visible(html);
   expect_sound(html);
@@ -533,8 +533,8 @@ TEST(FlightPage, APoorResultAsksForCare) {
   flight.calibration.rms_after = 0.35;
   EXPECT_THAT(visible(flight.html()), HasSubstr("The strips fit no better than before"));
   flight = {};
-  flight.calibration.warnings = {"one"};
-  flight.warnings = {"two"};
+  flight.calibration.warnings = {{kWarning.shots_lost, "one"}};
+  flight.warnings = {{kWarning.shots_lost, "two"}};
   EXPECT_THAT(visible(flight.html()), HasSubstr("<li>two</li><li>one</li>"));
 }
 
@@ -578,7 +578,7 @@ TEST(FlightPage, EscapesNames) {
   const std::string bad = "<script>alert(1)</script>";
   flight.mount.name = flight.mount.reference_point = bad;
   flight.recording = bad;
-  flight.warnings = {bad};
+  flight.warnings = {{kWarning.shots_lost, bad}};
   flight.calibration.sensor.serial = bad;
   flight.calibration.not_told = {{bad, 1}};
   const std::string html = flight.html();

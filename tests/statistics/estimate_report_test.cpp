@@ -173,7 +173,7 @@ report::Report report_of(const Case& one, bool truth = true) {
   found.head = one.head;
   found.details = jobs::estimate_details(one.estimate, found.nominal, found.head, found.evaluation);
   found.provenance = {{"command", "risley estimate"}, {"seed", "5"}};
-  found.warnings = {"a gap"};
+  found.warnings = {{kWarning.shots_lost, "a gap"}};
   return report::report_of(found);
 }
 

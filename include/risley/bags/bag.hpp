@@ -16,6 +16,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/io/block_file.hpp"
 
 namespace risley::bags {
@@ -86,12 +87,6 @@ struct Message {
   std::optional<std::uint64_t> byte_offset = {};  ///< in the file, of it or of its packed chunk
 };
 
-/// What a user should know that does not make a bag useless.
-struct BagWarning {
-  FilePlace place;
-  std::string message;
-};
-
 /// A bag that is read from its beginning to its end.
 class Bag {
  public:
@@ -112,7 +107,7 @@ class Bag {
   /// Part of the messages already read, [0, 1].
   virtual double fraction_read() const = 0;
   /// Since rewind(): a bag that was cut off while it was recorded, where its kind can be read.
-  const std::vector<BagWarning>& warnings() const { return warnings_; }
+  const std::vector<Warning>& warnings() const { return warnings_; }
 
   /// Refuses the bag. @throws FileError, always
   [[noreturn]] void fail(const std::string& problem) const;
@@ -128,7 +123,7 @@ class Bag {
   std::string path_;
   Progress progress_;  ///< asked whether to go on
   std::vector<Topic> topics_;
-  std::vector<BagWarning> warnings_;
+  std::vector<Warning> warnings_;
 
  private:
   BagKind kind_;

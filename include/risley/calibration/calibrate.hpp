@@ -17,6 +17,7 @@
 #include "risley/calibration/planar_adjustment.hpp"
 #include "risley/calibration/plane_points.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/weak_directions.hpp"
 #include "risley/scenes/scene.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -121,7 +122,7 @@ struct Calibration {
   bool converged = false;
   std::string reason;  ///< why not; empty when converged
   CalibrationVerdict verdict;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   CalibrationMethod method = CalibrationMethod::adjustment;
   sensors::Sensor sensor;  ///< calibrated, with covariance
   PrismTrain believed;     ///< what the sensor computed directions with

@@ -19,6 +19,7 @@
 #include "risley/calibration/flight_shots.hpp"
 #include "risley/calibration/ground_cells.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/weak_directions.hpp"
 #include "risley/scenes/control.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -122,7 +123,7 @@ struct FlightCalibration : FlightJudgement {
   bool converged = false;
   std::string reason;  ///< why not; empty when converged
   CalibrationVerdict verdict;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   trajectories::Mount mount;     ///< adjusted, with sigmas
   sensors::Sensor sensor;        ///< adjusted, with covariance
   PointingError pointing_error;  ///< of the prisms as they were given against the ones found

@@ -12,6 +12,7 @@
 #include "risley/calibration/flight_calibration.hpp"
 #include "risley/calibration/planned_shots.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 
 namespace risley::calibration {
 
@@ -37,7 +38,7 @@ struct SharedPointErrors {
 
 /// What a flight will tell.
 struct FlightForecast : FlightJudgement {
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   std::vector<trajectories::StripTimes> strips;
   std::vector<std::uint64_t> strip_shots;  ///< used, that end on the terrain
   std::uint64_t fired = 0, shots = 0;      ///< of all strips: fired, and ending on the terrain

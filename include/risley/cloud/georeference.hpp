@@ -16,6 +16,7 @@
 #include "risley/cloud/points.hpp"
 #include "risley/cloud/sensor_poses.hpp"
 #include "risley/core/instruction_set.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/trajectories/error_process.hpp"
 #include "risley/trajectories/flown_strips.hpp"
@@ -70,7 +71,7 @@ class Georeference {
              InstructionSet set = best_instruction_set()) const;
 
   /// What a user should know: no errors of the trajectory, an unknown clock, a change of datum.
-  std::vector<std::string> warnings() const;
+  std::vector<Warning> warnings() const;
   /// From the recording's clock to the trajectory's time, with the mount's offset, ns.
   std::int64_t clock_shift_ns() const;
   /// The strips of the flight, in the order of their numbers from 1.

@@ -17,6 +17,7 @@
 #include "risley/cloud/rotor_tracking.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::cloud {
@@ -64,8 +65,7 @@ struct CloudSummary {
   /// How far points were moved from where the sensor says, rms over some beams, rad.
   double repointing_rms = 0;
   std::vector<recordings::ShotSlip> slips;  ///< of the recording's count, mended
-  std::vector<std::string> warnings;
-  std::vector<recordings::ReadWarning> read_warnings;
+  std::vector<Warning> warnings;            ///< beside those of the reader
   /// Damage in the recording's body; what came before it is in the cloud.
   std::optional<FileError> damage;
 };

@@ -12,6 +12,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/batch_map.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/recordings/observations.hpp"
@@ -31,7 +32,7 @@ struct SensorBelief {
   /// Mean square of the residuals over their stated variance, not below 1.
   double residual_variance_factor = 1;
   bool mirrored = false;  ///< the recording's elevation has the other sign
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Finds out from the beginning of a recording.

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/coordinate_rounding.hpp"
 #include "risley/estimation/diagnostics.hpp"
 #include "risley/estimation/initialisation.hpp"
@@ -78,8 +79,8 @@ struct Estimate : Solution {
   bool converged = false;
   std::string reason;  ///< why not converged; empty when converged
   EstimateVerdict verdict;
-  std::vector<std::string> warnings;  ///< what the user should know all the same
-  sensors::Sensor sensor;             ///< the calibrated sensor with its covariance
+  std::vector<Warning> warnings;  ///< what the user should know all the same
+  sensors::Sensor sensor;         ///< the calibrated sensor with its covariance
   bool mirrored = false;
   /// Whole turn of the recording's frame, where it is not the sensor's; the series is turned back.
   std::optional<FrameEstimate> frame_turn;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/jobs/campaign_plan.hpp"
 #include "risley/optics/parameters.hpp"
 
@@ -130,7 +131,7 @@ struct CampaignResult {
   std::vector<SettingSummary> settings;  ///< in the order of the plan
   /// Cells without a result, as ranges, the last included; the first ones if they are many.
   std::vector<std::pair<std::uint64_t, std::uint64_t>> missing;
-  std::vector<std::string> warnings;  ///< about files that do not count
+  std::vector<Warning> warnings;  ///< about files that do not count
 };
 
 /// Reads the chunks that are done, in whatever way the campaign was divided, and writes one table

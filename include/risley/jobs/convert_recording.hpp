@@ -9,6 +9,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -31,7 +32,7 @@ struct ConvertedRecording {
   std::uint64_t left_out = 0;      ///< of them, because the format has no place for them
   std::string input_format;
   std::optional<SensorChoice> choice;  ///< where the file does not name the sensor
-  std::vector<recordings::ReadWarning> warnings;
+  std::vector<Warning> warnings;
   /// By which times that had to be guessed may be off, s; 0: there are none.
   double time_uncertainty = 0;
   std::optional<FileError> damage;  ///< of the recording's body; what came before it was written

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/trajectories/trajectory.hpp"
 
 namespace risley::jobs {
@@ -25,7 +26,7 @@ struct ConvertedTrajectory {
   std::uint64_t records = 0;
   std::string input_format;
   std::vector<std::string> left_out;  ///< what the format has no place for, in words
-  std::vector<trajectories::TrajectoryWarning> warnings;  ///< of reading
+  std::vector<Warning> warnings;      ///< of reading
 };
 
 /// Reads a trajectory in any known format and writes it in another. Stages: reading, writing.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/evaluation.hpp"
 #include "risley/jobs/estimate_details.hpp"
@@ -51,9 +52,9 @@ struct EstimatedRecording {
   ReadRecording recording;
   estimation::AngleSeries head;  ///< every shot of the first second, as recorded
   estimation::SelectionCounts counts;
-  std::vector<std::string> warnings;  ///< of the recording; the estimate has its own
-  SensorChoice choice;                ///< who says which sensor it was
-  sensors::Sensor nominal;            ///< what the estimation started from
+  std::vector<Warning> warnings;  ///< of the recording; the estimate has its own
+  SensorChoice choice;            ///< who says which sensor it was
+  sensors::Sensor nominal;        ///< what the estimation started from
   estimation::Estimate estimate;
   std::optional<estimation::Evaluation> evaluation;  ///< where the truth is known
   std::optional<EstimateDetails> details;            ///< where they were asked for

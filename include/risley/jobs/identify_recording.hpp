@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/identification/identified_sensor.hpp"
 #include "risley/identification/identify.hpp"
 #include "risley/jobs/provenance.hpp"
@@ -43,7 +44,7 @@ struct IdentifiedRecording {
   std::string like;                       ///< the built-in preset that has this train; empty: none
   bool like_mirrored = false;             ///< it is that one's mirror image
   std::vector<std::string> unobservable;  ///< what such a recording never tells, in words
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   bool cropped = false;  ///< packets lack points, and a preset's optics told their shots' times
   bool written = false;
   double reading_time = 0, solving_time = 0;  ///< s

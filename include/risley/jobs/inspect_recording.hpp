@@ -8,6 +8,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/excerpt.hpp"
 #include "risley/recordings/reader.hpp"
@@ -29,7 +30,7 @@ struct InspectedRecording {
   /// The sensor; empty for a recording of several, or of a type without a built-in preset.
   std::optional<SensorChoice> choice;
   recordings::TimeAuditResult audit;
-  std::vector<recordings::ReadWarning> warnings;
+  std::vector<Warning> warnings;
   /// By which times that had to be guessed may be off, s; 0: there are none.
   double time_uncertainty = 0;
   std::optional<FileError> damage;  ///< of its body; what came before it is in the audit

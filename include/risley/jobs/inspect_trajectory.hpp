@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/trajectories/trajectory.hpp"
 #include "risley/trajectories/trajectory_audit.hpp"
@@ -33,7 +34,7 @@ struct InspectedTrajectory {
   std::optional<trajectories::TrajectoryAudit> audit;     ///< of the trajectory
   std::optional<trajectories::AccuracyAudit> accuracies;  ///< of the file of accuracies
   /// Of everything that was read.
-  std::vector<trajectories::TrajectoryWarning> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Reads a trajectory and audits it. Stages: reading, checking.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/observability.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/reader.hpp"
@@ -31,7 +32,7 @@ struct JudgedObservability {
   estimation::Observability observability;
   TrainShape shape;
   std::vector<std::string> words;  ///< the same in sentences
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   bool converged = true;  ///< the estimate of a recording
   std::string reason;     ///< why not
 };

@@ -10,6 +10,7 @@
 #include "risley/calibration/flight_forecast.hpp"
 #include "risley/cloud/point_distribution.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/scenes/terrain.hpp"
 #include "risley/trajectories/error_process.hpp"
@@ -55,7 +56,7 @@ struct PlannedFlightResult {
   calibration::FlightForecast forecast;
   /// Of all shots that the sensor fires; empty where the sensor does not look down.
   std::optional<cloud::PointDistributionSummary> distribution;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Accuracy of a calibration on the strips of a planned flight, and how its points lie on the

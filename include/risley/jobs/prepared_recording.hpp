@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/reader.hpp"
@@ -39,11 +41,21 @@ struct PreparedRecording {
   std::unique_ptr<recordings::Reader> reader;  ///< as reading says, at its first row
   std::optional<SensorChoice> choice;          ///< where the sensor was needed
   FirstShots first;                            ///< as they were when it was chosen
-  std::vector<std::string> warnings;           ///< what was done about times, pose and sensor
+  std::vector<Warning> warnings;               ///< what was done about times, pose and sensor
   double time_uncertainty = 0;  ///< by which guessed times may be off, s; 0: there are none
   bool turned_back = false;     ///< by a pose, stated or given, or a roll that was found
   bool cut_mended = false;      ///< points were moved to the middle of where they were before a cut
 
+  /// All so far, those of the reader first.
+  std::vector<Warning> all_warnings() const {
+    std::vector<Warning> all = reader->warnings();
+    append(all, warnings);
+    return all;
+  }
+  /// Refuses damage that was met while questions were answered. @throws FileError
+  void require_whole() const {
+    if (const auto damage = source.damage()) throw FileError(*damage);
+  }
   /// Leaves what only questions need, before all rows are read.
   void close_questions() {
     source = {};

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "risley/core/warning.hpp"
 #include "risley/jobs/recording_input.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -27,7 +28,7 @@ struct RangedInputOptions {
 struct RangedInput {
   std::vector<ReadRecording> recordings;
   std::uint64_t observations = 0;            ///< rows of all recordings
-  std::vector<std::string> warnings;         ///< of the recordings
+  std::vector<Warning> warnings;             ///< of the recordings
   SensorChoice choice;                       ///< who says which sensor the first one was
   sensors::Sensor nominal;                   ///< preset that all started from
   double reading_time = 0, angles_time = 0;  ///< s

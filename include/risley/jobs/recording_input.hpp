@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/packed_series.hpp"
 #include "risley/jobs/sensor_choice.hpp"
@@ -41,9 +42,9 @@ struct EstimationInput {
   estimation::AngleSeries head;     ///< every shot of the first second
   estimation::StartFindings found;  ///< about the head
   estimation::SelectionCounts counts;
-  std::vector<std::string> warnings;  ///< of the reader, about frame, sensor and clock
-  bool whole_steps = false;           ///< directions come from coordinates in whole steps
-  double reading_time = 0;            ///< s
+  std::vector<Warning> warnings;  ///< of the reader, about frame, sensor and clock
+  bool whole_steps = false;       ///< directions come from coordinates in whole steps
+  double reading_time = 0;        ///< s
 };
 
 /// Reads all of a recording of one sensor in the sensor's frame.
@@ -53,9 +54,6 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
                                     const Progress& progress = {});
 
 /// Says which shots were left out because their times do not tell when they were fired.
-void add_left_out_words(const estimation::SelectionCounts& counts, std::vector<std::string>& words);
-
-/// A warning of a reader with its place: "... (at byte 17)", "... (line 3)".
-std::string warning_text(const recordings::ReadWarning& warning);
+void warn_of_left_out(const estimation::SelectionCounts& counts, std::vector<Warning>& warnings);
 
 }  // namespace risley::jobs

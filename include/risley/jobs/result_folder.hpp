@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/io/folder_lock.hpp"
 #include "risley/io/output_file.hpp"
@@ -39,7 +40,7 @@ class ResultFolder {
   void add_text(const NamedText& text);
   /// Gives all files their names.
   /// @return what happened to results of an earlier run, in sentences
-  std::vector<std::string> commit();
+  std::vector<Warning> commit();
 
  private:
   std::string path(const std::string& name) const;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/estimation/sensor_recognition.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -44,7 +45,7 @@ struct SensorChoice {
   std::optional<bool> fits;
   /// The sensor and the next best one, where the shots were asked.
   std::vector<PresetMisfit> misfits;
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
   /// Why no sensor of these can have made it, where that shows before any is asked for: coordinates
   /// that are none of a sensor's frame, a field of view beyond theirs. The sensor is the usual one.
   std::string impossible;

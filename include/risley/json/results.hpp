@@ -8,6 +8,7 @@
 
 namespace risley {
 class FileError;
+struct Warning;
 namespace calibration {
 struct FormalDatum;
 }
@@ -74,6 +75,8 @@ Json of(const jobs::IdentifiedRecording& found);
 Json of(const jobs::RecordingCloud& made);
 /// Of `risley info` about a recording.
 Json of(const jobs::InspectedRecording& found);
+/// Of every verb: `warnings`.
+Json of(const std::vector<Warning>& warnings);
 /// What a reader told of a recording that a result is of, and how sound its times are.
 Json of(const jobs::ReadRecording& recording);
 /// How well a calibration on walls knows directions; without the `kind` of the datum.

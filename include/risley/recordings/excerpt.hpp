@@ -9,6 +9,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/recordings/reader.hpp"
 
 namespace risley::recordings {
@@ -33,10 +34,10 @@ struct Excerpt {
   bool has_ranges = false;
   /// Directions and resolutions that came from coordinates were rounded, see write_excerpt().
   bool rounded = false;
-  double duration = 0;                ///< from the first to the last shot, s; 0 without times
-  std::uint64_t first_row = 0;        ///< of the recording's rows of this device, from 0
-  std::vector<ReadWarning> warnings;  ///< of the recording
-  std::optional<FileError> damage;    ///< of the recording, behind the rows searched
+  double duration = 0;              ///< from the first to the last shot, s; 0 without times
+  std::uint64_t first_row = 0;      ///< of the recording's rows of this device, from 0
+  std::vector<Warning> warnings;    ///< of the recording
+  std::optional<FileError> damage;  ///< of the recording, behind the rows searched
 };
 
 /// The same in words, for who is to send it away.

@@ -11,20 +11,12 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/recordings/extrinsics.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/recordings/source.hpp"
 
 namespace risley::recordings {
-
-/// Something a user should know that does not make the recording useless: a tail cut off while
-/// recording, a packet of an unknown type that was stepped over.
-struct ReadWarning {
-  FilePlace place;
-  std::string message;
-  std::uint64_t lost_records = 0;   ///< records known to be lost, 0 when it cannot be known
-  bool answered_by_places = false;  ///< it does not hold where ReadOptions::packet_places are given
-};
 
 /// Rows per chunk unless the caller asks otherwise: large enough to be fast, a few MB small.
 inline constexpr std::size_t kDefaultChunkRows = 65536;
@@ -36,7 +28,7 @@ class Reader {
   /// What is known of the whole recording.
   const RecordingHeader& header() const { return header_; }
   /// What is wrong with the rows so far and did not end the reading.
-  const std::vector<ReadWarning>& warnings() const { return warnings_; }
+  const std::vector<Warning>& warnings() const { return warnings_; }
   /// How often a PPS clock began a new second so far, over all devices; 0 for other clocks.
   std::uint64_t clock_wraps() const { return clock_wraps_; }
 
@@ -47,6 +39,10 @@ class Reader {
   ///         InvalidArgument for max_rows = 0
   virtual bool read(Chunk& chunk, std::size_t max_rows = kDefaultChunkRows) = 0;
 
+  /// As read(), to find something out about the sound rows: damage is their end. A source that is
+  /// held open keeps it (Source::damage()), for whoever needs all rows.
+  bool read_sound(Chunk& chunk, std::size_t max_rows = kDefaultChunkRows);
+
   /// Part of the file already read, [0, 1].
   virtual double fraction_read() const = 0;
 
@@ -56,12 +52,13 @@ class Reader {
 
  protected:
   RecordingHeader header_;
-  std::vector<ReadWarning> warnings_;
+  std::vector<Warning> warnings_;
   std::uint64_t clock_wraps_ = 0;
 
   /// Adds to warnings().
-  void warn(FilePlace place, std::string message, std::uint64_t lost_records = 0) {
-    warnings_.push_back({place, std::move(message), lost_records});
+  template <class... Values>
+  Warning& warn(WarningCode code, fmt::format_string<Values...> words, Values&&... values) {
+    return risley::warn(warnings_, code, words, std::forward<Values>(values)...);
   }
 };
 
@@ -161,7 +158,7 @@ void require_times(const RecordingHeader& header);
 struct Recording {
   RecordingHeader header;
   Chunk data;
-  std::vector<ReadWarning> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Reads a whole recording into memory. @throws as open_recording

@@ -4,9 +4,11 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "risley/core/error.hpp"
 #include "risley/io/block_file.hpp"
 
 namespace risley::recordings {
@@ -46,6 +48,8 @@ class Source {
   /// kept for the next one of them, until one reads on behind it. A Progress given with one of the
   /// copies must outlive all of them.
   Source held_open() const;
+  /// What keeps a recording that is held open from being read to its end, once somebody met it.
+  std::optional<FileError> damage() const;
   /// One of its files to be read: the one that is held open, where it is that. @throws FileError
   io::InputFile open_file(const std::string& path) const;
 

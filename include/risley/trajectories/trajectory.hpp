@@ -12,6 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "risley/core/error.hpp"
+#include "risley/core/warning.hpp"
 
 namespace risley::trajectories {
 
@@ -62,15 +63,6 @@ struct PoseAccuracy {
   double roll = 0, pitch = 0, heading = 0;  ///< rad
 };
 
-/// Something a user should know that does not make the trajectory useless.
-struct TrajectoryWarning {
-  FilePlace place;
-  std::string message;
-};
-
-/// A warning in one line: the message, then the place in brackets.
-std::string warning_text(const TrajectoryWarning& warning);
-
 /// Along which axes a file's velocities stand, found by comparing them with differences of its
 /// positions.
 struct VelocityFrame {
@@ -110,7 +102,7 @@ struct Trajectory {
   std::vector<Eigen::Quaterniond> attitude;  ///< frame from body (x forward, y right, z down)
   std::vector<Eigen::Vector3d> velocity;     ///< relative to the frame, along its axes, m/s
   std::vector<PoseAccuracy> accuracy;
-  std::vector<TrajectoryWarning> warnings;  ///< of reading it
+  std::vector<Warning> warnings;  ///< of reading it
   /// Of a file that has one: angle from the platform's heading to the true one, which is less.
   std::optional<AngleSpread> wander;
   std::optional<VelocityFrame> velocity_frame;  ///< of a file's velocities

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/trajectories/interpolation.hpp"
 #include "risley/trajectories/trajectory.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
@@ -38,8 +39,8 @@ struct TrajectoryAudit {
   Extent roll, pitch;                         ///< rad
   double fastest = 0;          ///< largest speed between records that are no gap apart, m/s
   double fastest_turning = 0;  ///< largest angular rate between them, rad/s
-  std::optional<PoseAccuracy> accuracy;     ///< median of each accuracy
-  std::vector<TrajectoryWarning> warnings;  ///< of reading, and of what was found here
+  std::optional<PoseAccuracy> accuracy;  ///< median of each accuracy
+  std::vector<Warning> warnings;         ///< of reading, and of what was found here
 };
 
 /// @throws InvalidArgument as require_trajectory and for gap_steps as Interpolation; Cancelled

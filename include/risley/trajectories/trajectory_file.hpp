@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "risley/core/progress.hpp"
+#include "risley/core/warning.hpp"
 #include "risley/trajectories/trajectory.hpp"
 
 namespace risley::trajectories {
@@ -59,7 +60,7 @@ struct AccuracyRecords {
   std::vector<std::int64_t> time_ns;
   std::vector<PoseAccuracy> accuracy;
   std::vector<Eigen::Vector3d> velocity;  ///< standard deviations north, east, down, m/s
-  std::vector<TrajectoryWarning> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Reads SMRMSG, the accuracies that belong to an SBET: records of 80 bytes.

@@ -112,8 +112,9 @@ BinaryTableReader::BinaryTableReader(std::string path, std::string_view format, 
   } catch (const BadColumns& bad) {
     throw FileError(path_, {table_.columns_offset, {}}, bad.what());
   }
-  for (std::string& warning : table_.warnings) {
-    warn({table_.columns_offset, {}}, std::move(warning));
+  for (Warning& warning : table_.warnings) {
+    warning.place.byte_offset = table_.columns_offset;
+    warnings_.push_back(std::move(warning));
   }
   open_lanes();
 }

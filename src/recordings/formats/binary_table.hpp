@@ -50,8 +50,8 @@ struct BinaryTable {
   std::uint64_t rows = 0;
   std::vector<TableLane> lanes;
   std::vector<TableColumn> columns;
-  std::vector<std::string> warnings;  ///< of what stands before the rows
-  std::uint64_t columns_offset = 0;   ///< where the file names its columns
+  std::vector<Warning> warnings;     ///< of what stands before the rows
+  std::uint64_t columns_offset = 0;  ///< where the file names its columns
 };
 
 /// Longest record of a lane.

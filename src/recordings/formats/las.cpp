@@ -142,9 +142,10 @@ class LasReader final : public Reader {
     step_ = *most;
     // Equal but for the rounding of decimal fractions is equal.
     if (*most <= *least * (1 + 1e-9)) return;
-    warn({}, fmt::format("coordinates are multiples of {:g}, {:g} and {:g} m in x, y and z; {:g} m "
-                         "is used for all three",
-                         steps[0], steps[1], steps[2], step_));
+    warn(kWarning.values_changed,
+         "coordinates are multiples of {:g}, {:g} and {:g} m in x, y and z; {:g} m is used for all "
+         "three",
+         steps[0], steps[1], steps[2], step_);
   }
 
   /// Decides what GPS times are.
@@ -152,9 +153,9 @@ class LasReader final : public Reader {
     const bool adjusted = (file_.global_encoding & kAdjustedGpsTime) != 0;
     if (!gps_time_at(file_.point_format)) {
       header_.has_times = false;
-      warn({}, fmt::format(
-                   "points of format {} have no times; they are taken to be in the order of firing",
-                   file_.point_format));
+      warn(kWarning.no_shot_times,
+           "points of format {} have no times; they are taken to be in the order of firing",
+           file_.point_format);
       return;
     }
     std::size_t shots = 0, times = 0;
@@ -170,10 +171,11 @@ class LasReader final : public Reader {
     if ((times == 1 && shots > 1) || (times > 0 && shots / times >= kShotsOfOneTime)) {
       header_.has_times = false;
       header_.all_times_equal = times == 1;
-      warn({}, fmt::format("GPS times are not those of single shots: {} of the first {} shots {}; "
-                           "points are taken to be in the order of firing",
-                           times == 1 ? "all" : fmt::format("{} on average", shots / times), shots,
-                           times == 1 ? fmt::format("have {} s", first) : "share one"));
+      warn(kWarning.no_shot_times,
+           "GPS times are not those of single shots: {} of the first {} shots {}; points are taken "
+           "to be in the order of firing",
+           times == 1 ? "all" : fmt::format("{} on average", shots / times), shots,
+           times == 1 ? fmt::format("have {} s", first) : "share one");
       return;
     }
     if (times_fit(adjusted) && adjusted) header_.time_reference = TimeReference::utc;
@@ -210,9 +212,10 @@ class LasReader final : public Reader {
                                      counted_since));
     }
     if (found.empty()) return true;
-    warn({}, fmt::format("GPS times of {:.3f} to {:.3f} s do not fit the header: {}. They are read "
-                         "as they are, without an origin",
-                         low, high, found));
+    warn(kWarning.clock_unknown,
+         "GPS times of {:.3f} to {:.3f} s do not fit the header: {}. They are read as they are, "
+         "without an origin",
+         low, high, found);
     return false;
   }
 
@@ -259,9 +262,10 @@ class LasReader final : public Reader {
     if (value <= UINT8_MAX) return static_cast<std::uint8_t>(value);
     if (!intensity_reported_) {
       intensity_reported_ = true;
-      warn({}, fmt::format("the intensity of point {} is {}, but none of the first {} points has "
-                           "more than 255; higher intensities are read as 255",
-                           row_ + 1, point.intensity, kPointsLookedAt));
+      warn(kWarning.values_changed,
+           "the intensity of point {} is {}, but none of the first {} points has more than 255; "
+           "higher intensities are read as 255",
+           row_ + 1, point.intensity, kPointsLookedAt);
     }
     return UINT8_MAX;
   }

@@ -47,7 +47,7 @@ std::size_t bytes_described(const std::uint8_t* descriptor) {
 
 class HeaderReader {
  public:
-  HeaderReader(io::BlockInput& input, std::vector<ReadWarning>& warnings)
+  HeaderReader(io::BlockInput& input, std::vector<Warning>& warnings)
       : input_(input), warnings_(warnings) {}
 
   PublicHeader read() {
@@ -78,10 +78,6 @@ class HeaderReader {
  private:
   [[noreturn]] void fail(std::uint64_t offset, const std::string& problem) const {
     throw FileError(input_.path(), {offset, {}}, problem);
-  }
-
-  void warn(std::uint64_t offset, std::string message) {
-    warnings_.push_back({{offset, {}}, std::move(message), 0});
   }
 
   template <class T>
@@ -151,9 +147,11 @@ class HeaderReader {
     if (count == 0 && !is_modern(header_.point_format)) return;  // some fill in the old one alone
     header_.points = count;
     if (old_count == 0 || old_count == count) return;
-    warn(kCountAt, fmt::format("the header says {} points in its old counter and {} in that of LAS "
-                               "1.4; the latter is used",
-                               old_count, count));
+    warn(warnings_, kWarning.header_contradicted,
+         "the header says {} points in its old counter and {} in that of LAS 1.4; the latter is "
+         "used",
+         old_count, count)
+        .place.byte_offset = kCountAt;
   }
 
   void step_over_records() {
@@ -189,10 +187,11 @@ class HeaderReader {
       const std::uint64_t length =
           left < kExtendedRecordHeaderBytes ? 0 : number<std::uint64_t>(at + 20);
       if (left < kExtendedRecordHeaderBytes || left - kExtendedRecordHeaderBytes < length) {
-        warn(kExtendedAt,
-             fmt::format("extended record {} of {}, at byte {}, does not lie between the points "
-                         "and the end of the file; it and those after it were left out",
-                         i + 1, count, at));
+        warn(warnings_, kWarning.content_left_out,
+             "extended record {} of {}, at byte {}, does not lie between the points and the end of "
+             "the file; it and those after it were left out",
+             i + 1, count, at)
+            .place.byte_offset = kExtendedAt;
         return;
       }
       if (describes_extra_bytes(at)) find_extra_bytes(at + kExtendedRecordHeaderBytes, length);
@@ -216,9 +215,11 @@ class HeaderReader {
       const std::uint8_t* const descriptor = input_.at(at, kDescriptorBytes);
       const std::size_t bytes = bytes_described(descriptor);
       if (place + bytes > header_.record_bytes) {
-        warn(at, fmt::format("the extra bytes described from here on lie beyond the end of the "
-                             "point records, which have {} bytes; they were left out",
-                             header_.record_bytes));
+        warn(warnings_, kWarning.columns_unused,
+             "the extra bytes described from here on lie beyond the end of the point records, "
+             "which have {} bytes; they were left out",
+             header_.record_bytes)
+            .place.byte_offset = at;
         return;
       }
       constexpr std::uint8_t kUint8 = 1;
@@ -231,7 +232,7 @@ class HeaderReader {
   }
 
   io::BlockInput& input_;
-  std::vector<ReadWarning>& warnings_;
+  std::vector<Warning>& warnings_;
   PublicHeader header_;
   std::uint64_t header_size_ = 0;
 };
@@ -248,7 +249,7 @@ std::optional<std::int64_t> utc_of_adjusted_gps(double seconds) {
   return utc_ns;
 }
 
-PublicHeader read_header(io::BlockInput& input, std::vector<ReadWarning>& warnings) {
+PublicHeader read_header(io::BlockInput& input, std::vector<Warning>& warnings) {
   return HeaderReader(input, warnings).read();
 }
 

@@ -38,6 +38,6 @@ struct PublicHeader {
 /// taken on a header's word.
 /// @param warnings  gets what is odd and does not keep points from being read
 /// @throws FileError with the byte of what cannot be
-PublicHeader read_header(io::BlockInput& input, std::vector<ReadWarning>& warnings);
+PublicHeader read_header(io::BlockInput& input, std::vector<Warning>& warnings);
 
 }  // namespace risley::recordings::las

@@ -18,7 +18,7 @@ using io::load;
 
 class PlainPoints final : public PointSource {
  public:
-  PlainPoints(io::BlockInput input, const PublicHeader& header, std::vector<ReadWarning>& warnings)
+  PlainPoints(io::BlockInput input, const PublicHeader& header, std::vector<Warning>& warnings)
       : input_(std::move(input)), header_(header) {
     const std::uint64_t room = (header_.points_end - header_.points_at) / header_.record_bytes;
     points_ = std::min(header_.points, room);
@@ -26,16 +26,17 @@ class PlainPoints final : public PointSource {
       // A program that fills in its counter last was interrupted.
       points_ = header_.points = room;
       warnings.push_back(
-          {{header_.points_at, {}},
+          {kWarning.header_contradicted,
            fmt::format("the header says that there are 0 points; the {} that follow it were read",
                        room),
-           0});
+           {header_.points_at, {}}});
     }
     if (header_.points < room) {
       warnings.push_back(
-          {{place_of(header_.points), {}},
+          {kWarning.content_left_out,
            fmt::format("the header says that there are {} points; those after them were left out",
                        header_.points),
+           {place_of(header_.points), {}},
            room - header_.points});
     }
   }
@@ -108,7 +109,7 @@ class PlainPoints final : public PointSource {
 }  // namespace
 
 std::unique_ptr<PointSource> open_points(io::BlockInput input, const PublicHeader& header,
-                                         std::vector<ReadWarning>& warnings) {
+                                         std::vector<Warning>& warnings) {
   return std::make_unique<PlainPoints>(std::move(input), header, warnings);
 }
 

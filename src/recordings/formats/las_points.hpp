@@ -45,12 +45,12 @@ class PointSource {
 
 /// Points that stand one after another. @param warnings  gets points that the header does not count
 std::unique_ptr<PointSource> open_points(io::BlockInput input, const PublicHeader& header,
-                                         std::vector<ReadWarning>& warnings);
+                                         std::vector<Warning>& warnings);
 
 /// Points that LASzip compressed.
 /// @throws FileError also when this build has no LASzip, with what to do then
 std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& header,
-                                                    std::vector<ReadWarning>& warnings);
+                                                    std::vector<Warning>& warnings);
 
 }  // namespace risley::recordings::las

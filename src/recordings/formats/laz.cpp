@@ -23,12 +23,12 @@ using io::load;
 /// Points that LASzip unpacks one by one. It reads the header again, which has been checked.
 class LazPoints final : public PointSource {
  public:
-  LazPoints(io::BlockInput input, const PublicHeader& header, std::vector<ReadWarning>& warnings)
+  LazPoints(io::BlockInput input, const PublicHeader& header, std::vector<Warning>& warnings)
       : path_(input.path()), header_(header), size_(input.size()) {
     if (header_.points == 0 && size_ > header_.points_at + sizeof(std::int64_t)) {
-      warnings.push_back({{header_.points_at, {}},
+      warnings.push_back({kWarning.content_left_out,
                           "the header says that there are 0 points; what follows it was left out",
-                          0});
+                          {header_.points_at, {}}});
     }
     if (header_.points > 0) check_chunk_table(input);
     stream_.open(input.file().name_for_libraries(), std::ios::binary);
@@ -172,7 +172,7 @@ class LazPoints final : public PointSource {
 
 std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& header,
-                                                    std::vector<ReadWarning>& warnings) {
+                                                    std::vector<Warning>& warnings) {
   return std::make_unique<LazPoints>(std::move(input), header, warnings);
 }
 
@@ -184,7 +184,7 @@ namespace risley::recordings::las {
 
 std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& /*header*/,
-                                                    std::vector<ReadWarning>& /*warnings*/) {
+                                                    std::vector<Warning>& /*warnings*/) {
   const io::BlockInput own = std::move(input);
   throw FileError(own.path(), {kPointFormatAt, {}},
                   "is compressed by LASzip, and this build has no LASzip, because Debian 12 has no "

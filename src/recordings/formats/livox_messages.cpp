@@ -180,9 +180,10 @@ void MessageReader::choose_topics() {
   for (std::size_t i = 0; i < topics().size(); ++i) {
     const bags::Topic& topic = topics()[i];
     if (topic.kind == MessageKind::cloud && wanted == MessageKind::points) {
-      warn({}, fmt::format("the point clouds of topic {} were left out: the Livox driver's own "
-                           "messages have better times",
-                           topic.name));
+      warn(kWarning.content_left_out,
+           "the point clouds of topic {} were left out: the Livox driver's own messages have "
+           "better times",
+           topic.name);
     }
     if (topic.kind != wanted) continue;
     if (header_.devices.size() > UINT8_MAX) {
@@ -234,10 +235,10 @@ void MessageReader::find_lidars() {
     }
     if (sharing > 1) {
       lidars_[i].assign(seen[i].begin(), seen[i].end());
-      warn({},
-           fmt::format("{} lidars share the topic {}: they are told apart by the numbers that the "
-                       "driver gave them",
-                       sharing, topics()[i].name));
+      warn(kWarning.devices_unclear,
+           "{} lidars share the topic {}: they are told apart by the numbers that the driver gave "
+           "them",
+           sharing, topics()[i].name);
       device.serial.clear();
     }
     for (std::size_t lidar = 0; lidar < sharing; ++lidar) {
@@ -279,9 +280,10 @@ void MessageReader::choose_imu_topics() {
     } else if (imu_topics == 1 && header_.devices.size() == 1) {
       devices_[i] = std::uint8_t{0};
     } else {
-      warn({}, fmt::format("the inertial samples of topic {} were left out: nothing says to which "
-                           "lidar they belong",
-                           topics()[i].name));
+      warn(
+          kWarning.content_left_out,
+          "the inertial samples of topic {} were left out: nothing says to which lidar they belong",
+          topics()[i].name);
     }
   }
 }
@@ -345,10 +347,10 @@ void MessageReader::find_cloud_times() {
     if (!cloud_times_[i]) {
       unused_times_[i] = searches[i].problem();
     } else if (constexpr double kCoarse_ns = 100; cloud_times_[i]->step_ns >= kCoarse_ns) {
-      warn({},
-           fmt::format("the times of the points of topic {} are floating-point numbers in steps of "
-                       "{:.0f} ns (field {})",
-                       topics()[i].name, cloud_times_[i]->step_ns, cloud_times_[i]->field));
+      warn(kWarning.times_coarse,
+           "the times of the points of topic {} are floating-point numbers in steps of {:.0f} ns "
+           "(field {})",
+           topics()[i].name, cloud_times_[i]->step_ns, cloud_times_[i]->field);
     }
   }
 }
@@ -392,10 +394,10 @@ void MessageReader::describe() {
       }
     } else if (!first[i].accelerations.empty() && median(first[i].accelerations) > kLongestInG) {
       acceleration_units_[i] = 1.0 / kStandardGravity;
-      warn({},
-           fmt::format("judging by their size, the accelerations of topic {} are in m/s^2; they "
-                       "were divided by {} m/s^2",
-                       topics()[i].name, kStandardGravity));
+      warn(kWarning.unit_guessed,
+           "judging by their size, the accelerations of topic {} are in m/s^2; they were divided "
+           "by {} m/s^2",
+           topics()[i].name, kStandardGravity);
     }
   }
   rewind();
@@ -440,11 +442,10 @@ void MessageReader::compare_clocks(std::uint8_t device, const FirstMessages& fir
   }
   if (!grow) return;
   growth_from_ns_[device] = first.times_ns[0];
-  warn({},
-       fmt::format("times are at fault: the offset times of topic {} do not begin anew with each "
-                   "message but grow as the time of the messages does; they were taken as counted "
-                   "from the first message",
-                   header_.devices[device].topic));
+  warn(kWarning.times_corrected,
+       "times are at fault: the offset times of topic {} do not begin anew with each message but "
+       "grow as the time of the messages does; they were taken as counted from the first message",
+       header_.devices[device].topic);
 }
 
 /// Finds the shots per second and the returns per shot of a cloud topic from its points per
@@ -485,7 +486,7 @@ void MessageReader::settle_cloud_grid(std::size_t topic, FirstMessages& first) {
         "after them have wrong times",
         rate);
   }
-  warn({}, std::move(message));
+  warnings_.push_back({kWarning.no_shot_times, std::move(message)});
 }
 
 bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
@@ -510,12 +511,11 @@ bool MessageReader::read(Chunk& chunk, std::size_t max_rows) {
 
 void MessageReader::take_bag_warnings() {
   if (std::exchange(ended_, true)) return;
-  for (const bags::BagWarning& one : bag_->warnings()) {
-    warn(one.place, one.message);
-  }
+  risley::append(warnings_, bag_->warnings());
   if (unknown_lidar_points_ == 0) return;
-  warn({}, "points of lidars that are not among the first messages of their topic were left out",
-       unknown_lidar_points_);
+  warn(kWarning.content_left_out,
+       "points of lidars that are not among the first messages of their topic were left out")
+      .lost_records = unknown_lidar_points_;
 }
 
 void MessageReader::append(const LidarMessage& message, Chunk& chunk) {
@@ -575,10 +575,10 @@ void MessageReader::append_points(const LidarMessage& message, std::uint8_t devi
     const bool is_shot = is_one_shot(points, first, run);
     if (run > kMostReturns && !equal_times_reported_) {
       equal_times_reported_ = true;
-      warn({},
-           fmt::format("{} points of topic {} have the same time; where more than {} do, each is "
-                       "taken as a separate shot",
-                       run, topics()[message.topic].name, kMostReturns));
+      warn(kWarning.times_coarse,
+           "{} points of topic {} have the same time; where more than {} do, each is taken as a "
+           "separate shot",
+           run, topics()[message.topic].name, kMostReturns);
     }
     for (std::size_t i = 0; i < run; ++i, ++row) {
       const MessagePoint& point = points[first + i];
@@ -612,10 +612,10 @@ void MessageReader::append_imu(const LidarMessage& message, std::uint8_t device,
         static_cast<float>(message.acceleration[axis] * acceleration_units_[message.topic]);
     if (std::isfinite(sample.angular_velocity[axis] + sample.acceleration_g[axis])) continue;
     if (!std::exchange(imu_without_numbers_reported_, true)) {
-      warn({},
-           fmt::format("inertial samples of topic {} whose rates or accelerations are not finite "
-                       "numbers were left out",
-                       topics()[message.topic].name));
+      warn(kWarning.content_left_out,
+           "inertial samples of topic {} whose rates or accelerations are not finite numbers were "
+           "left out",
+           topics()[message.topic].name);
     }
     return;
   }

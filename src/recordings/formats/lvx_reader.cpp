@@ -151,7 +151,7 @@ void LvxReader::describe() {
     header_.cartesian = version_.float_points;
   }
 
-  std::vector<ReadWarning> unknown;
+  std::vector<Warning> unknown;
   for (std::size_t i = 0; i < first.size(); ++i) {
     const FirstPackets& device = first[i];
     if (device.empty() || version_.float_points) continue;
@@ -159,11 +159,11 @@ void LvxReader::describe() {
     if (!grids_[i]) continue;
     header_.returns_per_shot = std::max<int>(header_.returns_per_shot, grids_[i]->records_per_shot);
     if (!shot_grid(header_.devices[i].type, device.data_type())) {
-      unknown.push_back({{},
-                         fmt::format("device {} has the unknown type {}; judging by the times of "
-                                     "its packets, it measures at {} kHz",
-                                     i, header_.devices[i].type, grids_[i]->beams > 1 ? 240 : 100),
-                         0});
+      unknown.push_back(
+          {kWarning.devices_unclear,
+           fmt::format("device {} has the unknown type {}; judging by the times of its packets, it "
+                       "measures at {} kHz",
+                       i, header_.devices[i].type, grids_[i]->beams > 1 ? 240 : 100)});
     }
   }
   rewind();
@@ -205,15 +205,15 @@ void LvxReader::open_frame() {
   if (position_ == file_.size()) {
     ended_ = true;
     if (frames_ == 0) {
-      warn({position_, {}}, "the file ends before its first frame");
+      warn(kWarning.cut_off, "the file ends before its first frame").place = {position_, {}};
     }
     return;
   }
   const std::uint64_t left = file_.size() - position_;
   if (left < version_.frame_header_bytes) {
-    warn({position_, {}},
-         fmt::format("cut off while recording: {} bytes are left, a frame header has {}", left,
-                     version_.frame_header_bytes));
+    warn(kWarning.cut_off, "cut off while recording: {} bytes are left, a frame header has {}",
+         left, version_.frame_header_bytes)
+        .place = {position_, {}};
     position_ = file_.size();
     ended_ = true;
     return;
@@ -249,7 +249,7 @@ void LvxReader::stop_at_cut(std::optional<std::size_t> records) {
   } else if (open_ended_) {
     message += fmt::format("; its frame was never closed (next offset {})", next_offset_);
   }
-  warn({position_, {}}, message, records.value_or(0));
+  warnings_.push_back({kWarning.cut_off, message, {position_, {}}, records.value_or(0)});
   position_ = file_.size();
   ended_ = true;
 }
@@ -258,7 +258,7 @@ void LvxReader::step_over(std::uint8_t data_type) {
   // One warning per data type, however long the recording is.
   const std::uint64_t frames = ++frames_stepped_over_[data_type];
   const auto [entry, is_new] = stepped_over_.try_emplace(data_type, warnings_.size());
-  if (is_new) warn({position_, {}}, {});
+  if (is_new) warnings_.push_back({kWarning.content_left_out, {}, {position_, {}}});
   warnings_[entry->second].message = fmt::format(
       "a packet has the unknown data type {}; the rest of {} was skipped", data_type,
       frames == 1 ? std::string("its frame") : fmt::format("its frame and of {} more", frames - 1));
@@ -281,8 +281,9 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
   // A frame that was never closed may still be followed by a whole one.
   if (open_ended_ && left >= version_.frame_header_bytes &&
       load<std::uint64_t>(bytes) == position_) {
-    warn({position_, {}},
-         fmt::format("the previous frame was never closed (next offset {})", next_offset_));
+    warn(kWarning.header_contradicted, "the previous frame was never closed (next offset {})",
+         next_offset_)
+        .place = {position_, {}};
     in_frame_ = false;
     return true;
   }

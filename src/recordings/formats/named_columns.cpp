@@ -213,7 +213,7 @@ void NamedColumns::look_at(std::span<const Decimal> cells) {
 }
 
 double NamedColumns::length_unit(std::initializer_list<Role> roles, RecordingHeader& header,
-                                 std::vector<std::string>& warnings) const {
+                                 std::vector<Warning>& warnings) const {
   std::optional<Unit> unit;
   std::size_t with_unit = 0;
   bool whole = true;
@@ -241,12 +241,12 @@ double NamedColumns::length_unit(std::initializer_list<Role> roles, RecordingHea
   header.length_unit_assumed = true;
   if (!whole || largest < kFewMetres) return 1.0;
   const bool large = largest > kMillimetres;
-  warnings.push_back(fmt::format(
-      "the columns {} have no unit and hold whole numbers up to {}: they were taken as "
-      "{}, so that the largest is {:.4g} m ({:.4g} m if they are centimetres); state the "
-      "unit in their names, as in {}_m, _cm or _mm",
-      names_of(roles), largest, large ? "millimetres" : "metres",
-      large ? largest / 1000.0 : largest, largest / 100.0, names_of({*roles.begin()})));
+  warn(warnings, kWarning.unit_guessed,
+       "the columns {} have no unit and hold whole numbers up to {}: they were taken as {}, so "
+       "that the largest is {:.4g} m ({:.4g} m if they are centimetres); state the unit in their "
+       "names, as in {}_m, _cm or _mm",
+       names_of(roles), largest, large ? "millimetres" : "metres",
+       large ? largest / 1000.0 : largest, largest / 100.0, names_of({*roles.begin()}));
   return large ? 1000.0 : 1.0;
 }
 
@@ -295,7 +295,7 @@ bool NamedColumns::is_shared_by_many(const Source& time) const {
 }
 
 int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
-                             std::vector<std::string>& warnings) const {
+                             std::vector<Warning>& warnings) const {
   const std::string name = printable(name_of(time));
   const auto extent_of_times = extent(time.samples);
   const double low = extent_of_times.first, high = extent_of_times.second;
@@ -315,10 +315,10 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
   constexpr double kShortest_ns = 1e3, kLongest_ns = 1e5;  // between shots; no other unit fits
   if (whole && step >= kShortest_ns && step <= kLongest_ns) {
     if (since_1970(9) && !gps) header.time_reference = TimeReference::utc;
-    warnings.push_back(
-        fmt::format("column {} was taken as nanoseconds, because it rises by {} from shot to shot; "
-                    "state the unit in its name, as in time_ns",
-                    name, step));
+    warn(warnings, kWarning.unit_guessed,
+         "column {} was taken as nanoseconds, because it rises by {} from shot to shot; state the "
+         "unit in its name, as in time_ns",
+         name, step);
     return 9;
   }
   constexpr double kLongest_s = 0.1;
@@ -328,9 +328,9 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
     if (!since_1970(shift) || step > kLongest_s * std::pow(10.0, shift)) continue;
     if (!gps) header.time_reference = TimeReference::utc;
     if (shift != 0) {
-      warnings.push_back(fmt::format(
-          "column {} was taken as {} since 1970; state the unit in its name, as in time_ns", name,
-          unit));
+      warn(warnings, kWarning.unit_guessed,
+           "column {} was taken as {} since 1970; state the unit in its name, as in time_ns", name,
+           unit);
     }
     return shift;
   }
@@ -344,7 +344,7 @@ int NamedColumns::time_shift(const Source& time, RecordingHeader& header,
                   name, step, high)};
 }
 
-void NamedColumns::settle_time(RecordingHeader& header, std::vector<std::string>& warnings) {
+void NamedColumns::settle_time(RecordingHeader& header, std::vector<Warning>& warnings) {
   const Source* chosen = nullptr;
   std::string shared;
   for (const Source& source : sources_) {
@@ -360,10 +360,10 @@ void NamedColumns::settle_time(RecordingHeader& header, std::vector<std::string>
     }
   }
   if (!shared.empty()) {
-    warnings.push_back(
-        fmt::format("column {} holds one time for many shots, that of their packet or frame, and "
-                    "no times of single shots{}",
-                    printable(shared), chosen != nullptr ? "" : ": the recording has no times"));
+    warn(warnings, kWarning.no_shot_times,
+         "column {} holds one time for many shots, that of their packet or frame, and no times of "
+         "single shots{}",
+         printable(shared), chosen != nullptr ? "" : ": the recording has no times");
   }
   header.has_times = chosen != nullptr;
   header.all_times_equal = header.all_times_equal && !header.has_times;
@@ -374,7 +374,7 @@ void NamedColumns::settle_time(RecordingHeader& header, std::vector<std::string>
   time_shift_ = time_shift(*chosen, header, warnings);
 }
 
-void NamedColumns::settle_index(std::vector<std::string>& warnings) {
+void NamedColumns::settle_index(std::vector<Warning>& warnings) {
   const Source* const index = find(Role::index);
   if (index == nullptr) return;
   double last = 0.0;
@@ -383,9 +383,9 @@ void NamedColumns::settle_index(std::vector<std::string>& warnings) {
       last = cell.value;
       continue;
     }
-    warnings.push_back(
-        fmt::format("column {} does not count shots: {} follows {}; rows were counted instead",
-                    printable(name_of(*index)), cell.value, last));
+    warn(warnings, kWarning.columns_unused,
+         "column {} does not count shots: {} follows {}; rows were counted instead",
+         printable(name_of(*index)), cell.value, last);
     cell_of_[static_cast<std::size_t>(Role::index)].reset();
     return;
   }
@@ -400,7 +400,7 @@ void NamedColumns::settle_returns(RecordingHeader& header) {
   header.returns_per_shot = static_cast<int>(std::clamp(high + return_offset_, 1.0, 255.0));
 }
 
-void NamedColumns::settle_intensity(RecordingHeader& header, std::vector<std::string>& warnings) {
+void NamedColumns::settle_intensity(RecordingHeader& header, std::vector<Warning>& warnings) {
   const Source* const intensity = find(Role::intensity);
   header.has_intensity = intensity != nullptr;
   if (intensity == nullptr) return;
@@ -409,17 +409,17 @@ void NamedColumns::settle_intensity(RecordingHeader& header, std::vector<std::st
   if (low < 0.0 || high > 255.0) {
     header.has_intensity = false;
     cell_of_[static_cast<std::size_t>(Role::intensity)].reset();
-    warnings.push_back(fmt::format(
-        "column {} holds {} to {}, expected intensities in [0, 255]; they were left out", name, low,
-        high));
+    warn(warnings, kWarning.columns_unused,
+         "column {} holds {} to {}, expected intensities in [0, 255]; they were left out", name,
+         low, high);
   } else if (high <= 1.0 && !all_whole(intensity->samples)) {
     intensity_factor_ = 255.0;
-    warnings.push_back(
-        fmt::format("column {} holds {} to {}: it was multiplied by 255", name, low, high));
+    warn(warnings, kWarning.values_changed, "column {} holds {} to {}: it was multiplied by 255",
+         name, low, high);
   }
 }
 
-void NamedColumns::settle(RecordingHeader& header, std::vector<std::string>& warnings) {
+void NamedColumns::settle(RecordingHeader& header, std::vector<Warning>& warnings) {
   for (const Source& source : sources_) {
     cell_of_[static_cast<std::size_t>(source.meaning.role)] = source.cell;
   }
@@ -450,7 +450,7 @@ void NamedColumns::settle(RecordingHeader& header, std::vector<std::string>& war
     for (const std::size_t column : unused_) {
       names += fmt::format("{}{}", names.empty() ? "" : ", ", columns_[column].name);
     }
-    warnings.push_back(fmt::format("columns that were not used: {}", printable(names)));
+    warn(warnings, kWarning.columns_unused, "columns that were not used: {}", printable(names));
   }
   for (Source& source : sources_) source.samples = {};
 }

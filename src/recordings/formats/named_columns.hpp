@@ -61,7 +61,7 @@ class NamedColumns {
   /// Decides units, rounding and what times are by the rows looked at, and completes the header.
   /// @param warnings  gets what was assumed and what is left out
   /// @throws BadColumns when a unit cannot be told
-  void settle(RecordingHeader& header, std::vector<std::string>& warnings);
+  void settle(RecordingHeader& header, std::vector<Warning>& warnings);
 
   /// Adds one row. @throws BadRow, leaving the rows as they were
   void append(std::span<const Decimal> cells, Observations& rows);
@@ -109,16 +109,15 @@ class NamedColumns {
   std::string names_of(std::initializer_list<Role> roles) const;
 
   double length_unit(std::initializer_list<Role> roles, RecordingHeader& header,
-                     std::vector<std::string>& warnings) const;
+                     std::vector<Warning>& warnings) const;
   double angle_unit(const Source& source) const;
   Rounding rounding(std::initializer_list<Role> roles) const;
-  void settle_time(RecordingHeader& header, std::vector<std::string>& warnings);
-  void settle_index(std::vector<std::string>& warnings);
+  void settle_time(RecordingHeader& header, std::vector<Warning>& warnings);
+  void settle_index(std::vector<Warning>& warnings);
   void settle_returns(RecordingHeader& header);
-  void settle_intensity(RecordingHeader& header, std::vector<std::string>& warnings);
+  void settle_intensity(RecordingHeader& header, std::vector<Warning>& warnings);
   bool is_shared_by_many(const Source& time) const;
-  int time_shift(const Source& time, RecordingHeader& header,
-                 std::vector<std::string>& warnings) const;
+  int time_shift(const Source& time, RecordingHeader& header, std::vector<Warning>& warnings) const;
 
   /// The cell of a role, nullptr where no column has it.
   const Decimal* cell(std::span<const Decimal> cells, Role role) const;

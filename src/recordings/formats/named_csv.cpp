@@ -186,9 +186,9 @@ std::optional<TableHead> find_head(std::string_view bytes) {
   head.layout.names = pts_names(first.size());
   if (!head.layout.names.empty()) {
     head.layout.names_line = head.layout.rows_line;
-    head.layout.warnings.push_back(
-        fmt::format("the columns have no names: behind a number of rows they were taken as {}",
-                    fmt::join(head.layout.names, ", ")));
+    warn(head.layout.warnings, kWarning.columns_guessed,
+         "the columns have no names: behind a number of rows they were taken as {}",
+         fmt::join(head.layout.names, ", "));
   }
   return head;
 }

@@ -30,8 +30,9 @@ NamedTextReader::NamedTextReader(const io::InputFile& file, std::string_view for
   } catch (const BadColumns& bad) {
     fail(layout_.names_line, bad.what());
   }
-  for (std::string& warning : layout_.warnings) {
-    warn({{}, layout_.names_line}, std::move(warning));
+  for (Warning& warning : layout_.warnings) {
+    warning.place.line = layout_.names_line;
+    warnings_.push_back(std::move(warning));
   }
 }
 

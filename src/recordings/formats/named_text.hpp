@@ -20,8 +20,8 @@ struct NamedTextLayout {
   char delimiter = kBlanks;
   std::uint64_t names_line = 1, first_row_line = 2;  ///< from 1
   std::optional<std::uint64_t> rows;                 ///< where the file tells their number
-  std::uint64_t rows_line = 0;        ///< where it does so and nothing may follow them, otherwise 0
-  std::vector<std::string> warnings;  ///< of what stands before the rows
+  std::uint64_t rows_line = 0;    ///< where it does so and nothing may follow them, otherwise 0
+  std::vector<Warning> warnings;  ///< of what stands before the rows
 };
 
 /// Reads rows of numbers whose columns have names.

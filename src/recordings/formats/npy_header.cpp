@@ -301,8 +301,8 @@ void add_table(const ArrayHeader& header, const OpenArray& open, BinaryTable& ta
       if (!name.empty()) others += (others.empty() ? "" : ", ") + name;
     }
     if (!others.empty()) {
-      table.warnings.push_back(
-          fmt::format("fields that do not hold numbers were left out: {}", printable(others)));
+      warn(table.warnings, kWarning.columns_unused,
+           "fields that do not hold numbers were left out: {}", printable(others));
     }
     return;
   }
@@ -310,9 +310,9 @@ void add_table(const ArrayHeader& header, const OpenArray& open, BinaryTable& ta
   const NumberType type = header.fields.front().type;
   const std::size_t columns = static_cast<std::size_t>(header.shape[1]);
   table.rows = header.shape[0];
-  table.warnings.push_back(
-      fmt::format("the columns of the array have no names: they were taken as x y z{}",
-                  columns == 4 ? " intensity" : ""));
+  warn(table.warnings, kWarning.columns_guessed,
+       "the columns of the array have no names: they were taken as x y z{}",
+       columns == 4 ? " intensity" : "");
   for (std::size_t i = 0; i < columns; ++i) {
     const std::size_t lane = header.fortran_order ? first_lane + i : first_lane;
     table.columns.push_back({kNames[i], type, lane, header.fortran_order ? 0 : i * type.bytes});

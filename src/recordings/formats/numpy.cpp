@@ -36,7 +36,8 @@ BinaryTable npy_table(const io::InputFile& file) {
     const std::uint64_t end = header.data_offset + header.elements() * header.element_bytes;
     const std::uint64_t size = file.size();
     if (size > end) {
-      table.warnings.push_back(fmt::format("{} bytes after the array were not read", size - end));
+      warn(table.warnings, kWarning.content_left_out, "{} bytes after the array were not read",
+           size - end);
     }
     return table;
   } catch (const BadArray& bad) {
@@ -163,8 +164,8 @@ BinaryTable npz_table(const io::InputFile& file) {
   if (!left_out.empty()) {
     std::string names;
     for (const std::string& name : left_out) names += (names.empty() ? "" : ", ") + name;
-    table.warnings.push_back(fmt::format(
-        "members that are not columns of {} rows were left out: {}", table.rows, printable(names)));
+    warn(table.warnings, kWarning.columns_unused,
+         "members that are not columns of {} rows were left out: {}", table.rows, printable(names));
   }
   return table;
 }

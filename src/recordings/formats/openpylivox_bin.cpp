@@ -145,10 +145,12 @@ class OpenpylivoxBinReader final : public Reader {
   void report_tail() {
     if (offset_ == input_.size() || tail_reported_) return;
     tail_reported_ = true;
-    warn({offset_, {}},
+    warnings_.push_back(
+        {kWarning.cut_off,
          fmt::format("the last record is cut off: expected {} bytes, found {}; it was left out",
                      parts_.bytes(), input_.size() - offset_),
-         1);
+         {offset_, {}},
+         1});
   }
 
   io::BlockInput input_;

@@ -277,8 +277,8 @@ void PcapReader::add_device(const Seen& seen) {
             ? fmt::format("its type is unknown, too: by its packets it measures at {} kHz",
                           grid && grid->beams == 1 ? 100 : 240)
             : fmt::format("by its packets it is a {}", device_type_name(device.type));
-    warn({}, fmt::format("device {} is {}: no broadcast names its serial number; {}", row,
-                         to_string(endpoints_[row]), type));
+    warn(kWarning.devices_unclear, "device {} is {}: no broadcast names its serial number; {}", row,
+         to_string(endpoints_[row]), type);
   }
 }
 
@@ -340,32 +340,34 @@ void PcapReader::say_what_is_missing() {
   for (std::size_t row = 0; row < live_.size(); ++row) {
     const PacketCounts& counts = live_[row].order.counts();
     if (counts.lost > 0) {
-      warn({}, fmt::format("{}: {} packets are missing between others", name_of(row), counts.lost));
+      warn(kWarning.shots_lost, "{}: {} packets are missing between others", name_of(row),
+           counts.lost);
     }
     if (counts.duplicates > 0) {
-      warn({}, fmt::format("{}: {} packets were captured twice; the second ones were left out",
-                           name_of(row), counts.duplicates));
+      warn(kWarning.content_left_out,
+           "{}: {} packets were captured twice; the second ones were left out", name_of(row),
+           counts.duplicates);
     }
     if (counts.rejected > 0) {
-      warn({}, fmt::format("{}: {} packets that no sensor sends were left out", name_of(row),
-                           counts.rejected));
+      warn(kWarning.content_left_out, "{}: {} packets that no sensor sends were left out",
+           name_of(row), counts.rejected);
     }
   }
   if (cut_ > 0) {
-    warn({},
-         fmt::format("{} packets were not captured whole, because only {} bytes of each were kept; "
-                     "capture whole packets, as tcpdump -s 0 does",
-                     cut_, file_.snap_length()),
-         cut_rows_);
+    warn(kWarning.shots_lost,
+         "{} packets were not captured whole, because only {} bytes of each were kept; capture "
+         "whole packets, as tcpdump -s 0 does",
+         cut_, file_.snap_length())
+        .lost_records = cut_rows_;
   }
   if (file_.fragments() > 0) {
-    warn({}, fmt::format("{} fragments of datagrams were left out; sensors send none",
-                         file_.fragments()));
+    warn(kWarning.content_left_out, "{} fragments of datagrams were left out; sensors send none",
+         file_.fragments());
   }
   if (strangers_ > 0) {
-    warn({},
-         fmt::format("{} packets were left out: of more than {} senders, or with impossible times",
-                     strangers_, kMostSenders));
+    warn(kWarning.content_left_out,
+         "{} packets were left out: of more than {} senders, or with impossible times", strangers_,
+         kMostSenders);
   }
 }
 

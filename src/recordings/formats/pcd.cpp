@@ -35,7 +35,7 @@ struct PcdHeader {
   std::string data;
   std::uint64_t fields_line = 1, fields_offset = 0;
   std::uint64_t data_line = 1, data_offset = 0;  ///< of what follows the header
-  std::vector<std::string> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// Gives each field its value of one line of the header.
@@ -96,10 +96,10 @@ PcdHeader read_pcd_header(const io::InputFile& file) {
               decimal_field(words[i], key).value == decimal_field(kIdentity[i - 1], key).value;
         }
         if (!identity) {
-          header.warnings.push_back(
-              fmt::format("the header states a pose of the sensor, \"{}\": it was ignored, and the "
-                          "points were taken to be in the frame of the sensor",
-                          printable(line)));
+          warn(header.warnings, kWarning.pose_unused,
+               "the header states a pose of the sensor, \"{}\": it was ignored, and the points "
+               "were taken to be in the frame of the sensor",
+               printable(line));
         }
       } else if (key == "DATA") {
         header.data = std::string(only_value());
@@ -126,9 +126,9 @@ PcdHeader read_pcd_header(const io::InputFile& file) {
   if (!width && !points) lines.fail("expected a POINTS or WIDTH line before DATA, found none");
   header.points = points.value_or(product);
   if (width && product != header.points) {
-    header.warnings.push_back(
-        fmt::format("the header has POINTS {} but WIDTH x HEIGHT = {}: POINTS was used",
-                    header.points, product));
+    warn(header.warnings, kWarning.header_contradicted,
+         "the header has POINTS {} but WIDTH x HEIGHT = {}: POINTS was used", header.points,
+         product);
   }
   return header;
 }
@@ -190,8 +190,8 @@ BinaryTable binary_table(const io::InputFile& input, PcdHeader header) {
     const std::uint64_t left = file_size - begin;
     if (point_bytes > 0 && header.points <= left / point_bytes &&
         left > header.points * point_bytes) {
-      table.warnings.push_back(fmt::format("{} bytes after the last point were not read",
-                                           left - header.points * point_bytes));
+      warn(table.warnings, kWarning.content_left_out, "{} bytes after the last point were not read",
+           left - header.points * point_bytes);
     }
     return table;
   }
@@ -210,9 +210,9 @@ BinaryTable binary_table(const io::InputFile& input, PcdHeader header) {
   }
   const std::uint64_t packed_begin = begin + kSizesBytes;
   if (packed_bytes > file_size - packed_begin) {
-    table.warnings.push_back(
-        fmt::format("expected {} bytes of compressed points, found {}: the file was cut off",
-                    packed_bytes, file_size - packed_begin));
+    warn(table.warnings, kWarning.cut_off,
+         "expected {} bytes of compressed points, found {}: the file was cut off", packed_bytes,
+         file_size - packed_begin);
   }
   for (std::size_t i = 0; i < header.fields.size(); ++i) {
     const std::uint64_t before = field_offsets[i] * header.points;

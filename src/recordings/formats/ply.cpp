@@ -266,7 +266,7 @@ BinaryTable binary_table(const io::InputFile& input, const PlyHeader& header) {
     table.lanes.push_back(
         {[=] { return std::make_unique<FileSource>(input, begin, UINT64_MAX); }, offset});
   } else {
-    table.warnings.push_back(fmt::format("lists of the vertices were not used: {}", lists));
+    warn(table.warnings, kWarning.columns_unused, "lists of the vertices were not used: {}", lists);
     table.lanes.push_back({[=, properties = vertices.properties] {
                              return std::make_unique<WithoutLists>(
                                  std::make_unique<FileSource>(input, begin, UINT64_MAX),

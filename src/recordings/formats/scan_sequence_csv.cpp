@@ -93,9 +93,9 @@ class ScanSequenceReader final : public TextTableReader {
     if (beyond_180) header_.set_detail(kAzimuthSense, "0-360");
     if (all_shot_numbers) {
       header_.has_times = false;
-      warn({{}, 2},
-           "column Time/s holds shot numbers instead of seconds; the time between shots is "
-           "unknown");
+      warn(kWarning.no_shot_times,
+           "column Time/s holds shot numbers instead of seconds; the time between shots is unknown")
+          .place.line = 2;
     }
   }
 

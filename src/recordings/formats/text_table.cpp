@@ -31,7 +31,7 @@ TextTableReader::TextTableReader(const io::InputFile& file, std::string format)
   if (!lines_.next(line)) fail(1, "expected a header line, found an empty file");
   table_header_ = normalized_header(line);
   if (!lines_.has_line_end()) {
-    warn({{}, 1}, "the file ends within its header line; it holds no rows");
+    warn(kWarning.cut_off, "the file ends within its header line; it holds no rows").place.line = 1;
   }
 }
 
@@ -115,11 +115,12 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
       const int decimals = all_fields ? decimals_of(fields_.back()) : 0;
       if (!lines_.has_line_end() &&
           !(all_fields && decimals > 0 && decimals == last_field_decimals_)) {
-        warn({{}, lines_.line_number()},
-             fmt::format(
+        Warning& warning =
+            warn(kWarning.cut_off,
                  "the last line has no line end and may be cut off (\"{}\"); it was left out",
-                 printable(line)),
-             rows_left_.value_or(1));
+                 printable(line));
+        warning.place.line = lines_.line_number();
+        warning.lost_records = rows_left_.value_or(1);
         finished_ = true;
         break;
       }

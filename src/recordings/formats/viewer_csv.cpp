@@ -200,12 +200,12 @@ class ViewerCsvReader final : public TextTableReader {
     if (sensor.rows < sensor.rows_expected && !short_packet_reported_) {
       short_packet_reported_ = true;
       warnings_.push_back(
-          {{{}, line_number()},
+          {kWarning.packets_incomplete,
            fmt::format("the previous packet has {} of {} points; where points are missing in a "
                        "packet, the times of those after them are too early",
                        sensor.rows, sensor.rows_expected),
-           sensor.rows_expected - sensor.rows,
-           true});
+           {{}, line_number()},
+           sensor.rows_expected - sensor.rows});
     }
     Packet packet;
     // The table has nanoseconds also where the packet had a date.

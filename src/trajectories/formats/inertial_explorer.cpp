@@ -133,7 +133,7 @@ struct ExplorerHeader {
   std::uint64_t names_line = 0;
   /// By what standard deviations were multiplied.
   double position_scale = 1, attitude_scale = 1;
-  std::vector<TrajectoryWarning> warnings;
+  std::vector<Warning> warnings;
 };
 
 /// The factor behind "Position:", 1 for "No scaling".
@@ -172,17 +172,19 @@ ExplorerHeader read_explorer_header(const std::string& path) {
     if (in_scaling && (position || attitude)) {
       const auto scale = scaling_of(text);
       if (!scale) {
-        header.warnings.push_back({{{}, lines.line_number()},
+        header.warnings.push_back({kWarning.unit_guessed,
                                    fmt::format("\"{}\" is not a known scaling of standard "
                                                "deviations: they are taken as one sigma",
-                                               io::printable(text))});
+                                               io::printable(text)),
+                                   {{}, lines.line_number()}});
       } else {
         (position ? header.position_scale : header.attitude_scale) = *scale;
         if (*scale != 1) {
-          header.warnings.push_back({{{}, lines.line_number()},
+          header.warnings.push_back({kWarning.values_changed,
                                      fmt::format("standard deviations of the {} were written {:g} "
                                                  "times as large: they are divided by that",
-                                                 position ? "position" : "attitude", *scale)});
+                                                 position ? "position" : "attitude", *scale),
+                                     {{}, lines.line_number()}});
         }
       }
     }

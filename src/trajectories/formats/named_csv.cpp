@@ -277,7 +277,7 @@ void refuse_ambiguous(const std::string& path, const std::vector<PoseColumn>& co
 
 /// Columns by a header. @throws FileError at its line
 PoseTable csv_table(const std::string& path, std::string_view header,
-                    std::vector<TrajectoryWarning>& warnings) {
+                    std::vector<Warning>& warnings) {
   const auto refuse = [&](const std::string& problem) { throw FileError(path, {{}, 1}, problem); };
   PoseTable table;
   table.first_row = 2;
@@ -365,13 +365,15 @@ PoseTable csv_table(const std::string& path, std::string_view header,
   }
   take_contents(table, warnings);
   for (const std::string& name : unknown) {
-    warnings.push_back({{{}, 1}, fmt::format("column {} was ignored", io::printable(name))});
+    warnings.push_back({kWarning.columns_unused,
+                        fmt::format("column {} was ignored", io::printable(name)),
+                        {{}, 1}});
   }
   return table;
 }
 
 Trajectory read_trajectory_csv(const std::string& path, const Progress& progress) {
-  std::vector<TrajectoryWarning> warnings;
+  std::vector<Warning> warnings;
   PoseTable table;
   {
     io::LineReader lines(path, io::LinesOf::table);

@@ -56,22 +56,23 @@ TimeScale scale_by_size(const std::vector<std::int64_t>& ascending) {
   return fits ? TimeScale::utc_unix : TimeScale::unknown;
 }
 
-std::vector<TrajectoryWarning> order_warnings(
-    const TimeOrder& told, std::size_t records,
-    const std::function<FilePlace(std::size_t)>& place_of) {
-  std::vector<TrajectoryWarning> warnings;
+std::vector<Warning> order_warnings(const TimeOrder& told, std::size_t records,
+                                    const std::function<FilePlace(std::size_t)>& place_of) {
+  std::vector<Warning> warnings;
   if (told.moved > 0) {
     warnings.push_back(
-        {place_of(told.largest_back_at),
+        {kWarning.rows_sorted,
          fmt::format("records that come after later ones: {} of {}, by up to {:.6f} s; all were "
                      "sorted by time",
-                     told.moved, records, 1e-9 * static_cast<double>(told.largest_back_ns))});
+                     told.moved, records, 1e-9 * static_cast<double>(told.largest_back_ns)),
+         place_of(told.largest_back_at)});
   }
   if (told.repeated > 0) {
     warnings.push_back(
-        {place_of(told.repeated_at),
+        {kWarning.content_left_out,
          fmt::format("records that repeat the time of an earlier one: {}; they were left out",
-                     told.repeated)});
+                     told.repeated),
+         place_of(told.repeated_at)});
   }
   return warnings;
 }
@@ -155,10 +156,6 @@ void PoseRows::add(const PoseRow& row, const FilePlace& place) {
   places_.push_back(place);
 }
 
-void PoseRows::warn(const FilePlace& place, std::string message) {
-  trajectory_.warnings.push_back({place, std::move(message)});
-}
-
 void PoseRows::refuse(std::size_t row, const FilePlace& place, const std::string& problem) const {
   const bool placed = place.line || place.byte_offset;
   throw FileError(path_, place, placed ? problem : fmt::format("record {}: {}", row + 1, problem));
@@ -170,10 +167,10 @@ void PoseRows::make_times_run_on() {
   const int crossings = unwrap_times(trajectory_.time_ns, *period);
   trajectory_.week_crossings = crossings;
   if (crossings == 0) return;
-  warn({},
-       fmt::format("{} ends within the trajectory: times were continued beyond it",
-                   contents_.time_scale == TimeScale::gps_second_of_week ? "the GPS week (604800 s)"
-                                                                         : "the day (86400 s)"));
+  warn(warnings(), kWarning.clock_wrapped,
+       "{} ends within the trajectory: times were continued beyond it",
+       contents_.time_scale == TimeScale::gps_second_of_week ? "the GPS week (604800 s)"
+                                                             : "the day (86400 s)");
 }
 
 void PoseRows::put_in_order() {
@@ -189,9 +186,7 @@ void PoseRows::put_in_order() {
   }
   if (order.rows.empty()) return;
   const auto place_of = [this](std::size_t row) { return places_[row]; };
-  for (TrajectoryWarning& one : order_warnings(told, trajectory_.size(), place_of)) {
-    warn(one.place, std::move(one.message));
-  }
+  append(warnings(), order_warnings(told, trajectory_.size(), place_of));
   reorder(wander_, order.rows);
   static_cast<void>(order_by_time(trajectory_));
 }

@@ -48,7 +48,7 @@ class PoseRows {
   /// @throws FileError for values that no platform has
   void add(const PoseRow& row, const FilePlace& place);
 
-  void warn(const FilePlace& place, std::string message);
+  std::vector<Warning>& warnings() { return trajectory_.warnings; }
   std::size_t size() const { return trajectory_.size(); }
 
   /// Times that ran on beyond the end of the week or day; records in the order of their times;
@@ -71,9 +71,8 @@ class PoseRows {
 
 /// What is to be said of records that were put in order.
 /// @param place_of  of a record, by its number from 0
-std::vector<TrajectoryWarning> order_warnings(
-    const TimeOrder& told, std::size_t records,
-    const std::function<FilePlace(std::size_t)>& place_of);
+std::vector<Warning> order_warnings(const TimeOrder& told, std::size_t records,
+                                    const std::function<FilePlace(std::size_t)>& place_of);
 
 /// Seconds after which a scale of time begins again; nothing where it never does.
 std::optional<std::int64_t> period_ns(TimeScale scale);

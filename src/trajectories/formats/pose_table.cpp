@@ -213,7 +213,7 @@ bool is_angle(PoseField field) {
 
 bool is_angle_sigma(PoseField field) { return field >= PoseField::sigma_roll; }
 
-void take_contents(PoseTable& table, std::vector<TrajectoryWarning>& warnings) {
+void take_contents(PoseTable& table, std::vector<Warning>& warnings) {
   // A quantity counts when all its columns are there.
   const auto whole = [&](std::initializer_list<PoseField> fields, const char* what) {
     std::vector<std::string> there;
@@ -229,9 +229,8 @@ void take_contents(PoseTable& table, std::vector<TrajectoryWarning>& warnings) {
       }
     }
     if (!there.empty()) {
-      warnings.push_back({{},
-                          fmt::format("{} are incomplete (only {}) and were left out", what,
-                                      fmt::join(there, ", "))});
+      warn(warnings, kWarning.columns_unused, "{} are incomplete (only {}) and were left out", what,
+           fmt::join(there, ", "));
     }
     return false;
   };
@@ -258,14 +257,13 @@ std::vector<std::string_view> lines_of(std::string_view head) {
 }
 
 Trajectory read_pose_table(const std::string& path, const PoseTable& table,
-                           const Progress& progress,
-                           const std::vector<TrajectoryWarning>& warnings) {
+                           const Progress& progress, const std::vector<Warning>& warnings) {
   io::LineReader lines(path, io::LinesOf::table);
   std::string_view line;
   while (lines.line_number() + 1 < table.first_row && lines.next(line)) {
   }
   PoseRows rows(path, table.contents);
-  for (const TrajectoryWarning& warning : warnings) rows.warn(warning.place, warning.message);
+  append(rows.warnings(), warnings);
   RowReader reader(table);
   std::vector<std::string_view> fields(fields_in_line(table.columns));
   std::optional<std::uint64_t> empty_line;
@@ -295,13 +293,15 @@ Trajectory read_pose_table(const std::string& path, const PoseTable& table,
     }
     const bool footer = table.has_footer && empty_line && !row;
     if (footer) {
-      rows.warn(place, "text after the records was not read");
+      warn(rows.warnings(), kWarning.content_left_out, "text after the records was not read")
+          .place = place;
       break;
     }
     const bool cut = !lines.has_line_end() &&
                      (!row || (rows.size() > 0 && decimals_in(fields.back()) != last_decimals));
     if (cut) {
-      rows.warn(place, "the last line is cut off and was left out");
+      warn(rows.warnings(), kWarning.cut_off, "the last line is cut off and was left out").place =
+          place;
       break;
     }
     if (!problem.empty()) throw FileError(path, place, problem);

@@ -81,8 +81,7 @@ struct PoseTable {
 /// Reads the rows of a table. A last line that is cut off is left out with a warning.
 /// @throws FileError at the line that is no row or holds what no platform does; Cancelled
 Trajectory read_pose_table(const std::string& path, const PoseTable& table,
-                           const Progress& progress,
-                           const std::vector<TrajectoryWarning>& warnings = {});
+                           const Progress& progress, const std::vector<Warning>& warnings = {});
 
 /// Which fields the columns have; RowContents::has_velocity and so on follow from it.
 bool has_field(const std::vector<PoseColumn>& columns, PoseField field);
@@ -98,6 +97,6 @@ bool is_angle_sigma(PoseField field);
 
 /// Sets what the columns hold in the table's contents. Velocities and accuracies that are there in
 /// part are left out with a warning.
-void take_contents(PoseTable& table, std::vector<TrajectoryWarning>& warnings);
+void take_contents(PoseTable& table, std::vector<Warning>& warnings);
 
 }  // namespace risley::trajectories

@@ -89,7 +89,7 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
     }
     break;
   }
-  std::vector<TrajectoryWarning> warnings;
+  std::vector<Warning> warnings;
   // "(time in Sec, ..., orientation angles and SD in Degrees, ...)"
   bool degrees = false, arc_minutes = false;
   for (const std::string_view clause : io::fields_of(units, ',')) {
@@ -99,9 +99,10 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
     degrees = degrees || has("deg");
   }
   if (!degrees && !arc_minutes) {
-    warnings.push_back({{{}, table.first_row - 1},
+    warnings.push_back({kWarning.unit_guessed,
                         "the unit of the standard deviations of roll, pitch and heading is not "
-                        "stated: degrees are assumed"});
+                        "stated: degrees are assumed",
+                        {{}, table.first_row - 1}});
   }
   const std::uint64_t names_line = table.first_row - 1;
   const bool heights = names.find("ELLIPSOID HEIGHT") != names.npos;

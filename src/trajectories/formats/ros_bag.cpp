@@ -178,14 +178,13 @@ Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
   PoseRows rows(path, contents);
   const auto warn_of_part = [&](std::size_t without, const char* what) {
     if (without == 0 || without == all.rows.size()) return;
-    rows.warn(
-        {}, fmt::format(
-                "{} of {} messages of topic {} state no {}; they were left out for the others, too",
-                without, all.rows.size(), topic.name, what));
+    warn(rows.warnings(), kWarning.columns_unused,
+         "{} of {} messages of topic {} state no {}; they were left out for the others, too",
+         without, all.rows.size(), topic.name, what);
   };
   warn_of_part(all.without_accuracy, "accuracies of position and attitude");
   warn_of_part(all.without_velocity, "velocities");
-  for (const bags::BagWarning& one : bag->warnings()) rows.warn(one.place, one.message);
+  append(rows.warnings(), bag->warnings());
   for (const PoseRow& row : all.rows) rows.add(row, {});
   Trajectory trajectory = rows.finish();
   trajectory.time_scale = scale_by_size(trajectory.time_ns);

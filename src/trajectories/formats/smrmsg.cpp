@@ -101,16 +101,14 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
     for (std::int64_t& time : records.time_ns) {
       if (time < week / 2) time += week;
     }
-    records.warnings.push_back(
-        {{}, "the GPS week (604800 s) ends within the accuracies: times were continued beyond it"});
+    warn(records.warnings, kWarning.clock_wrapped,
+         "the GPS week (604800 s) ends within the accuracies: times were continued beyond it");
   }
   const RowOrder order = row_order(records.time_ns);
   const auto place_of = [](std::size_t row) {
     return FilePlace{static_cast<std::uint64_t>(row) * kSmrmsgRecord, {}};
   };
-  for (TrajectoryWarning& warning : order_warnings(order.told, records.time_ns.size(), place_of)) {
-    records.warnings.push_back(std::move(warning));
-  }
+  append(records.warnings, order_warnings(order.told, records.time_ns.size(), place_of));
   if (!order.rows.empty()) {
     reorder(records.accuracy, order.rows);
     reorder(records.velocity, order.rows);

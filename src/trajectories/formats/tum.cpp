@@ -6,8 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
@@ -105,12 +103,11 @@ void check_order(Trajectory& trajectory) {
   const auto tilt_deg = [](double cosine) {
     return degrees_from_radians(std::acos(std::clamp(cosine, -1.0, 1.0)));
   };
-  trajectory.warnings.push_back(
-      {{},
-       fmt::format("the quaternions were read as qx qy qz qw, and so the body is tilted by {:.0f} "
-                   "deg; as qw qx qy qz by {:.0f} deg: if that is their order, state it in a first "
-                   "line \"# time x y z qw qx qy qz\"",
-                   tilt_deg(as_read), tilt_deg(otherwise))});
+  warn(trajectory.warnings, kWarning.columns_guessed,
+       "the quaternions were read as qx qy qz qw, and so the body is tilted by {:.0f} deg; as qw "
+       "qx qy qz by {:.0f} deg: if that is their order, state it in a first line \"# time x y z qw "
+       "qx qy qz\"",
+       tilt_deg(as_read), tilt_deg(otherwise));
 }
 
 Trajectory read_tum(const std::string& path, const Progress& progress) {
