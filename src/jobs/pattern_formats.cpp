@@ -30,12 +30,15 @@ void append_number(std::string& text, double value) {
   if (text.back() == '.') text.pop_back();
 }
 
-std::string csv_rows(const sensors::ScanPattern& pattern) {
+/// @param all_around  azimuths from 0 to 360 degrees, as the manufacturer's file of the Mid-360 has
+///                    them, instead of -180 to 180
+std::string csv_rows(const sensors::ScanPattern& pattern, bool all_around) {
   std::string text;
   for (std::size_t i = 0; i < pattern.size(); ++i) {
     append_number(text, pattern.time[i]);
     text += ',';
-    append_number(text, degrees_from_radians(pattern.azimuth[i]));
+    const double azimuth = pattern.azimuth[i];
+    append_number(text, degrees_from_radians(all_around ? wrap_to_two_pi(azimuth) : azimuth));
     text += ',';
     append_number(text, degrees_from_radians(pattern.zenith[i]));
     text += '\n';
@@ -77,7 +80,8 @@ void PatternStream::put_rows(const std::function<std::string(const sensors::Scan
 
 void put_livox_csv(PatternStream& out) {
   out.put("Time,Azimuth,Zenith\n");
-  out.put_rows(csv_rows);
+  const bool all_around = out.sensor().train.layout().axis_up;
+  out.put_rows([all_around](const auto& pattern) { return csv_rows(pattern, all_around); });
 }
 
 void put_npy(PatternStream& out) {
