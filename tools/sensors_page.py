@@ -96,7 +96,7 @@ def picture(risley, preset, emitters):
         line = points[emitter::emitters][::thin]
         steps = np.diff(line, axis=0)
         if around:  # steps of a thinned scan go right around
-            path = "".join(f"M{a} {b}h1" for a, b in line)
+            path = "".join(f"M{a} {b}h0" for a, b in line)
         else:
             path = f"M{line[0][0]} {line[0][1]}l" + " ".join(f"{a} {b}" for a, b in steps)
         lines.append(f'<path d="{path.replace(" -", "-")}" stroke="{COLOURS[emitter]}"/>')
@@ -104,10 +104,12 @@ def picture(risley, preset, emitters):
     bar = 10 if degrees > 12 else 2
     length = round(fine * SIDE * bar / (2 * degrees))
     size = fine * SIDE
+    caps = ' stroke-linecap="round"' if around else ""
     text = (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size} {size}" width="{SIDE}" '
             f'height="{SIDE}" role="img"><title>{preset}: {DURATION} s</title>'
             f'<rect width="{size}" height="{size}" fill="#fff"/>'
-            f'<g fill="none" stroke-width="{6 if around else 3}" stroke-opacity="0.75">{"".join(lines)}</g>'
+            f'<g fill="none" stroke-width="{9 if around else 3}" stroke-opacity="0.75"'
+            f'{caps}>{"".join(lines)}</g>'
             f'<path d="M40 {size - 40}h{length}" stroke="#1b1f24" stroke-width="6"/>'
             f'<text x="40" y="{size - 60}" font-family="sans-serif" font-size="56" fill="#1b1f24">'
             f'{bar}°</text></svg>\n')
