@@ -260,7 +260,9 @@ void read_geometry(const YamlMap& root, Sensor& sensor) {
     const auto take = [&](const std::string& name) {
       const bool none = sensor.train.layout().reflects();  // beams start at the origin
       const Quantity quantity = read_quantity(map, name, "m", sensor, none ? 0 : kThinnest,
-                                              none ? 0 : is_thickness ? kThickest : kWidest);
+                                              none           ? 0
+                                              : is_thickness ? kThickest
+                                                             : kWidest);
       values.push_back(static_cast<double>(quantity.value));
       read.push_back(name);
     };

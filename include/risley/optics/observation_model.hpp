@@ -269,8 +269,8 @@ PreparedTrain<T, N> prepare(const std::array<T, parameter_count(N)>& parameters,
 /// passes, in the train's frame.
 template <ModelScalar T, TrainLayout N>
 struct Trace {
-  static constexpr std::size_t kSurfaces = N.surfaces();
-  std::array<T, N> sine, cosine;       ///< of the rotation angles
+  static constexpr std::size_t kSurfaces = N.surfaces();  ///< of all elements
+  std::array<T, N> sine, cosine;                          ///< of the rotation angles
   std::array<Vector3<T>, N + 1> beam;  ///< before each element and behind the last, unit vectors
   std::array<Vector3<T>, N> inside;    ///< behind each element's first face: trace_forward()
   std::array<Vector3<T>, kSurfaces> normal;  ///< of the surfaces, unit vectors

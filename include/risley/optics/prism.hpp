@@ -51,6 +51,7 @@ struct TrainLayout {
   // NOLINTNEXTLINE(google-explicit-constructor)
   [[gnu::always_inline]] constexpr operator int() const { return elements; }
 
+  /// Whether an element reflects.
   [[gnu::always_inline]] constexpr bool is_reflector(std::size_t element) const {
     return kind[element] == ElementKind::reflector;
   }
@@ -62,6 +63,7 @@ struct TrainLayout {
   [[gnu::always_inline]] constexpr std::size_t surfaces() const {
     return 2 * static_cast<std::size_t>(elements) + (reflects() ? 1 : 0);
   }
+  /// Of one element.
   [[gnu::always_inline]] constexpr std::size_t surfaces(std::size_t element) const {
     return is_reflector(element) ? 3 : 2;
   }
