@@ -24,10 +24,9 @@ Json page_of(TrainShape shape, const std::vector<jobs::ReadRecording>& recording
     list.push_back({{"name", file_name(one.path)}});
     list.back().update(json::of(one));
   }
-  return {{"prisms", int{shape.prisms}},
-          {"reflects", shape.prisms.reflects()},
-          {"emitters", shape.emitters},
-          {"recordings", list}};
+  Json page{{"prisms", int{shape.prisms}}, {"emitters", shape.emitters}, {"recordings", list}};
+  if (shape.prisms.reflects()) page["reflects"] = true;
+  return page;
 }
 
 Json correlation_json(const std::vector<std::string>& names, const Eigen::MatrixXd& covariance) {
@@ -51,7 +50,7 @@ Json correlation_json(const std::vector<estimation::FreeParameter>& free,
 
 TrainShape shape_of(const View& report) {
   const View page = report["page"];
-  const TrainLayout layout = page["reflects"].flag()
+  const TrainLayout layout = page.has("reflects")
                                  ? kWedgeAndReflector
                                  : TrainLayout(static_cast<int>(page["prisms"].count()));
   return {layout, static_cast<int>(page["emitters"].count())};
