@@ -66,6 +66,7 @@ std::vector<FaceOrder> parse_face_order(std::string_view text) {
 
 std::string to_string(const std::vector<FaceOrder>& face_order) {
   std::vector<std::string_view> words;
+  words.reserve(face_order.size());
   for (const FaceOrder order : face_order) {
     words.push_back(std::ranges::find(kNamedOrders, order, &NamedOrder::order)->name);
   }
