@@ -217,10 +217,11 @@ std::string wide_words(const recordings::DirectionSpread& spread) {
     const char* name;
     double azimuth_deg, zenith_deg;
     double least;  ///< share of the azimuths that is rarely behind something
+    const char* why_not;
   };
-  // Of the second generation, whose scans no built-in preset describes.
-  static constexpr std::array kWide{Wide{"Mid-360", 360.0, 59.0, 0.35},
-                                    Wide{"HAP", 120.0, 25.0, 0.8}};
+  static constexpr std::array kWide{
+      Wide{"Mid-360", 360.0, 59.0, 0.35, "of which the file does not say which emitter fired"},
+      Wide{"HAP", 120.0, 25.0, 0.8, "for which there is no built-in preset"}};
   constexpr double kMore_deg = 3.0, kLeastZenith = 0.7;
   const double azimuth_deg = degrees_from_radians(spread.azimuth_to - spread.azimuth_from),
                zenith_deg = degrees_from_radians(spread.zenith_to - spread.zenith_from);
@@ -232,8 +233,8 @@ std::string wide_words(const recordings::DirectionSpread& spread) {
         !fits(zenith_deg, wide.zenith_deg, kLeastZenith)) {
       continue;
     }
-    return fmt::format("those of a {} ({:.0f} x {:.0f} deg), for which there is no built-in preset",
-                       wide.name, wide.azimuth_deg, wide.zenith_deg);
+    return fmt::format("those of a {} ({:.0f} x {:.0f} deg), {}", wide.name, wide.azimuth_deg,
+                       wide.zenith_deg, wide.why_not);
   }
   return "merged clouds of several sensors: record or export each of them by itself";
 }
@@ -255,7 +256,10 @@ std::string too_near_words(const AngleSeries& shots, const Sensor& sensor) {
 }
 
 /// Says why no sensor can have made the shots, where that is so.
-std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> candidates) {
+/// @param names_emitters  whether the file says which emitter fired; without it, the rotors of a
+///                        sensor that sees all around are not found
+std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> candidates,
+                             bool names_emitters) {
   if (shots.size() < recordings::kFewestJudged) return {};
   const double radius = recordings::cone_radius(shots.azimuth, shots.zenith);
   if (const auto problem = recordings::not_a_scan(radius, shots.size(), shots.range)) {
@@ -263,6 +267,7 @@ std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> c
   }
   double widest = 0;
   for (const Sensor& sensor : candidates) {
+    if (candidates.size() > 1 && sensor.train.layout().axis_up && !names_emitters) continue;
     if (!(sensor.field_of_view > 0)) return {};
     widest = std::max(widest, sensor.field_of_view);
   }
@@ -284,7 +289,7 @@ bool are_possible(const FirstShots& shots, std::span<const Sensor> candidates,
   if (shots.beams == BeamSource::recorded) {
     for (const std::uint8_t beam : shots.head.beam) choice.lines = std::max(choice.lines, beam + 1);
   }
-  choice.impossible = impossible_words(shots.head, candidates);
+  choice.impossible = impossible_words(shots.head, candidates, choice.lines > 1);
   if (choice.impossible.empty()) return true;
   choice.chosen_by = ChosenBy::guess;
   choice.fits = false;

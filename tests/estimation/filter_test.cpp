@@ -282,7 +282,7 @@ void compare(const Case& c) {
 /// Everything by which a train can be off, each prism for itself.
 std::vector<std::string> every_parameter(const std::string& face_order, int emitters) {
   std::vector<std::string> names;
-  const TrainShape shape{static_cast<int>(parse_face_order(face_order).size()), emitters};
+  const TrainShape shape{layout_of(parse_face_order(face_order)), emitters};
   for (const ParameterInfo& info : parameter_list(shape)) {
     if (info.kind == ParameterKind::train && info.places.size() == 1) names.push_back(info.name);
   }
