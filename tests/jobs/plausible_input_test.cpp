@@ -61,13 +61,13 @@ TEST(PlausibleInput, MapCoordinatesAreOfNoSensor) {
   }
 }
 
-/// Shots all around, between two elevations, of four lines in turn.
+/// Shots all around, between two elevations, of emitters that are not named.
 std::string all_around(double low_deg, double high_deg) {
-  std::string text = "time_s,azimuth_deg,elevation_deg,range_m,line\n";
+  std::string text = "time_s,azimuth_deg,elevation_deg,range_m\n";
   for (int i = 0; i < 20'000; ++i) {
-    text += fmt::format("{:.6f},{:.3f},{:.3f},5.000,{}\n", 5e-6 * i,
+    text += fmt::format("{:.6f},{:.3f},{:.3f},5.000\n", 5e-6 * i,
                         std::fmod(0.0187 * i * 4.1, 360.0) - 180.0,
-                        low_deg + (high_deg - low_deg) * (0.5 + 0.5 * std::sin(0.0063 * i)), i % 4);
+                        low_deg + (high_deg - low_deg) * (0.5 + 0.5 * std::sin(0.0063 * i)));
   }
   return text;
 }
