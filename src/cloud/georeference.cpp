@@ -317,8 +317,8 @@ std::vector<Warning> Georeference::warnings() const {
   std::vector<Warning> warnings;
   if (!s.errors) {
     warn(warnings, kWarning.taken_as_exact,
-         "nobody says how wrong the trajectory may be: covariances hold the sensor's and the "
-         "mount's part alone");
+         "the trajectory states no accuracy: covariances hold the sensor's and the mount's part "
+         "alone");
   }
   if (!s.clock_known) {
     warn(warnings, kWarning.clock_unknown,

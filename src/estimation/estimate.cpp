@@ -217,9 +217,8 @@ std::string frame_words(const Estimate& estimate) {
   };
   return fmt::format(
       "the recording's frame is not the sensor's: it is turned by {} in {} and {} in {}{}; a "
-      "turn about the axis of rotation cannot be told from the zeros of the rotation angles and "
-      "was "
-      "taken as 0",
+      "turn about the axis of rotation has the same effect as other zeros of the rotation angles "
+      "and was taken as 0",
       angle(frame.turn.yaw, frame.covariance(0, 0)), frame.turn.axis_up ? "pitch" : "yaw",
       angle(frame.turn.pitch, frame.covariance(1, 1)), frame.turn.axis_up ? "roll" : "pitch",
       has_sigma ? "" : " (held at what the start found)");

@@ -201,9 +201,9 @@ class LineMatcher {
   bool any_axis_up() const { return any_axis_up_; }
 
   /// Tries candidates in a frame.
-  /// @param search  in the shots, turned back by the frame
-  /// @param frame   of the train, whose X is the axis of rotation
-  /// @param which   those whose axis is the sensor's Z, or its X, or all
+  /// @param search   in the shots, turned back by the frame
+  /// @param frame    of the train, whose X is the axis of rotation
+  /// @param axis_up  only sensors that turn about their Z (true) or X (false); empty: all
   /// @return the axis of the best one there
   /// @param[in,out] known  lines near some speeds
   Complex try_frame(const LineSearch& search, const Eigen::Matrix3d& frame,

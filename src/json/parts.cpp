@@ -30,12 +30,15 @@ Json value_json(double value, double sigma) {
 
 Json frame_json(const std::optional<estimation::FrameEstimate>& turn) {
   const estimation::FrameEstimate frame = turn.value_or(estimation::FrameEstimate{});
-  const bool up = frame.turn.axis_up;
-  return {
-      {up ? "pitch_deg" : "yaw_deg", value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)))},
-      {up ? "roll_deg" : "pitch_deg",
-       value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)))},
-      {"estimated", turn.has_value()}};
+  const Json first = value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)));
+  const Json second = value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)));
+  Json json{{"yaw_deg", first}, {"pitch_deg", second}, {"estimated", turn.has_value()}};
+  if (frame.turn.axis_up) {  // turns about the sensor's Y and X; about its Z it is not turned
+    json["yaw_deg"] = value_json(0, 0);
+    json["pitch_deg"] = first;
+    json["roll_deg"] = second;
+  }
+  return json;
 }
 
 Json slips_json(const std::vector<recordings::ShotSlip>& slips) {

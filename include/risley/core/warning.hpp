@@ -68,7 +68,7 @@ struct Warning {
   WarningCode code;
   std::string message;
   FilePlace place = {};            ///< of the file that was read, where there is one
-  std::uint64_t lost_records = 0;  ///< that are known to be lost; 0: none, or nobody knows
+  std::uint64_t lost_records = 0;  ///< known to be lost; 0 also where the number is unknown
 };
 
 /// Adds a warning, in words that fmt makes. @return it, valid until the next one
