@@ -68,6 +68,7 @@ class Value(Fields):
 class Frame(Fields):
     yaw_deg: Value
     pitch_deg: Value
+    roll_deg: Value
     estimated: bool
 
 class Slip(Fields):

@@ -210,6 +210,7 @@ std::string unusual_values(const Estimate& estimate, const sensors::Sensor& nomi
 std::string frame_words(const Estimate& estimate) {
   const FrameEstimate& frame = *estimate.frame_turn;
   const bool has_sigma = frame.covariance(0, 0) > 0;
+  const auto [first, second] = turn_names(frame.turn.axis_up);
   const auto angle = [&](double value, double variance) {
     return has_sigma ? fmt::format("{:.3f} ± {:.3f} deg", degrees_from_radians(value),
                                    degrees_from_radians(std::sqrt(variance)))
@@ -219,8 +220,8 @@ std::string frame_words(const Estimate& estimate) {
       "the recording's frame is not the sensor's: it is turned by {} in {} and {} in {}{}; a "
       "turn about the axis of rotation has the same effect as other zeros of the rotation angles "
       "and was taken as 0",
-      angle(frame.turn.yaw, frame.covariance(0, 0)), frame.turn.axis_up ? "pitch" : "yaw",
-      angle(frame.turn.pitch, frame.covariance(1, 1)), frame.turn.axis_up ? "roll" : "pitch",
+      angle(frame.turn.yaw, frame.covariance(0, 0)), first,
+      angle(frame.turn.pitch, frame.covariance(1, 1)), second,
       has_sigma ? "" : " (held at what the start found)");
 }
 

@@ -12,6 +12,11 @@
 
 namespace risley::estimation {
 
+std::array<std::string, 2> turn_names(bool axis_up) {
+  if (axis_up) return {"pitch", "roll"};
+  return {"yaw", "pitch"};
+}
+
 Eigen::Matrix3d sensor_from_train(bool axis_up) {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   if (axis_up) axes << 0, 1, 0, 0, 0, 1, 1, 0, 0;
@@ -66,9 +71,9 @@ void turn(AngleSeries& series, const Eigen::Matrix3d& rotation) {
 }
 
 std::vector<FreeParameter> frame_parameters(const TrainLayout& layout, double prior_sigma) {
-  const bool up = layout.axis_up;
-  return {{up ? "frame_pitch_deg" : "frame_yaw_deg", {place::frame_yaw(layout)}, prior_sigma},
-          {up ? "frame_roll_deg" : "frame_pitch_deg", {place::frame_pitch(layout)}, prior_sigma}};
+  const auto [first, second] = turn_names(layout.axis_up);
+  return {{"frame_" + first + "_deg", {place::frame_yaw(layout)}, prior_sigma},
+          {"frame_" + second + "_deg", {place::frame_pitch(layout)}, prior_sigma}};
 }
 
 }  // namespace risley::estimation

@@ -131,7 +131,7 @@ Json of(const jobs::EstimatedRecording& found) {
        {{"azimuth_deg", value_json(e.noise.value.azimuth, e.noise.sigma.azimuth)},
         {"zenith_deg", value_json(e.noise.value.zenith, e.noise.sigma.zenith)},
         {"held", e.noise_held}}},
-      {"frame", frame_json(e.frame_turn)},
+      {"frame", frame_json(e.frame_turn, e.sensor.train.layout().axis_up)},
       {"slips", slips_json(found.recording.header.slips)},
       {"shot_clock", shot_clock_json(found)},
       {"coordinates", to_string(e.coordinates)},

@@ -28,16 +28,12 @@ Json value_json(double value, double sigma) {
   return {{"value", deg(value)}, {"sigma", deg(sigma)}};
 }
 
-Json frame_json(const std::optional<estimation::FrameEstimate>& turn) {
+Json frame_json(const std::optional<estimation::FrameEstimate>& turn, bool axis_up) {
   const estimation::FrameEstimate frame = turn.value_or(estimation::FrameEstimate{});
-  const Json first = value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)));
-  const Json second = value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)));
-  Json json{{"yaw_deg", first}, {"pitch_deg", second}, {"estimated", turn.has_value()}};
-  if (frame.turn.axis_up) {  // turns about the sensor's Y and X; about its Z it is not turned
-    json["yaw_deg"] = value_json(0, 0);
-    json["pitch_deg"] = first;
-    json["roll_deg"] = second;
-  }
+  const auto [first, second] = estimation::turn_names(axis_up);
+  Json json{{"yaw_deg", value_json(0, 0)}, {"estimated", turn.has_value()}};
+  json[first + "_deg"] = value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)));
+  json[second + "_deg"] = value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)));
   return json;
 }
 

@@ -40,7 +40,8 @@ Json verdict_json(const Verdict& verdict) {
 Json choice_json(const jobs::SensorChoice& choice);
 
 /// How a recording's frame is turned; zeros without sigma where it is the sensor's.
-Json frame_json(const std::optional<estimation::FrameEstimate>& turn = {});
+/// @param axis_up  of the sensor: a roll takes the place of the yaw, which is 0
+Json frame_json(const std::optional<estimation::FrameEstimate>& turn = {}, bool axis_up = false);
 
 /// Where the count of shots was wrong: [{row, shots}], shots null where they could not be counted.
 Json slips_json(const std::vector<recordings::ShotSlip>& slips);

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -22,6 +24,10 @@ struct FrameTurn {
   double yaw = 0, pitch = 0;
   bool axis_up = false;  ///< of the sensor
 };
+
+/// What the turns of a FrameTurn are called, "yaw" and "pitch" or "pitch" and "roll": by the axes of
+/// the sensor's frame, yaw about Z, pitch about Y, roll about X.
+std::array<std::string, 2> turn_names(bool axis_up);
 
 /// The axes of the train's frame, in which X is the axis of rotation, in the sensor's.
 Eigen::Matrix3d sensor_from_train(bool axis_up);
@@ -46,8 +52,7 @@ struct FrameEstimate {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< of yaw and pitch, rad^2
 };
 
-/// What stands at the end of the free parameters where the frame's turn is estimated too, named by
-/// the axes of the sensor's frame: yaw about Z, pitch about Y, roll about X.
+/// What stands at the end of the free parameters where the frame's turn is estimated too.
 /// @param prior_sigma  of each, rad
 std::vector<FreeParameter> frame_parameters(const TrainLayout& layout, double prior_sigma);
 

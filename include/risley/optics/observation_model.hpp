@@ -309,7 +309,7 @@ void pass_prism(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>
   const std::size_t first = 2 * prism, surfaces = surfaces_of<N>(prism);
   const T& into = train.faces[first].index_ratio;
   const T& out_of = train.faces[first + surfaces - 1].index_ratio;
-  const Vector3<T> beam = trace.beam[prism];
+  const Vector3<T>& beam = trace.beam[prism];
   Vector3<T> behind = beam;
   std::array<T, 3> k;
 #pragma GCC unroll 3
