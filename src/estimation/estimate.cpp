@@ -644,7 +644,10 @@ Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
   if (estimate.start.mirrored || estimate.start.frame) {
     estimate.series.change([&](AngleSeries& rows) { prepare_shots(rows, estimate.start); });
   }
-  if (estimate.start.frame) estimate.frame_turn.emplace().turn = *estimate.start.frame;
+  if (estimate.start.frame) {
+    estimate.frame_turn.emplace().turn = *estimate.start.frame;
+    hold_last_bearing(options.sensor.train.layout(), estimate.free);
+  }
   if (options.cartesian && method == Method::map) {
     estimate.coordinates = rounding_of(estimate, options, progress.silent());
     if (estimate.coordinates == CoordinateRounding::toward_zero) {

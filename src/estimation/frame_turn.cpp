@@ -76,4 +76,11 @@ std::vector<FreeParameter> frame_parameters(const TrainLayout& layout, double pr
           {"frame_" + second + "_deg", {place::frame_pitch(layout)}, prior_sigma}};
 }
 
+void hold_last_bearing(const TrainLayout& layout, std::vector<FreeParameter>& free) {
+  std::erase_if(free, [&](const FreeParameter& parameter) {
+    const int at = parameter.places.front();
+    return at == place::frame_yaw(layout) || at == place::frame_pitch(layout);
+  });
+}
+
 }  // namespace risley::estimation

@@ -45,9 +45,10 @@ constexpr double kGoodResidual = radians_from_degrees(0.08);
 /// Two answers are told apart when their chi2 differ by this.
 constexpr double kDecisive = 25.0;
 /// A turn that leaves all shots in the field of view is believed from this angle on, rad, where it
-/// takes this share of the residuals away.
+/// takes this share of the residuals away, or adds at most the second where a lean of the last axis
+/// explains it as well.
 constexpr double kLeastTurn = radians_from_degrees(0.3);
-constexpr double kTurnGain = 0.1;
+constexpr double kTurnGain = 0.1, kTurnLoss = 0.02;
 
 /// A fit of parameters and one parabola per rotor to a few shots.
 struct WindowFit {
@@ -65,7 +66,10 @@ class WindowFitter {
   WindowFitter(const AngleSeries& shots, const PrismTrain& nominal,
                const std::vector<FreeParameter>& free, const std::vector<FreeParameter>& frame,
                double noise)
-      : shots_(shots), free_(free), all_(free), prior_(free_values(nominal, free)) {
+      : shots_(shots), free_(free) {
+    if (!frame.empty()) hold_last_bearing(nominal.layout(), free_);
+    prior_ = free_values(nominal, free_);
+    all_ = free_;
     all_.insert(all_.end(), frame.begin(), frame.end());
     weights_.angle_noise = equal_noise(noise);
     azimuth_.resize(shots.size());
@@ -285,6 +289,7 @@ class StartWindow {
   StartWindow& operator=(const StartWindow&) = delete;
 
   const LineSearch& search() const { return *search_; }
+  bool last_axis_leans() const { return axis_up_; }
   /// The lines near a hypothesis's speeds.
   std::vector<RotorLines> near(const std::vector<double>& speeds) const {
     if (search_ != found_.lines) return search_->near(speeds, kUsualShare, kMostMinima, axis_up_);
@@ -659,7 +664,8 @@ Start new_start(const AngleSeries& head, const sensors::Sensor& sensor, const St
   // A small turn leaves the shots in the field of view and shows in the residuals alone.
   Start free = window.start_of(window.answer(answer.trial, kEnoughShots, true));
   const bool far = std::hypot(free.frame->yaw, free.frame->pitch) > kLeastTurn;
-  if (far && free.residual_rms < (1.0 - kTurnGain) * start.residual_rms) return free;
+  const double allowed = window.last_axis_leans() ? 1.0 + kTurnLoss : 1.0 - kTurnGain;
+  if (far && free.residual_rms < allowed * start.residual_rms) return free;
   return start;
 }
 

@@ -56,6 +56,7 @@ NominalLines nominal_lines(const PrismTrain& train) {
   for (std::size_t k = 0; k < prisms; ++k) turns[k][k] = 1.0;
   if (train.layout().reflects()) turns.push_back({-1.0, 2.0});
   result.amplitude.assign(turns.size(), 0.0);
+  const Eigen::Matrix3d train_from_sensor = sensor_from_train(train.layout().axis_up).transpose();
   for (int beam = 0; beam < train.emitters(); ++beam) {
     std::vector<Complex> sums(turns.size());
     Complex constant = 0;
@@ -71,9 +72,9 @@ NominalLines nominal_lines(const PrismTrain& train) {
       }
       const Observation shot = observe(train, angles, beam);
       if (!shot.valid) return;
-      const Vector3<double>& v = shot.direction;
-      const Complex value =  // of the train's frame
-          train.layout().axis_up ? Complex(v.x, v.y) : Complex(v.y, v.z);
+      const auto& [x, y, z] = shot.direction;
+      const Eigen::Vector3d v = train_from_sensor * Eigen::Vector3d(x, y, z);
+      const Complex value(v.y(), v.z());
       count += 1.0;
       constant += value;
       for (std::size_t k = 0; k < turns.size(); ++k) {
@@ -194,11 +195,13 @@ class LineMatcher {
       candidates_.push_back({sensors::in_all_combinations(candidates[i]),
                              nominal_lines(candidates[i].train),
                              candidates[i].train.layout().axis_up});
-      any_axis_up_ = any_axis_up_ || candidates_.back().axis_up;
     }
   }
 
-  bool any_axis_up() const { return any_axis_up_; }
+  bool any_axis_up() const {
+    return std::any_of(candidates_.begin(), candidates_.end(),
+                       [](const Candidate& one) { return one.axis_up; });
+  }
 
   /// Tries candidates in a frame.
   /// @param search   in the shots, turned back by the frame
@@ -309,7 +312,6 @@ class LineMatcher {
 
   BeamSource beams_;
   std::vector<Candidate> candidates_;
-  bool any_axis_up_ = false;
   std::vector<SensorMatch> matches_;
 };
 

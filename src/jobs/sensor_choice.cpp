@@ -8,8 +8,10 @@
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <set>
 #include <span>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -73,8 +75,8 @@ FirstShots first_shots(const recordings::Source& source, const recordings::ReadO
   if (std::any_of(beam.begin(), beam.end(), [](std::uint8_t one) { return one != 0; })) {
     return shots;
   }
-  int emitters = 1;
-  for (const Sensor& sensor : candidates) emitters = std::max(emitters, sensor.train.emitters());
+  int emitters = 1;  // that every candidate's fire in turn
+  for (const Sensor& sensor : candidates) emitters = std::lcm(emitters, sensor.train.emitters());
   shots.beams = BeamSource::counted;
   for (std::size_t i = 0; i < shots.head.size(); ++i) {
     const double shot = 1e-9 * static_cast<double>(shots.head.time_ns[i]) * *reading.shot_rate;
@@ -220,7 +222,8 @@ std::string wide_words(const recordings::DirectionSpread& spread) {
     const char* why_not;
   };
   static constexpr std::array kWide{
-      Wide{"Mid-360", 360.0, 59.0, 0.35, "of which the file does not say which emitter fired"},
+      Wide{"Mid-360", 360.0, 59.0, 0.35,
+           "without the traces of its rotors, which motion corrected or sorted clouds lack"},
       Wide{"HAP", 120.0, 25.0, 0.8, "for which there is no built-in preset"}};
   constexpr double kMore_deg = 3.0, kLeastZenith = 0.7;
   const double azimuth_deg = degrees_from_radians(spread.azimuth_to - spread.azimuth_from),
@@ -256,23 +259,29 @@ std::string too_near_words(const AngleSeries& shots, const Sensor& sensor) {
 }
 
 /// Says why no sensor can have made the shots, where that is so.
-/// @param names_emitters  whether the file says which emitter fired; without it, the rotors of a
-///                        sensor that sees all around are not found
-std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> candidates,
-                             bool names_emitters) {
+std::string impossible_words(FirstShots& first, std::span<const Sensor> candidates) {
+  const AngleSeries& shots = first.head;
   if (shots.size() < recordings::kFewestJudged) return {};
   const double radius = recordings::cone_radius(shots.azimuth, shots.zenith);
   if (const auto problem = recordings::not_a_scan(radius, shots.size(), shots.range)) {
     return *problem;
   }
-  double widest = 0;
-  for (const Sensor& sensor : candidates) {
-    if (candidates.size() > 1 && sensor.train.layout().axis_up && !names_emitters) continue;
-    if (!(sensor.field_of_view > 0)) return {};
-    widest = std::max(widest, sensor.field_of_view);
-  }
   constexpr double kMargin = radians_from_degrees(10.0);
-  if (radius < 0.5 * widest + kMargin) return {};
+  std::vector<Sensor> wide_enough;
+  for (const Sensor& sensor : candidates) {
+    const double field = sensor.field_of_view;
+    if (!(field > 0) || radius < 0.5 * field + kMargin) wide_enough.push_back(sensor);
+  }
+  if (candidates.size() == 1 && !wide_enough.empty()) return {};
+  // What sees all around holds every scan: its rotors must show, too.
+  const bool all_around =
+      std::all_of(wide_enough.begin(), wide_enough.end(),
+                  [](const Sensor& sensor) { return sensor.train.layout().axis_up; });
+  if (!all_around) return {};
+  if (!wide_enough.empty()) {
+    const auto found = recognised(first, wide_enough);
+    if (found && found->fits) return {};
+  }
   const recordings::DirectionSpread spread =
       recordings::direction_spread(shots.azimuth, shots.zenith);
   return fmt::format(
@@ -280,16 +289,17 @@ std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> c
       "probably {}",
       span_text(spread.azimuth_from, spread.azimuth_to),
       span_text(spread.zenith_from, spread.zenith_to),
-      candidates.size() == 1 ? candidates.front().name : "any built-in preset", wide_words(spread));
+      candidates.size() == 1 ? candidates.front().name
+                             : "any built-in preset whose rotors show in them",
+      wide_words(spread));
 }
 
 /// Looks at the first shots before any sensor is. @return whether one may have made them
-bool are_possible(const FirstShots& shots, std::span<const Sensor> candidates,
-                  SensorChoice& choice) {
+bool are_possible(FirstShots& shots, std::span<const Sensor> candidates, SensorChoice& choice) {
   if (shots.beams == BeamSource::recorded) {
     for (const std::uint8_t beam : shots.head.beam) choice.lines = std::max(choice.lines, beam + 1);
   }
-  choice.impossible = impossible_words(shots.head, candidates, choice.lines > 1);
+  choice.impossible = impossible_words(shots, candidates);
   if (choice.impossible.empty()) return true;
   choice.chosen_by = ChosenBy::guess;
   choice.fits = false;

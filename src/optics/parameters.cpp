@@ -88,7 +88,7 @@ std::vector<ParameterInfo> build_list(TrainShape shape) {
   for (int i = 0; i < prisms; ++i) {
     const char letter = prism_letter(i);
     const char capital = static_cast<char>(letter - 'a' + 'A');
-    if (i + 1 < prisms) {
+    if (shape.prisms.has_bearing(static_cast<std::size_t>(i))) {
       add_error(fmt::format("bearing_tilt_{}_horizontal", letter),
                 fmt::format("horizontal bearing tilt of prism {}", capital),
                 fmt::format("Δφ_R{}", capital), place::bearing_tilt_horizontal(i));

@@ -45,14 +45,18 @@ AngleSeries shots_of(const sensors::Sensor& unit, std::size_t shots, unsigned se
   return series;
 }
 
+EstimateOptions options_of_preset() {
+  EstimateOptions options;
+  options.sensor = sensors::load_sensor("mid-360");
+  return options;
+}
+
 TEST(Reflector, UnitsAreEstimatedToTheirNoise) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     SCOPED_TRACE(seed);
     const sensors::Sensor unit = random_unit(seed);
     const AngleSeries series = shots_of(unit, 40'000, seed);
-    EstimateOptions options;
-    options.sensor = sensors::load_sensor("mid-360");
-    const Estimate found = estimate(Method::map, series, series, options);
+    const Estimate found = estimate(Method::map, series, series, options_of_preset());
     ASSERT_TRUE(found.converged) << found.reason;
     EXPECT_FALSE(found.mirrored);
     EXPECT_NEAR(found.expected_residual, unit.angle_noise, 0.03 * unit.angle_noise);
@@ -61,6 +65,35 @@ TEST(Reflector, UnitsAreEstimatedToTheirNoise) {
       EXPECT_NEAR(found.sensor.train[place], unit.train[place], radians_from_degrees(0.6)) << place;
     }
   }
+}
+
+TEST(Reflector, RotorsThatLeanAreNoTurnOfTheFrame) {
+  sensors::Sensor unit = sensors::load_sensor("mid-360");
+  const double lean = radians_from_degrees(0.15);
+  for (const int element : {0, 1})
+    unit.train.set_place(place::bearing_tilt_vertical(element), lean);
+  for (int emitter = 0; emitter < 4; ++emitter) {
+    unit.train.set_place(place::incident_beam_vertical(emitter, 2), lean);
+  }
+  const AngleSeries series = shots_of(unit, 40'000, 7);
+  const Estimate found = estimate(Method::map, series, series, options_of_preset());
+  ASSERT_TRUE(found.converged) << found.reason;
+  EXPECT_FALSE(found.frame_turn.has_value());
+  EXPECT_NEAR(found.sensor.train[place::bearing_tilt_vertical(1)], lean,
+              radians_from_degrees(0.02));
+}
+
+TEST(Reflector, ATurnOfTheFrameHoldsTheLeanOfTheLastAxis) {
+  const sensors::Sensor unit = sensors::load_sensor("mid-360");
+  AngleSeries series = shots_of(unit, 40'000, 8);
+  const FrameTurn turned{radians_from_degrees(2.0), radians_from_degrees(-1.0), true};
+  turn(series, recording_from_sensor(turned));
+  const Estimate found = estimate(Method::map, series, series, options_of_preset());
+  ASSERT_TRUE(found.converged) << found.reason;
+  ASSERT_TRUE(found.frame_turn.has_value());
+  EXPECT_NEAR(found.frame_turn->turn.yaw, turned.yaw, radians_from_degrees(0.1));
+  EXPECT_NEAR(found.frame_turn->turn.pitch, turned.pitch, radians_from_degrees(0.1));
+  EXPECT_EQ(found.sensor.train[place::bearing_tilt_vertical(1)], 0.0);
 }
 
 TEST(Reflector, IsRecognisedAmongAllPresets) {

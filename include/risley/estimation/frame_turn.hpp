@@ -25,8 +25,8 @@ struct FrameTurn {
   bool axis_up = false;  ///< of the sensor
 };
 
-/// What the turns of a FrameTurn are called, "yaw" and "pitch" or "pitch" and "roll": by the axes of
-/// the sensor's frame, yaw about Z, pitch about Y, roll about X.
+/// What the turns of a FrameTurn are called, "yaw" and "pitch" or "pitch" and "roll": by the axes
+/// of the sensor's frame, yaw about Z, pitch about Y, roll about X.
 std::array<std::string, 2> turn_names(bool axis_up);
 
 /// The axes of the train's frame, in which X is the axis of rotation, in the sensor's.
@@ -55,5 +55,9 @@ struct FrameEstimate {
 /// What stands at the end of the free parameters where the frame's turn is estimated too.
 /// @param prior_sigma  of each, rad
 std::vector<FreeParameter> frame_parameters(const TrainLayout& layout, double prior_sigma);
+
+/// Drops from the free parameters those that a free turn of the frame holds: a lean of the last
+/// axis, which looks alike.
+void hold_last_bearing(const TrainLayout& layout, std::vector<FreeParameter>& free);
 
 }  // namespace risley::estimation

@@ -72,7 +72,7 @@ void prepare_prism_derivatives(const Parameters& parameters, FaceOrder order, co
   if (out.tilt_horizontal_wanted) {
     out.tilt_horizontal = turning_about(axis.direction, Vector3<T>{zero, zero, T(-1.0)});
   }
-  if (prism + 1 < N) {
+  if (N.has_bearing(prism)) {
     // The axis and all that turns about it lean together, but for what the tilts turn the normals.
     Vector3<T> bearing_level = leaning_horizontal_rate<T>(axis.horizontal, level_angle);
     out.bearing_vertical = turning_about(axis.direction, level - bearing_level);
@@ -87,13 +87,10 @@ void prepare_prism_derivatives(const Parameters& parameters, FaceOrder order, co
     Vector3<T> wedge =
         sign * leaning_vertical_rate<T>(horizontal, sines[leaning::vertical(prism, angled)]);
     out.wedge = turning_about(axis.direction, wedge);
-    out.wedge_by_other =
-        dot(wedge, leaning_direction<T>(horizontal, sines[leaning::vertical(prism, other)]));
+    out.wedge_by_other = dot(wedge, normal_at_zero<T>(sines, prism, other));
     if constexpr (N.reflects()) {
       if (N.is_reflector(prism)) {
-        const SinePair<T> first = sines[leaning::vertical(prism, 0)];
-        out.wedge_by_exit =
-            dot(wedge, leaning_direction<T>(horizontal, SinePair<T>{-first.second, first.first}));
+        out.wedge_by_exit = dot(wedge, normal_at_zero<T>(sines, prism, 2));
       }
     }
     out.first_is_angled = T(angled == 0 ? 1.0 : 0.0);
@@ -159,7 +156,7 @@ ReversePass<T, N, Results> begin_reverse(const Vector3<T>& direction,
     pass.beam[r] = in_train_frame<N>(seeds[r]);
     pass.torque[r] = cross(in_train_frame<N>(direction), pass.beam[r]);
     pass.air[r] = T(0.0);
-    // No bearing leans behind the last prism.
+    // Where the last axis is X.
     pass.gradients[r].parameters[static_cast<std::size_t>(place::frame_yaw(N))] = T(0.0);
     pass.gradients[r].parameters[static_cast<std::size_t>(place::frame_pitch(N))] = T(0.0);
   }
@@ -180,7 +177,7 @@ void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T
                    const Trace<T, N>& forward, std::size_t prism, ReversePass<T, N, Results>& pass,
                    const AtFace& at_face = {}) {
   constexpr bool kAtFaces = !std::is_same_v<AtFace, NothingAtFaces> && !N.reflects();
-  const bool last = prism == N - 1;
+  const bool has_bearing = N.has_bearing(prism);
   const int number = static_cast<int>(prism);
   const std::size_t first = 2 * prism, surfaces = surfaces_of<N>(prism), exit = surfaces - 1;
   const auto& d = derivatives.prisms[prism];
@@ -214,7 +211,7 @@ void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T
               d.second_is_angled * (exit == 1 ? k[1] : T(out_of * k[1]));
   }
   Vector3<T> bearing_vertical;
-  if (!last) bearing_vertical = d.bearing_vertical.at(sine, cosine);
+  if (has_bearing) bearing_vertical = d.bearing_vertical.at(sine, cosine);
 #pragma GCC unroll 3
   for (std::size_t r = 0; r < Results; ++r) {
     Gradient<T, N>& gradient = pass.gradients[r];
@@ -279,7 +276,7 @@ void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T
       ahead = ahead + before;
       pass.torque[r] = cross(beam, ahead);
     }
-    gradient.rotation_angles[prism] = last ? torque.x : dot(d.rotation, torque);
+    gradient.rotation_angles[prism] = has_bearing ? dot(d.rotation, torque) : torque.x;
     by(place::prism_tilt_horizontal(number)) =
         d.tilt_horizontal_wanted ? dot(tilt_horizontal, torque) : zero;
     by(place::prism_tilt_vertical(number)) = dot(tilt_vertical, torque);
@@ -287,7 +284,7 @@ void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T
       by(place::prism_tilt_vertical(number)) = by(place::prism_tilt_vertical(number)) - wedge_bar;
     }
     by(place::wedge_angle(number)) = wedge_bar;
-    if (!last) {
+    if (has_bearing) {
       by(place::bearing_tilt_horizontal(number)) = -torque.z;
       by(place::bearing_tilt_vertical(number)) = dot(bearing_vertical, torque);
     }
@@ -390,7 +387,7 @@ TurnDerivatives<T> turn_derivatives(const Vector3<T>& direction) {
 }
 
 /// Fills the places of place::frame_yaw and place::frame_pitch with turn_derivatives(). No other
-/// function of this file writes there.
+/// function of this file writes there unless the last axis leans, which a free turn holds.
 template <ModelScalar T, TrainLayout N>
 void add_turn_derivatives(AngleLinearisation<T, N>& shot) {
   constexpr auto kYaw = static_cast<std::size_t>(place::frame_yaw(N));

@@ -151,12 +151,14 @@ constexpr std::size_t horizontal(std::size_t prism) { return 2 + 5 * prism; }
 /// Of the normal of an element's face, 0 or 1, in which the wedge or the mirror may be. The third
 /// surface of a reflector stands a right angle below its tilt.
 constexpr std::size_t vertical(std::size_t prism, std::size_t face) { return 3 + 5 * prism + face; }
-/// Of a prism's axis, but not of the last prism's, which is X.
+/// Of a prism's axis; behind the end where TrainLayout::has_bearing() says that it is X.
 constexpr std::size_t bearing_horizontal(std::size_t prism) { return 5 + 5 * prism; }
 /// As bearing_horizontal().
 constexpr std::size_t bearing_vertical(std::size_t prism) { return 6 + 5 * prism; }
 /// How many there are.
-constexpr std::size_t count(int prisms) { return 5 * static_cast<std::size_t>(prisms); }
+constexpr std::size_t count(const TrainLayout& layout) {
+  return 5 * static_cast<std::size_t>(layout.elements) + (layout.axis_up ? 2 : 0);
+}
 }  // namespace leaning
 
 /// The leaning angles of a train, rad: see namespace leaning.
@@ -174,7 +176,7 @@ std::array<T, leaning::count(N)> leaning_angles(const std::array<T, parameter_co
     const bool wedge = N.kind[prism] == ElementKind::wedge;  // its faces share no angle
     T horizontal = p(place::prism_tilt_horizontal(number));
     T vertical = p(place::prism_tilt_vertical(number)), second(0.0);
-    if (prism + 1 < N) {
+    if (N.has_bearing(prism)) {
       const T& bearing_horizontal = p(place::bearing_tilt_horizontal(number));
       const T& bearing_vertical = p(place::bearing_tilt_vertical(number));
       angles[leaning::bearing_horizontal(prism)] = bearing_horizontal;
@@ -214,9 +216,20 @@ struct PrismAxis {
 template <ModelScalar T, TrainLayout N, class Sines>
 PrismAxis<T> prism_axis(const Sines& sines, std::size_t prism) {
   const T zero(0.0), one(1.0);
-  if (prism + 1 == N) return {{one, zero, zero}, {zero, one}};
+  if (!N.has_bearing(prism)) return {{one, zero, zero}, {zero, one}};
   auto&& horizontal = sines[leaning::bearing_horizontal(prism)];
   return {leaning_direction<T>(horizontal, sines[leaning::bearing_vertical(prism)]), horizontal};
+}
+
+/// The normal of an element's surface at rotation angle zero. @param sines  as prism_axis()
+template <ModelScalar T, class Sines>
+Vector3<T> normal_at_zero(const Sines& sines, std::size_t element, std::size_t surface) {
+  auto&& horizontal = sines[leaning::horizontal(element)];
+  if (surface < 2) {
+    return leaning_direction<T>(horizontal, sines[leaning::vertical(element, surface)]);
+  }
+  const SinePair<T> first = sines[leaning::vertical(element, 0)];  // a right angle below
+  return leaning_direction<T>(horizontal, SinePair<T>{-first.second, first.first});
 }
 
 /// One prism of prepare().
@@ -229,18 +242,11 @@ void prepare_prism(const Parameters& parameters, const Sines& sines, std::size_t
   auto&& air = parameters[static_cast<std::size_t>(place::refractive_index_air())];
   auto&& glass = parameters[static_cast<std::size_t>(place::refractive_index(number))];
   Vector3<T> axis = prism_axis<T, N>(sines, prism).direction;
-  auto&& horizontal = sines[leaning::horizontal(prism)];
   const std::size_t surfaces = surfaces_of<N>(prism);
   std::array<Vector3<T>, 3> normals;
 #pragma GCC unroll 3
   for (std::size_t side = 0; side < surfaces; ++side) {
-    Vector3<T>& normal = normals[side];
-    if (side < 2) {
-      normal = leaning_direction<T>(horizontal, sines[leaning::vertical(prism, side)]);
-    } else {  // a right angle below the first
-      const SinePair<T> first = sines[leaning::vertical(prism, 0)];
-      normal = leaning_direction<T>(horizontal, SinePair<T>{-first.second, first.first});
-    }
+    const Vector3<T>& normal = normals[side] = normal_at_zero<T>(sines, prism, side);
     auto& face = train.faces[2 * prism + side];
     face.normal = turning_about(axis, normal);
     face.index_ratio = side == 0 ? T(air / glass) : side + 1 == surfaces ? T(glass / air) : T(1.0);
@@ -316,9 +322,9 @@ void pass_prism(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>
   for (std::size_t i = 0; i < surfaces; ++i) {
     const std::size_t at = first + i;
     const TurningVector<T>& turning = train.faces[at].normal;
-    const Vector3<T> normal = prism == N - 1
-                                  ? turning.at_about_x(trace.sine[prism], trace.cosine[prism])
-                                  : turning.at(trace.sine[prism], trace.cosine[prism]);
+    const Vector3<T> normal = N.has_bearing(prism)
+                                  ? turning.at(trace.sine[prism], trace.cosine[prism])
+                                  : turning.at_about_x(trace.sine[prism], trace.cosine[prism]);
     T in = i == 0 ? dot(normal, beam) : T(into * dot(normal, beam));
 #pragma GCC unroll 2
     for (std::size_t before = 0; before < i; ++before) {

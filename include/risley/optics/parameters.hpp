@@ -28,8 +28,8 @@ void check_shape(TrainShape shape);
 
 /// Places in the flat parameter vector of a train: air, incident beam of the first emitter, then
 /// six per prism in beam order, then two per further emitter. A shot sees the part that a train
-/// with one emitter has, with its own emitter's beam. The last prism's axis is the X axis of the
-/// sensor, so its two bearing-tilt places exist only to keep the stride and always hold zero.
+/// with one emitter has, with its own emitter's beam. Where the last prism's axis is the X axis of
+/// the sensor, its two bearing-tilt places exist only to keep the stride and always hold zero.
 namespace place {
 constexpr int refractive_index_air() { return 0; }      ///< of the medium around the prisms
 constexpr int incident_beam_horizontal() { return 1; }  ///< of the first emitter
@@ -55,13 +55,13 @@ constexpr int wedge_angle(int prism) { return 4 + 6 * prism; }
 constexpr int prism_tilt_horizontal(int prism) { return 5 + 6 * prism; }  ///< against its bearing
 /// Against its bearing; of a wedge its first face alone.
 constexpr int prism_tilt_vertical(int prism) { return 6 + 6 * prism; }
-/// Of the axis about which a prism turns, against X; always zero for the last prism.
+/// Of the axis about which a prism turns, against the frame's; zero unless has_bearing().
 constexpr int bearing_tilt_horizontal(int prism) { return 7 + 6 * prism; }
-/// Of the axis about which a prism turns, against X; always zero for the last prism.
+/// Of the axis about which a prism turns, against the frame's; zero unless has_bearing().
 constexpr int bearing_tilt_vertical(int prism) { return 8 + 6 * prism; }
-/// Derivatives keep in the last prism's two bearing places, which are no parameters, what a small
-/// turn of the whole emergent beam about Z (yaw) and about Y (pitch) of the train's frame does:
-/// turn_derivatives().
+/// Where the turn of a recording's frame is free, derivatives keep in the last prism's two bearing
+/// places what a small turn of the whole emergent beam about Z (yaw) and about Y (pitch) of the
+/// train's frame does: turn_derivatives(). A bearing of the last prism is held then.
 constexpr int frame_yaw(int prisms) { return bearing_tilt_horizontal(prisms - 1); }
 /// As frame_yaw(), of the pitch.
 constexpr int frame_pitch(int prisms) { return bearing_tilt_vertical(prisms - 1); }

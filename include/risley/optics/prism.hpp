@@ -59,6 +59,11 @@ struct TrainLayout {
   [[gnu::always_inline]] constexpr bool reflects() const {
     return elements > 0 && is_reflector(static_cast<std::size_t>(elements) - 1);
   }
+  /// Whether the axis of an element leans in the sensor's frame. X is the last one's by definition;
+  /// where the axes point up, the sensor's housing defines the frame and all may lean.
+  [[gnu::always_inline]] constexpr bool has_bearing(std::size_t element) const {
+    return axis_up || element != static_cast<std::size_t>(elements) - 1;
+  }
   /// Of all elements; those of an element begin at twice its number.
   [[gnu::always_inline]] constexpr std::size_t surfaces() const {
     return 2 * static_cast<std::size_t>(elements) + (reflects() ? 1 : 0);
