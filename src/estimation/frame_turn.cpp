@@ -72,8 +72,8 @@ void turn(AngleSeries& series, const Eigen::Matrix3d& rotation) {
 
 std::vector<FreeParameter> frame_parameters(const TrainLayout& layout, double prior_sigma) {
   const auto [first, second] = turn_names(layout.axis_up);
-  return {{"frame_" + first + "_deg", {place::frame_yaw(layout)}, prior_sigma},
-          {"frame_" + second + "_deg", {place::frame_pitch(layout)}, prior_sigma}};
+  return {{"frame_" + first + "_deg", {place::frame_yaw(layout)}, prior_sigma, true},
+          {"frame_" + second + "_deg", {place::frame_pitch(layout)}, prior_sigma, true}};
 }
 
 void hold_last_bearing(const TrainLayout& layout, std::vector<FreeParameter>& free) {

@@ -87,9 +87,8 @@ class BlockSums {
     static_cast<TrainArguments&>(all_) = arguments_of(train, places_);
     all_.azimuth_noise_variance = weights.angle_noise.azimuth * weights.angle_noise.azimuth;
     all_.zenith_noise_variance = weights.angle_noise.zenith * weights.angle_noise.zenith;
-    all_.turned = std::any_of(places_.places.begin(), places_.places.end(), [&](int place) {
-      return place == place::frame_yaw(knots.prisms) || place == place::frame_pitch(knots.prisms);
-    });
+    all_.turned = std::any_of(free.begin(), free.end(),
+                              [](const FreeParameter& parameter) { return parameter.of_frame; });
     all_.softening = weights.softening;
     all_.cut = weights.cut;
   }

@@ -96,9 +96,8 @@ TEST_P(LawsOfEveryTrain, IdealModelEqualsThePaperEquationsWrittenOutWithQuaterni
     const auto angles = testing::random_angles(train.prisms(), generator);
     Eigen::Vector3d beam = lean(train[1], train[2]);
     for (int prism = 0; prism < train.prisms(); ++prism) {
-      const bool last = prism + 1 == train.prisms();
-      const double bh = last ? 0 : train[place::bearing_tilt_horizontal(prism)];
-      const double bv = last ? 0 : train[place::bearing_tilt_vertical(prism)];
+      const double bh = train[place::bearing_tilt_horizontal(prism)];
+      const double bv = train[place::bearing_tilt_vertical(prism)];
       const double th = train[place::prism_tilt_horizontal(prism)];
       const double tv = train[place::prism_tilt_vertical(prism)];
       const double angle = train[place::wedge_angle(prism)];

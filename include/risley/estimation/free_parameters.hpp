@@ -16,6 +16,7 @@ struct FreeParameter {
   std::string name;         ///< as in parameter_list()
   std::vector<int> places;  ///< of the flat parameter vector that take its value
   double prior_sigma = 0;   ///< SI units
+  bool of_frame = false;    ///< a turn of the recording's frame, in a place of the last bearing
 
   friend bool operator==(const FreeParameter&, const FreeParameter&) = default;
 };
