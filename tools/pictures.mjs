@@ -55,6 +55,10 @@ const pictures = [
            { figure: /^Angular velocity of prism/ }],
   },
   {
+    file: 'walls.png', needs: ['calibrate'], page: 'out/calibration/report.html', width: 1160,
+    keep: [{ css: '.verdict' }, { figure: /^Walls (before|after)/ }],
+  },
+  {
     file: 'estimate.png', needs: ['estimate'], page: 'out/unit/report.html', width: 1160,
     keep: [{ css: '.verdict' }, { figure: /^(Angular velocity of prism|Error of the rotation)/ },
            { figure: /^Histogram of the (azimuth|zenith) residuals/ }],
