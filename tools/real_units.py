@@ -36,15 +36,8 @@ def number(value, sigma):
     return f"{value:.{digits}f}", f"{sigma:.{digits}f}"
 
 
-def unit_of(name):
-    for ending, unit in (("_deg_per_s", "deg/s"), ("_deg", "deg")):
-        if name.endswith(ending):
-            return unit
-    return "1"
-
-
 def in_words(name):
-    """The name of a parameter without its unit; prisms have capital letters."""
+    """The name of a parameter without its unit, which the page states; prisms have capital letters."""
     words = name.replace("_", " ").removesuffix(" deg per s").removesuffix(" deg")
     return re.sub(r"\b[a-h]\b", lambda letter: letter.group().upper(), words)
 
@@ -55,10 +48,10 @@ def grouped(count):
 
 
 def table(rows):
-    lines = ["| quantity | value | sigma | unit |", "|---|---|---|---|"]
-    for name, value, sigma, unit in rows:
+    lines = ["| quantity | value | sigma |", "|---|---|---|"]
+    for name, value, sigma in rows:
         text, spread = number(value, sigma)
-        lines.append(f"| {name} | {text} | {spread} | {unit} |")
+        lines.append(f"| {name} | {text} | {spread} |")
     return lines
 
 
@@ -72,14 +65,14 @@ def text_of(command, path, options):
     slips = found["slips"]
     lost = f" {sum(one['shots'] or 0 for one in slips)} shots are missing at {len(slips)} places." if slips else ""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    rows = [(in_words(name), one["value"], one["sigma_given_held"], unit_of(name))
+    rows = [(in_words(name), one["value"], one["sigma_given_held"])
             for name, one in found["parameters"].items()]
     if found["frame"]["estimated"]:
         rows += [(f"{axis} of the frame", found["frame"][f"{axis}_deg"]["value"],
-                  found["frame"][f"{axis}_deg"]["sigma"], "deg") for axis in ("yaw", "pitch")]
+                  found["frame"][f"{axis}_deg"]["sigma"]) for axis in ("yaw", "pitch")]
     for axis in ("azimuth", "zenith"):
         noise = found["noise"][f"{axis}_deg"]
-        rows.append((f"noise of the {axis}, without rounding", noise["value"], noise["sigma"], "deg"))
+        rows.append((f"noise of the {axis}", noise["value"], noise["sigma"]))
     residual = {axis: found["residuals"][f"{axis}_deg"]["rms"] for axis in ("azimuth", "zenith")}
     image = "mirrored" if found["mirrored"] else "not mirrored"
     if found["combination"] is not None:
