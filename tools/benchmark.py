@@ -377,7 +377,8 @@ def in_one_row(rows):
     colon is common."""
     def joined(cells):
         label, colon, _ = cells[0].rpartition(": ")
-        return label + colon + " / ".join(dict.fromkeys(cell.removeprefix(label + colon) for cell in cells))
+        values = [cell.removeprefix(label + colon) for cell in cells]
+        return label + colon + (" / ".join(values) if len(set(values)) > 1 else values[0])
 
     questions = {}
     for row in rows:
@@ -414,23 +415,23 @@ def kernel_rows(result):
         for name in result["sets"]:
             row = found[f"{kind}/{name}"]
             if kind.startswith("jacobian"):
-                add(question, name, f"Jets, ns: {short(row['peer_ns'])}", row, short(row["ours_ns"]), f"{row['error']:.0e} of Jets")
+                add(question, name, f"Jets, ns: {short(row['peer_ns'])}", row, short(row["ours_ns"]), f"to Jets: {row['error']:.0e}")
             elif kind == "directions_in_memory":
                 add(question, name, f"copying the bytes, ns: {short(row['peer_ns'])}", row, beams(row), "as above")
             else:
-                add(question, name, f"plain Eigen, ns: {short(row['peer_ns'])}", row, beams(row), f"{row['error_rad']:.0e} rad")
+                add(question, name, f"plain Eigen, ns: {short(row['peer_ns'])}", row, beams(row), f"rad: {row['error_rad']:.0e}")
     row = found["numpy"]
     add("the same from Python", result["sets"][-1], f"numpy in blocks, ns: {short(row['peer_ns'])}", row, beams(row),
-        f"{row['difference_rad']:.0e} rad of numpy")
+        f"rad to numpy: {row['difference_rad']:.0e}")
     for name in result["sets"]:
         if f"adjust/{name}" in found:
             row = found[f"adjust/{name}"]
             add("calibration on a wall, 1 million ranges, s", name, f"Ceres, s: {short(row['peer_s'])}", row,
-                short(row["ours_s"]), f"same cost to {row['cost_difference']:.0e}", ratio="cpu_over_ours")
+                short(row["ours_s"]), f"of the cost: {row['cost_difference']:.0e}", ratio="cpu_over_ours")
     for name in result["sets"]:
         row = found[f"filter_step/{name}"]
         add("step of the filter, 12 states, ns", name, f"Eigen, Jets, Joseph, ns: {short(row['peer_ns'])}", row,
-            short(row["ours_ns"]), f"{row['difference_in_sigmas']:.0e} sigma of Joseph")
+            short(row["ours_ns"]), f"sigma to Joseph: {row['difference_in_sigmas']:.0e}")
     return in_one_row(rows)
 
 
