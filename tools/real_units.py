@@ -48,10 +48,14 @@ def grouped(count):
 
 
 def table(rows):
-    lines = ["| quantity | value | sigma |", "|---|---|---|"]
+    """The horizontal and the vertical part of a quantity stand in one row."""
+    quantities = {}
     for name, value, sigma in rows:
-        text, spread = number(value, sigma)
-        lines.append(f"| {name} | {text} | {spread} |")
+        quantities.setdefault(re.sub(" (horizontal|vertical)$", "", name), []).append((name, *number(value, sigma)))
+    lines = ["| quantity | value | sigma |", "|---|---|---|"]
+    for whole, parts in quantities.items():
+        names, values, sigmas = zip(*parts)
+        lines.append(f"| {whole if len(parts) > 1 else names[0]} | {' / '.join(values)} | {' / '.join(sigmas)} |")
     return lines
 
 
