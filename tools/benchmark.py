@@ -463,15 +463,13 @@ def job_text(result):
     for name, row in result["found"].items():
         one, all_cores = row[f"threads_{few}"], row[f"threads_{many}"]
         rows.append((f"`{name}`: {row['does']}", ranged(one["seconds_per_minute"]),
-                     short(one["processor_seconds_per_minute"]["median"]), ranged(all_cores["seconds_per_minute"]),
-                     f"{ranged(row['speed_up'])}" if "speed_up" in row else "",
-                     f"{short(60 / one['seconds_per_minute']['median'])} x",
+                     ranged(all_cores["seconds_per_minute"]), f"{short(60 / one['seconds_per_minute']['median'])} x",
                      f"{ranged(one['over_bytes_only'])}" if row["read_MB"] + row["written_MB"] > 0 else "",
                      f"{one['memory_MB']:.0f}, {all_cores['memory_MB']:.0f} MB", row["quality"]))
     points = result["found"]["cloud"]
     rate = {count: 60 * RATE / points[f"threads_{count}"]["seconds_per_minute"]["median"] / 1e6 for count in (few, many)}
     return "\n".join([
-        table(("job", "s per recorded minute, one thread", "of the processor", f"{many} threads", "one thread over these",
+        table(("job", "s per recorded minute, one thread", f"{many} threads",
                "recording time over ours", "times the time of its bytes", "memory", "accuracy"), rows), "",
         f"Recordings of {result['seconds_of_recording']} s, {result['shots'] / 1e6:g} million shots. `cloud` makes "
         f"{short(rate[few])} million points a second on one core and {short(rate[many])} on {many}. The time of its bytes is "

@@ -24,7 +24,6 @@ RECORDINGS = {
     "mid-40-hub-frame": ("real/mid-40-hub-frame.csv", ["--shot-rate-hz", "100000"]),
     "tele-15": ("real/tele-15.pcd", ["--shot-rate-hz", "240385"]),
     "horizon": ("real/horizon-1.pcd", ["--shot-rate-hz", "240385"]),
-    "mid-40-sequence": ("livox-mid-40-sequence.csv", []),
 }
 
 
