@@ -27,7 +27,6 @@ DATA = {
     "reproduce.md": ('cp -r "$RISLEY_REPRODUCED" out/reproduction',),
     "README.md": (
         "risley simulate -o my.lvx --sensor mid-40-table3 --scene data/room.yaml --duration-s 1",
-        f"mkdir survey && risley simulate -o survey/one.lvx {HALL} --duration-s 0.5",
     ),
     "recording.md": (
         "risley simulate -o wall.lvx --sensor mid-40-table3 --scene data/room.yaml --duration-s 1",
