@@ -372,8 +372,18 @@ def short(value):
     return f"{value:.{digits}f}"
 
 
-def ratio(row, low="ratio_q1", high="ratio_q3", middle="peer_over_ours"):
-    return f"{short(row[middle])} x ({short(row[low])} to {short(row[high])})"
+def in_one_row(rows):
+    """Rows of one question as one, with what differs between instruction sets one after the other; what stands before a
+    colon is common."""
+    def joined(cells):
+        label, colon, _ = cells[0].rpartition(": ")
+        values = [cell.removeprefix(label + colon) for cell in cells]
+        return label + colon + (" / ".join(values) if len(set(values)) > 1 else values[0])
+
+    questions = {}
+    for row in rows:
+        questions.setdefault(row[0], []).append(row[1:])
+    return [(question, *map(joined, zip(*answers))) for question, answers in questions.items()]
 
 
 def ranged(row):
@@ -391,41 +401,38 @@ SETS = {"baseline": "SSE2", "avx2": "AVX2", "avx512": "AVX-512"}
 def kernel_rows(result):
     found, rows = result["found"], []
 
-    def add(question, set_name, peer, row, ours, accuracy, **columns):
-        rows.append((question, SETS.get(set_name, set_name), ours, peer, ratio(row, **columns), accuracy))
+    def add(question, set_name, peer, row, ours, accuracy, ratio="peer_over_ours"):
+        rows.append((question, SETS.get(set_name, set_name), ours, peer, short(row[ratio]), accuracy))
 
     def beams(row):
-        return f"{short(1e3 / row['ours_ns'])} million a second"
+        return short(1e3 / row["ours_ns"])
 
-    for kind, question in (("directions", "azimuth and zenith of shots"),
+    for kind, question in (("directions", "azimuth and zenith, million a second"),
                            ("sequence", "the same at constant speed, from times"),
-                           ("directions_in_memory", "azimuth and zenith of 4 million shots, in main memory"),
-                           ("jacobian", "both angles and 2 x 11 derivatives"),
-                           ("jacobian_prepared", "the same")):
+                           ("directions_in_memory", "the same of 4 million shots, in main memory"),
+                           ("jacobian", "both angles and 2 x 11 derivatives, ns"),
+                           ("jacobian_prepared", "the same, parameters prepared, ns")):
         for name in result["sets"]:
             row = found[f"{kind}/{name}"]
             if kind.startswith("jacobian"):
-                peer = f"Jets{', parameters prepared' if 'prepared' in kind else ''}: {short(row['peer_ns'])} ns"
-                add(question, name, peer, row, f"{short(row['ours_ns'])} ns", f"{row['error']:.0e} of Jets")
+                add(question, name, f"Jets, ns: {short(row['peer_ns'])}", row, short(row["ours_ns"]), f"to Jets: {row['error']:.0e}")
             elif kind == "directions_in_memory":
-                add(question, name, f"copying as many bytes: {short(row['peer_ns'])} ns, {short(row['peer_GB_per_s'])} GB/s",
-                    row, beams(row), "as above")
+                add(question, name, f"copying the bytes, ns: {short(row['peer_ns'])}", row, beams(row), "as above")
             else:
-                add(question, name, f"plain Eigen: {short(row['peer_ns'])} ns", row, beams(row), f"{row['error_rad']:.0e} rad")
+                add(question, name, f"plain Eigen, ns: {short(row['peer_ns'])}", row, beams(row), f"rad: {row['error_rad']:.0e}")
     row = found["numpy"]
-    add("azimuth and zenith, from Python", result["sets"][-1], f"numpy in blocks: {short(row['peer_ns'])} ns", row, beams(row),
-        f"{row['difference_rad']:.0e} rad of numpy")
+    add("the same from Python", result["sets"][-1], f"numpy in blocks, ns: {short(row['peer_ns'])}", row, beams(row),
+        f"rad to numpy: {row['difference_rad']:.0e}")
     for name in result["sets"]:
         if f"adjust/{name}" in found:
             row = found[f"adjust/{name}"]
-            add("calibration on a wall, 1 million ranges", name, f"Ceres: {short(row['peer_s'])} s", row,
-                f"{short(row['ours_s'])} s", f"same cost to {row['cost_difference']:.0e}", middle="cpu_over_ours",
-                low="cpu_ratio_min", high="cpu_ratio_max")
+            add("calibration on a wall, 1 million ranges, s", name, f"Ceres, s: {short(row['peer_s'])}", row,
+                short(row["ours_s"]), f"of the cost: {row['cost_difference']:.0e}", ratio="cpu_over_ours")
     for name in result["sets"]:
         row = found[f"filter_step/{name}"]
-        add("step of the filter, 12 states", name, f"Eigen, Jets, Joseph: {short(row['peer_ns'])} ns", row,
-            f"{short(row['ours_ns'])} ns", f"{row['difference_in_sigmas']:.0e} sigma of Joseph")
-    return rows
+        add("step of the filter, 12 states, ns", name, f"Eigen, Jets, Joseph, ns: {short(row['peer_ns'])}", row,
+            short(row["ours_ns"]), f"sigma to Joseph: {row['difference_in_sigmas']:.0e}")
+    return in_one_row(rows)
 
 
 def kernel_text(result):
@@ -435,7 +442,7 @@ def kernel_text(result):
     read, only = found["read/lvx"], found["bytes_only/lvx"]
     accumulated = ", ".join(f"{short(1e9 * found[f'accumulate/{name}']['per_shot'])} ns ({SETS.get(name, name)})"
                             for name in result["sets"])
-    lines = [table(("question", "with", "ours", "peer", "peer over ours, median (quartiles)", "accuracy"),
+    lines = [table(("question", "with", "ours", "peer", "peer over ours", "accuracy"),
                    kernel_rows(result)), "",
              f"- All {length} s of a recording, {RATE * length / 1e6:g} million shots, in the batch estimator take "
              f"{short(1 / batch['cpu_ratio'])} times less processor time than one pass of a filter with Eigen, Jets and "
@@ -456,15 +463,13 @@ def job_text(result):
     for name, row in result["found"].items():
         one, all_cores = row[f"threads_{few}"], row[f"threads_{many}"]
         rows.append((f"`{name}`: {row['does']}", ranged(one["seconds_per_minute"]),
-                     short(one["processor_seconds_per_minute"]["median"]), ranged(all_cores["seconds_per_minute"]),
-                     f"{ranged(row['speed_up'])}" if "speed_up" in row else "",
-                     f"{short(60 / one['seconds_per_minute']['median'])} x",
+                     ranged(all_cores["seconds_per_minute"]), f"{short(60 / one['seconds_per_minute']['median'])} x",
                      f"{ranged(one['over_bytes_only'])}" if row["read_MB"] + row["written_MB"] > 0 else "",
                      f"{one['memory_MB']:.0f}, {all_cores['memory_MB']:.0f} MB", row["quality"]))
     points = result["found"]["cloud"]
     rate = {count: 60 * RATE / points[f"threads_{count}"]["seconds_per_minute"]["median"] / 1e6 for count in (few, many)}
     return "\n".join([
-        table(("job", "s per recorded minute, one thread", "of the processor", f"{many} threads", "one thread over these",
+        table(("job", "s per recorded minute, one thread", f"{many} threads",
                "recording time over ours", "times the time of its bytes", "memory", "accuracy"), rows), "",
         f"Recordings of {result['seconds_of_recording']} s, {result['shots'] / 1e6:g} million shots. `cloud` makes "
         f"{short(rate[few])} million points a second on one core and {short(rate[many])} on {many}. The time of its bytes is "
@@ -487,7 +492,8 @@ def parameter_text(result, found):
     return table(("free parameters", f"`estimate` of {result['seconds_of_recording']} s, s", "iterations",
                   "sums over shots, ns a shot"),
                  [(row["free"], ranged(row["processor_seconds"]), row["iterations"],
-                   short(1e9 * kernel[row["free"]]) if row["free"] in kernel else "") for row in result["found"]])
+                   short(1e9 * kernel[row["free"]]) if row["free"] in kernel else "")
+                  for row in result["found"] if row["free"] in (1, 2, 4, 8)])
 
 
 def machine_text(result):

@@ -50,9 +50,8 @@ const steps = {
 // rows, columns: as many of every table. before: what to do on the page first.
 const pictures = [
   {
-    file: 'report.png', needs: ['estimate'], page: 'out/unit/report.html', width: 1160,
-    keep: [{ css: 'h1' }, { css: '.lead' }, { css: '.verdict' }, { section: /^Parameters$/ },
-           { figure: /^Angular velocity of prism/ }],
+    file: 'walls.png', needs: ['calibrate'], page: 'out/calibration/report.html', width: 1160,
+    keep: [{ css: '.verdict' }, { figure: /^Walls (before|after)/ }],
   },
   {
     file: 'estimate.png', needs: ['estimate'], page: 'out/unit/report.html', width: 1160,

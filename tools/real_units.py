@@ -24,7 +24,6 @@ RECORDINGS = {
     "mid-40-hub-frame": ("real/mid-40-hub-frame.csv", ["--shot-rate-hz", "100000"]),
     "tele-15": ("real/tele-15.pcd", ["--shot-rate-hz", "240385"]),
     "horizon": ("real/horizon-1.pcd", ["--shot-rate-hz", "240385"]),
-    "mid-40-sequence": ("livox-mid-40-sequence.csv", []),
 }
 
 
@@ -36,15 +35,8 @@ def number(value, sigma):
     return f"{value:.{digits}f}", f"{sigma:.{digits}f}"
 
 
-def unit_of(name):
-    for ending, unit in (("_deg_per_s", "deg/s"), ("_deg", "deg")):
-        if name.endswith(ending):
-            return unit
-    return "1"
-
-
 def in_words(name):
-    """The name of a parameter without its unit; prisms have capital letters."""
+    """The name of a parameter without its unit, which the page states; prisms have capital letters."""
     words = name.replace("_", " ").removesuffix(" deg per s").removesuffix(" deg")
     return re.sub(r"\b[a-h]\b", lambda letter: letter.group().upper(), words)
 
@@ -55,10 +47,14 @@ def grouped(count):
 
 
 def table(rows):
-    lines = ["| quantity | value | sigma | unit |", "|---|---|---|---|"]
-    for name, value, sigma, unit in rows:
-        text, spread = number(value, sigma)
-        lines.append(f"| {name} | {text} | {spread} | {unit} |")
+    """The horizontal and the vertical part of a quantity stand in one row."""
+    quantities = {}
+    for name, value, sigma in rows:
+        quantities.setdefault(re.sub(" (horizontal|vertical)$", "", name), []).append((name, *number(value, sigma)))
+    lines = ["| quantity | value | sigma |", "|---|---|---|"]
+    for whole, parts in quantities.items():
+        names, values, sigmas = zip(*parts)
+        lines.append(f"| {whole if len(parts) > 1 else names[0]} | {' / '.join(values)} | {' / '.join(sigmas)} |")
     return lines
 
 
@@ -72,14 +68,14 @@ def text_of(command, path, options):
     slips = found["slips"]
     lost = f" {sum(one['shots'] or 0 for one in slips)} shots are missing at {len(slips)} places." if slips else ""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    rows = [(in_words(name), one["value"], one["sigma_given_held"], unit_of(name))
+    rows = [(in_words(name), one["value"], one["sigma_given_held"])
             for name, one in found["parameters"].items()]
     if found["frame"]["estimated"]:
         rows += [(f"{axis} of the frame", found["frame"][f"{axis}_deg"]["value"],
-                  found["frame"][f"{axis}_deg"]["sigma"], "deg") for axis in ("yaw", "pitch")]
+                  found["frame"][f"{axis}_deg"]["sigma"]) for axis in ("yaw", "pitch")]
     for axis in ("azimuth", "zenith"):
         noise = found["noise"][f"{axis}_deg"]
-        rows.append((f"noise of the {axis}, without rounding", noise["value"], noise["sigma"], "deg"))
+        rows.append((f"noise of the {axis}", noise["value"], noise["sigma"]))
     residual = {axis: found["residuals"][f"{axis}_deg"]["rms"] for axis in ("azimuth", "zenith")}
     image = "mirrored" if found["mirrored"] else "not mirrored"
     if found["combination"] is not None:

@@ -43,7 +43,7 @@ class Warning(NamedTuple):
     Attributes
     ----------
     code : str
-        Stable, for programs; docs/files.md lists all.
+        Stable, for programs; docs/files/json.md lists all.
     message : str
         What it is, in words, with the place in the file.
     byte_offset, line : int

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""The codes of warnings are those of docs/files.md, and all are used."""
+"""The codes of warnings are those of docs/files/json.md, and all are used."""
 import pathlib
 import re
 import unittest
@@ -12,7 +12,7 @@ CODES = re.findall(r'(\w+)\{"(\w+)"\}', HEADER)
 
 class WarningCodesTest(unittest.TestCase):
     def test_the_documents_have_all(self):
-        _, _, text = (ROOT / "docs/files.md").read_text(encoding="utf-8").partition("\n| code | ")
+        _, _, text = (ROOT / "docs/files/json.md").read_text(encoding="utf-8").partition("\n| code | ")
         told = re.findall(r"^\| `(\w+)` \| \w.* \|$", text.partition("\n\n")[0], re.MULTILINE)
         self.assertEqual(told, [text for _, text in CODES])
 

@@ -135,6 +135,7 @@ class DocumentsTest(unittest.TestCase):
         self.folder = Path(tempfile.mkdtemp(prefix="risley-document-"))
         self.addCleanup(shutil.rmtree, self.folder)
         (self.folder / "data").symlink_to(SOURCE / "data")
+        (self.folder / "out").mkdir()  # docs/README.md, Before the examples
         built = self.folder / "build/command/apps/risley"
         built.mkdir(parents=True)
         (built / "risley").symlink_to(Path(COMMAND).resolve())

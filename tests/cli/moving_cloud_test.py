@@ -94,7 +94,7 @@ class MovingCloudTest(CommandTest):
 
     def read_las(self, name):
         """Points with their extra fields, and the table of the trajectory's errors, by the words of
-        docs/files.md."""
+        docs/files/clouds.md."""
         data = (self.folder / name).read_bytes()
         at, points_at, records = struct.unpack_from("<HII", data, 94)
         length, = struct.unpack_from("<H", data, 105)

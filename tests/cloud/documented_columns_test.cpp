@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// docs/files.md lists the columns of a cloud as kPointColumns does. RISLEY_KEEP_DOCUMENTS=1
+// docs/files/clouds.md lists the columns of a cloud as kPointColumns does. RISLEY_KEEP_DOCUMENTS=1
 // rewrites its table.
 #include <cstdlib>
 #include <string>
@@ -42,7 +42,7 @@ std::string table() {
 }
 
 TEST(DocumentedColumns, AreThoseOfTheList) {
-  const std::string path = in_source_tree("docs/files.md");
+  const std::string path = in_source_tree("docs/files/clouds.md");
   std::string page = io::read_text_file(path);
   const std::size_t begin = page.find(kHead);
   ASSERT_NE(begin, std::string::npos);
