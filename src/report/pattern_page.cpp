@@ -96,6 +96,7 @@ Chart ring_chart(const sensors::PatternCoverage& coverage) {
                 {},
                 {}};
     for (std::size_t i = 0; i < after.ring_density.size(); ++i) {
+      if (coverage.all_around && std::isnan(after.ring_density[i])) continue;  // about the zenith
       const double angle = degrees_from_radians(coverage.ring) * (static_cast<double>(i) + 0.5);
       line.x.push_back(coverage.all_around ? 90 - angle : angle);
       line.y.push_back(after.ring_density[i] * kSquareDegree);
