@@ -182,11 +182,11 @@ def coverage(risley, presets):
     for preset in presets:
         found = risley.json("pattern", "--sensor", preset, "--coverage",
                             *risley.start(preset))["coverage"]
-        field = found["field_of_view"]
+        field, until = found["field_of_view"], found["time_to_cover_s"]["90"]
         rows.append((f"`{preset}`", reach(field), f"{field['deg2']:.0f}",
                      *(f"{100 * one['covered']:.1f} %, {one['gap_deg']:.2f}°"
                        for one in found["after"]),
-                     f"{found['time_to_cover_s']['90']:.2f}",
+                     "later" if until is None else f"{until:.2f}",
                      f"{found['after'][-1]['density_per_deg2']['mean']:.1f}"))
     return table(("preset", "half angle, deg, or elevations", "field of view, deg²", "0.1 s", "0.2 s", "0.5 s",
                   "1 s", "90 % covered after, s", "shots per deg² after 1 s"), rows)
