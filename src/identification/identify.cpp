@@ -155,6 +155,8 @@ class TrainSearch {
                 std::atan2(-mean.imag(), std::hypot(forward, mean.real()))};
     }
     frame_.axis_up = all_around;
+    // It shows all around, and motion is judged before anything else is freed.
+    start_freedom_.frame = start_freedom_.frame || all_around;
     choose_trial_window();
     compared_ = thinned(grid, 0, grid.size(), kComparedShots);
   }

@@ -221,7 +221,7 @@ TEST(Identify, AScanAllAroundIsOfAWedgeAndAReflector) {
     unit.train.set("entrance_face_a_deg", radians_from_degrees(9.9));
     unit.train.set("exit_face_a_deg", radians_from_degrees(29.2));
     unit.train.set("mirror_face_b_deg", radians_from_degrees(50.1));
-    estimation::AngleSeries series = recording_of(unit, 1.0, named, 3);
+    estimation::AngleSeries series = recording_of(unit, 0.5, named, 3);
     const estimation::FrameTurn turn{0.02, -0.01, true};
     estimation::turn(series, estimation::recording_from_sensor(turn));
     const Identification found = identify(series);
