@@ -63,7 +63,8 @@ TEST(PatternPage, AScanAllAroundIsAPanoramaOfAzimuthAndElevation) {
     EXPECT_NEAR(*std::min_element(elevation.begin(), elevation.end()), -7.2, 1);
     EXPECT_NEAR(*std::max_element(elevation.begin(), elevation.end()), 52.2, 1);
   }
-  // Density times solid angle, of cells that narrow away from the horizon.
+  // Density times solid angle, of cells that narrow away from the horizon; those on the rim, which
+  // the field of view does not fill, count whole.
   const nlohmann::json& cells = charts[1]["series"][0];
   const double edge = cells["cell_width"];
   EXPECT_NEAR(std::remainder(360, edge), 0, 1e-9) << "a whole number of cells goes around";
@@ -73,7 +74,7 @@ TEST(PatternPage, AScanAllAroundIsAPanoramaOfAzimuthAndElevation) {
     const double up = radians_from_degrees(cells["y"][i].get<double>());
     shots += cells["value"][i].get<double>() * edge * edge * std::cos(up);
   }
-  EXPECT_NEAR(shots, static_cast<double>(details.coverage.after[0].shots), 0.03 * shots);
+  EXPECT_NEAR(shots, static_cast<double>(details.coverage.after[0].shots), 0.08 * shots);
 }
 
 TEST(PatternPage, StaysSmallWithSmallCells) {
