@@ -479,6 +479,7 @@ class TrainSearch {
     for (int round = 0; round < 3; ++round) {
       const TrainModel& model = chosen[leader].fit.model;
       TrainFit best;
+      best.rms = std::numeric_limits<double>::infinity();
       TrainFreedom wide = start_freedom_;
       wide.one_glass = chosen[leader].fit.model.train.prisms() < 2 || grid_.emitters == 1;
       motion = choose_motion(compared_, model, wide, progress_);
@@ -493,6 +494,11 @@ class TrainSearch {
       });
       const auto least = std::min_element(
           fits.begin(), fits.end(), [](const auto& a, const auto& b) { return a.rms < b.rms; });
+      if (!std::isfinite(least->rms)) {
+        throw EstimationError(
+            "no train follows the whole of this recording: its rotors could not be followed beyond "
+            "its middle");
+      }
       const auto now = static_cast<std::size_t>(least - fits.begin());
       progress_.report(0.6 + 0.1 * round);
       if (now == leader) break;

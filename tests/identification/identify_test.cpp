@@ -253,6 +253,13 @@ TEST(Identify, AScanAllAroundIsOfAWedgeAndAReflector) {
   }
 }
 
+// In 0.1 s the lines of rotors that turn nearly alike are one, and no prisms send beams backwards.
+TEST(Identify, AScanAllAroundThatIsTooShortIsRefused) {
+  const estimation::AngleSeries series =
+      recording_of(sensors::load_sensor("mid-360"), 0.1, true, 0);
+  EXPECT_THROW(identify(series), EstimationError);
+}
+
 TEST(Identify, RefusesWhatCannotAnswer) {
   EXPECT_NE(refusal([] { identify({}, {.fastest = 0}); }).find("fastest"), std::string::npos);
   EXPECT_NE(refusal([] { identify({}, {.most_prisms = 4}); }).find("most_prisms"),
