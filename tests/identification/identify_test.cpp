@@ -253,11 +253,16 @@ TEST(Identify, AScanAllAroundIsOfAWedgeAndAReflector) {
   }
 }
 
-// In 0.1 s the lines of rotors that turn nearly alike are one, and no prisms send beams backwards.
-TEST(Identify, AScanAllAroundThatIsTooShortIsRefused) {
-  const estimation::AngleSeries series =
-      recording_of(sensors::load_sensor("mid-360"), 0.1, true, 0);
-  EXPECT_THROW(identify(series), EstimationError);
+// In 0.1 s the lines of rotors that turn nearly alike may be one: no answer, but no wrong one.
+TEST(Identify, AShortScanAllAroundIsNotAnsweredWrongly) {
+  for (const std::uint64_t seed : {0U, 1U, 2U}) {
+    try {
+      const Identification found =
+          identify(recording_of(sensors::load_sensor("mid-360"), 0.1, true, seed));
+      EXPECT_TRUE(!found.fits || to_string(found.best().train().face_order()) == "AA-PMU") << seed;
+    } catch (const EstimationError&) {
+    }
+  }
 }
 
 TEST(Identify, RefusesWhatCannotAnswer) {
