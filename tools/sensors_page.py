@@ -170,28 +170,33 @@ def gallery(presets):
     return lines
 
 
-def seen_as_a_disc(presets):
-    return [one for one in presets if not one.startswith("mid-360")]
+def reach(field):
+    """How far a field of view goes from the X axis, or of one all around from where to where."""
+    if "elevation_deg" not in field:
+        return f"{field['half_angle_deg']:.2f}"
+    return f"{field['elevation_deg']['min']:.2f} to {field['elevation_deg']['max']:.2f}"
 
 
 def coverage(risley, presets):
     rows = []
-    for preset in seen_as_a_disc(presets):
+    for preset in presets:
         found = risley.json("pattern", "--sensor", preset, "--coverage",
                             *risley.start(preset))["coverage"]
-        field = found["field_of_view"]
-        rows.append((f"`{preset}`", f"{field['half_angle_deg']:.2f}", f"{field['deg2']:.0f}",
+        field, until = found["field_of_view"], found["time_to_cover_s"]["90"]
+        rows.append((f"`{preset}`", reach(field), f"{field['deg2']:.0f}",
                      *(f"{100 * one['covered']:.1f} %, {one['gap_deg']:.2f}°"
                        for one in found["after"]),
-                     f"{found['time_to_cover_s']['90']:.2f}",
+                     "later" if until is None else f"{until:.2f}",
                      f"{found['after'][-1]['density_per_deg2']['mean']:.1f}"))
-    return table(("preset", "half angle, deg", "field of view, deg²", "0.1 s", "0.2 s", "0.5 s",
+    return table(("preset", "half angle, deg, or elevations", "field of view, deg²", "0.1 s", "0.2 s", "0.5 s",
                   "1 s", "90 % covered after, s", "shots per deg² after 1 s"), rows)
 
 
 def carried(risley, presets):
     rows = []
-    for preset in seen_as_a_disc(presets):
+    for preset in presets:
+        if preset.startswith("mid-360"):
+            continue  # no scanner of HELIOS++ has a mirror behind a wedge
         made = risley.json("pattern", "--sensor", preset, "--format", "helios-xml", "-o",
                            risley.folder / "scanner.xml", *risley.start(preset))
         residual = made["residual"]

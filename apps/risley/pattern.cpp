@@ -62,8 +62,12 @@ sensors::ScanPatternOptions scan_options(const PatternOptions& options) {
 }
 
 void print_coverage(const sensors::PatternCoverage& coverage) {
-  say("field of view {:.5g} square degrees within {:.2f} degree of the axis\n",
-      coverage.field_solid_angle / kSquareDegree, degrees_from_radians(coverage.field_half_angle));
+  const double half_angle = degrees_from_radians(coverage.field_half_angle);
+  say("field of view {:.5g} square degrees {}\n", coverage.field_solid_angle / kSquareDegree,
+      coverage.all_around
+          ? fmt::format("all around, at elevations of {:.2f} to {:.2f} degree", 90 - half_angle,
+                        90 - degrees_from_radians(coverage.field_inner_angle))
+          : fmt::format("within {:.2f} degree of the axis", half_angle));
   Table table(
       {"after, s", "shots", "covered, %", "mean, 1/deg2", "least", "greatest", "largest gap, deg"});
   for (const sensors::CoverageAfter& one : coverage.after) {

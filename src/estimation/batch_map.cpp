@@ -472,7 +472,7 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
   const auto rotors = static_cast<std::size_t>(prisms);
   Solution result;
   std::vector<RotorProcess> process = options.rotor_process.empty()
-                                          ? std::vector<RotorProcess>(rotors, kSettlingProcess)
+                                          ? std::vector<RotorProcess>(rotors, start.motion.process)
                                           : options.rotor_process;
 
   // Coarse: tracked phases, then robust steps.

@@ -58,11 +58,12 @@ inline RotorState loose_state(const Start& start, double angle_sigma, double spe
 }
 
 /// Moves a state on to a time.
-inline void predict(RotorState& state, std::int64_t time_ns) {
+inline void predict(RotorState& state, std::int64_t time_ns,
+                    const RotorProcess& process = kSettlingProcess) {
   const double dt = 1e-9 * static_cast<double>(time_ns - state.time_ns);
   state.time_ns = time_ns;
   for (Eigen::Index k = 0; k < state.mean.size(); k += 3) advance_rows(state.mean, k, dt);
-  predict_covariance(state.covariance, dt, [](std::size_t) { return kSettlingProcess; });
+  predict_covariance(state.covariance, dt, [&](std::size_t) { return process; });
 }
 
 /// One Gauss-Newton step from a state to some shots and a prior together.

@@ -21,6 +21,7 @@
 #include "risley/estimation/spectral_lines.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/parallel/parallel.hpp"
+#include "risley/sensors/scan_pattern.hpp"
 
 #include "estimation/field_of_view.hpp"
 #include "estimation/frame_prior.hpp"
@@ -59,14 +60,37 @@ struct WindowFit {
   double prior_chi2 = 0;  // of the parameters: how unusual a sensor it would be
 };
 
+/// The greatest acceleration of a swing, rad/s^2.
+double swing_acceleration(const sensors::Sensor& sensor) {
+  const double frequency = sensors::swing_angular_frequency(sensor);
+  double greatest = 0;
+  if (frequency > 0) {
+    for (const double swing : sensor.sequence->swing) {
+      greatest = std::max(greatest, std::abs(swing) * frequency);
+    }
+  }
+  return greatest;
+}
+
+/// A swing bends little within an eighth of its period.
+FirstMotion first_motion(const sensors::Sensor& sensor) {
+  FirstMotion motion;
+  const double acceleration = swing_acceleration(sensor);
+  if (!(acceleration > 0)) return motion;
+  motion.window = std::min(motion.window, kTwoPi / sensors::swing_angular_frequency(sensor) / 8);
+  motion.process.acceleration =
+      std::max(motion.process.acceleration, acceleration * std::sqrt(motion.window));
+  return motion;
+}
+
 /// Robust least squares with Levenberg's damping: first the motion, then the parameters too.
 class WindowFitter {
  public:
   /// @param frame  the frame's parameters where its turn is free
   WindowFitter(const AngleSeries& shots, const PrismTrain& nominal,
                const std::vector<FreeParameter>& free, const std::vector<FreeParameter>& frame,
-               double noise)
-      : shots_(shots), free_(free) {
+               double noise, double acceleration_sigma)
+      : shots_(shots), free_(free), acceleration_sigma_(acceleration_sigma) {
     if (!frame.empty()) hold_last_bearing(nominal.layout(), free_);
     prior_ = free_values(nominal, free_);
     all_ = free_;
@@ -165,7 +189,8 @@ class WindowFitter {
     accumulate(*series, fit.knot, fit.train, all_, weights_, equations_, {azimuth_, zenith_, {}});
     double cost = equations_.cost + prior_chi2(fit);
     for (int k = 0; k < fit.knot.prisms; ++k) {
-      cost += std::pow(fit.knot.state[static_cast<std::size_t>(3 * k + 2)] / kAccelerationSigma, 2);
+      cost +=
+          std::pow(fit.knot.state[static_cast<std::size_t>(3 * k + 2)] / acceleration_sigma_, 2);
     }
     return cost;
   }
@@ -189,7 +214,7 @@ class WindowFitter {
       gradient[d + i] -= offset[i] / (sigma * sigma);
     }
     for (Eigen::Index k = 0; k < fit.knot.prisms; ++k) {
-      const double weight = 1.0 / (kAccelerationSigma * kAccelerationSigma);
+      const double weight = 1.0 / (acceleration_sigma_ * acceleration_sigma_);
       normal(3 * k + 2, 3 * k + 2) += weight;
       gradient[3 * k + 2] -= weight * fit.knot.state[static_cast<std::size_t>(3 * k + 2)];
     }
@@ -208,6 +233,7 @@ class WindowFitter {
   const AngleSeries& shots_;
   std::vector<FreeParameter> free_, all_;
   Eigen::VectorXd prior_;
+  double acceleration_sigma_;
   ShotWeights weights_;
   NormalEquations equations_;
   AngleSeries turned_;
@@ -269,6 +295,8 @@ class StartWindow {
         found_(found),
         frame_(frame),
         axis_up_(sensor.train.layout().axis_up),
+        swings_(swing_acceleration(sensor) > 0),
+        motion_(first_motion(sensor)),
         turned_(frame.isIdentity() ? AngleSeries() : head),
         series_(frame.isIdentity() ? head : turned_),
         noise_(least_noise(options)),
@@ -317,7 +345,8 @@ class StartWindow {
     const std::vector<FreeParameter> frame =
         frame_is_free ? frame_parameters_ : std::vector<FreeParameter>();
     const WindowFit from_lines = fit;
-    WindowFitter fitter(shots, h.sensor.train, options_.free, frame, noise_);
+    const double acceleration = std::max(kAccelerationSigma, swing_acceleration(h.sensor));
+    WindowFitter fitter(shots, h.sensor.train, options_.free, frame, noise_, acceleration);
     fitter.run(fit);
     // Where the lines explain next to nothing more than others would, or leave much, their phases
     // mean little.
@@ -327,7 +356,7 @@ class StartWindow {
       const AngleSeries few = chosen(h.mirrored, kGridShots);
       WindowFit around = from_lines;
       around.knot.last_shot[0] = few.size();
-      WindowFitter(few, h.sensor.train, {}, {}, noise_).look_around(around);
+      WindowFitter(few, h.sensor.train, {}, {}, noise_, acceleration).look_around(around);
       around.knot.last_shot[0] = shots.size();
       fitter.run(around);
       if (around.rms < fit.rms) fit = std::move(around);
@@ -339,7 +368,7 @@ class StartWindow {
 
   Start start_of(const Answer& answer) const {
     const Hypothesis& h = *answer.trial.hypothesis;
-    const ShotRange rows = search_->shots();
+    const ShotRange rows = fitted_rows();
     Start start;
     start.time_ns = search_->time_ns();
     start.reach =
@@ -349,6 +378,7 @@ class StartWindow {
     start.combination = h.sensor.combination;
     start.mirrored = h.mirrored;
     start.residual_rms = answer.fit.rms;
+    start.motion = motion_;
     for (std::size_t k = 0; k < h.sensor.angular_velocity.size(); ++k) {
       start.rotation_angle.push_back(wrap_to_pi(answer.fit.knot.state[3 * k]));
       start.angular_velocity.push_back(answer.fit.knot.state[3 * k + 1]);
@@ -370,9 +400,19 @@ class StartWindow {
     return std::max(options.angle_noise, radians_from_degrees(1e-4));
   }
 
+  /// The shots of the lines; where speeds swing, those about their middle that a parabola follows.
+  ShotRange fitted_rows() const {
+    ShotRange rows = search_->shots();
+    if (!swings_) return rows;
+    const auto half = static_cast<std::int64_t>(0.5e9 * motion_.window);
+    while (series_.time_ns[rows.begin] < search_->time_ns() - half) ++rows.begin;
+    while (series_.time_ns[rows.end - 1] > search_->time_ns() + half) --rows.end;
+    return rows;
+  }
+
   AngleSeries chosen(bool mirrored, std::size_t most) const {
     AngleSeries shots;
-    const ShotRange rows = search_->shots();
+    const ShotRange rows = fitted_rows();
     const std::size_t stride = thinning_stride(series_, rows, most);
     for (std::size_t i = rows.begin; i < rows.end; i += stride) shots.append(series_, i);
     if (mirrored) mirror(shots, axis_up_);
@@ -382,7 +422,8 @@ class StartWindow {
   const StartOptions& options_;
   StartFindings& found_;
   Eigen::Matrix3d frame_;
-  bool axis_up_;
+  bool axis_up_, swings_;
+  FirstMotion motion_;
   AngleSeries turned_;
   const AngleSeries& series_;
   double noise_;

@@ -24,7 +24,7 @@ constexpr double kOtherSigma[] = {radians_from_degrees(1.0), radians_from_degree
                                   radians_from_degrees(1e5)};
 /// Searched range of white acceleration, deg/s/sqrt(s), and white jerk, deg/s^2/sqrt(s), decades.
 constexpr double kLowestAcceleration = -6, kHighestAcceleration = 3;
-constexpr double kLowestJerk = -5, kHighestJerk = 5;
+constexpr double kLowestJerk = -5, kHighestJerk = 8;
 /// A motion model with one number more must be this much likelier.
 constexpr double kWorthIt = 3.0;
 constexpr int kRounds = 8;

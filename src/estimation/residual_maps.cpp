@@ -97,7 +97,7 @@ ResidualMap map_of(const Estimate& estimate, double cell, const PlaceOf& place_o
 
 ResidualMap residuals_over_field(const Estimate& estimate, double cell) {
   return map_of(estimate, cell, [](const SolvedShots& solved, std::size_t i) {
-    return std::pair(solved.shots.azimuth[i] - solved.residuals.azimuth[i],
+    return std::pair(wrap_to_pi(solved.shots.azimuth[i] - solved.residuals.azimuth[i]),
                      solved.shots.zenith[i] - solved.residuals.zenith[i]);
   });
 }

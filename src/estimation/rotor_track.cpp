@@ -21,7 +21,6 @@
 namespace risley::estimation {
 namespace {
 
-constexpr double kTrackStep = 0.025;  // s, a window of the tracker
 /// Of the start about the truth, where only few shots decided it.
 constexpr double kStartAngleSigma = radians_from_degrees(5.0);
 constexpr double kStartSpeedSigma = radians_from_degrees(100.0);
@@ -159,7 +158,7 @@ void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start
   require_start(start, knots.prisms);
   check_noise(noise);
   Tracker tracker(series, start, noise);
-  const auto step_ns = static_cast<std::int64_t>(kTrackStep * 1e9);
+  const auto step_ns = static_cast<std::int64_t>(start.motion.window * 1e9);
   const auto rows_about = [&](std::int64_t middle) {
     const auto begin = series.time_ns.begin();
     const auto from = begin + static_cast<std::ptrdiff_t>(shots.begin);
@@ -177,7 +176,7 @@ void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start
         direction > 0 ? series.time_ns[shots.end - 1] : series.time_ns[shots.begin];
     RotorState now = at_start;
     while (direction * (end - now.time_ns) > 0) {
-      predict(now, now.time_ns + direction * step_ns);
+      predict(now, now.time_ns + direction * step_ns, start.motion.process);
       if (tracker.update(now, rows_about(now.time_ns))) states.push_back(now);
     }
     if (now.time_ns != states.back().time_ns) states.push_back(now);  // only predicted

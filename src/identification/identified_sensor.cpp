@@ -67,7 +67,9 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
   sensor.reference = sensors::CalibrationReference::none;
   sensor.device_type = 0;
   sensor.train = model.train;
+  const bool all_around = model.train.layout().axis_up;
   sensor.geometry = {{kThickness}, {kSpacing}};
+  if (all_around) sensor.geometry = {{0.0}, {0.0}};
   sensor.shot_rate = 1 / identification.step;
   sensors::ScanSequence sequence;
   std::vector<int> order(static_cast<std::size_t>(emitters));
@@ -123,7 +125,7 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
   sensor.sequence.reset();
   if (repeatable) sensor.sequence = sequence;
 
-  double widest = 0;
+  double widest = all_around ? kPi : 0;
   for (std::size_t i = 0; i < identification.grid.size(); ++i) {
     const double azimuth = identification.grid.azimuth[i] - model.frame.yaw;
     const double elevation = 0.5 * kPi - identification.grid.zenith[i] + model.frame.pitch;
@@ -160,10 +162,14 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
     sensor.set_knowledge({info.name, sigma.value_or(0.0), sigma ? kFound : "held by convention"});
   }
   sensor.set_knowledge({"angle_noise_deg", 0, fmt::format("residuals, {}", kFound)});
-  sensor.set_knowledge({"field_of_view_deg", 0, fmt::format("the widest shot, {}", kFound)});
+  sensor.set_knowledge(
+      {"field_of_view_deg", 0,
+       fmt::format("{}, {}", all_around ? "all around" : "the widest shot", kFound)});
   for (const auto& [size, sigma] : {std::pair{"prism_thickness_m", kThicknessSigma},
                                     std::pair{"prism_spacing_m", kSpacingSigma}}) {
-    sensor.set_knowledge({size, sigma, "assumed, as of a Mid-40: directions do not show it"});
+    sensor.set_knowledge(
+        {size, all_around ? 0.0 : sigma,
+         fmt::format("assumed, as of a Mid-{}: directions do not show it", all_around ? 360 : 40)});
   }
   sensor.set_knowledge({"shot_rate_hz", 0, fmt::format("times of the shots, {}", kFound)});
   for (const char* assumed :
@@ -194,6 +200,11 @@ std::optional<Likeness> likeness(const Identification& identification,
           return (train[place::refractive_index(k)] - 1) * train[place::wedge_angle(k)];
         };
         worst = std::max(worst, std::abs(speed / nominal - 1) / kLikeSpeed);
+        if (known.train.layout().kind[k] == ElementKind::wedge) {
+          const int face = place::prism_tilt_vertical(k);
+          worst = std::max(worst,
+                           std::abs(one->train()[face] / known.train[face] - 1) / kLikeDeviation);
+        }
         worst = std::max(
             worst, std::abs(deviation(one->train()) / deviation(known.train) - 1) / kLikeDeviation);
       }

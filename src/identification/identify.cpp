@@ -9,9 +9,12 @@
 #include <optional>
 #include <utility>
 
+#include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/estimation/packed_series.hpp"
+#include "risley/optics/observation_model.hpp"
 #include "risley/optics/parameters.hpp"
 #include "risley/parallel/parallel.hpp"
 
@@ -48,6 +51,13 @@ constexpr std::size_t kMostShots = 1'500'000;
 constexpr std::size_t kOwnLines = 5;
 /// Wedges and indices from which a fit starts: the deviation is that of the line.
 constexpr std::array<double, 3> kStartIndex{1.45, 1.6, 1.85};
+/// A wedge and a reflector are tried with so many angles between them, each with the speeds of any
+/// two of so many lines.
+constexpr int kReflectorPhases = 12;
+constexpr std::size_t kReflectorLines = 4;
+/// A scan reaches all around where each of so many sectors about Z holds a tenth of its share.
+constexpr std::size_t kSectors = 36;
+constexpr double kFewestInSector = 0.1;
 /// A frame that is turned by more than an emitter can lean is a turned frame.
 constexpr double kTurnedFrame = 0.03;
 constexpr double kOneGlassLead = 9;
@@ -119,11 +129,14 @@ ShotGrid thinned(const ShotGrid& grid, std::size_t begin, std::size_t end, std::
 
 class TrainSearch {
  public:
-  /// @param window  in which the lines were looked for, s
-  TrainSearch(const ShotGrid& grid, LineSpectrum spectrum, double window,
+  /// @param spectrum    in the train's frame
+  /// @param window      in which the lines were looked for, s
+  /// @param all_around  of a wedge and a reflector that turn about Z; otherwise of prisms about X
+  TrainSearch(const ShotGrid& grid, LineSpectrum spectrum, double window, bool all_around,
               const IdentifyOptions& options, const Progress& progress)
       : grid_(grid),
         spectrum_(std::move(spectrum)),
+        all_around_(all_around),
         window_(std::min(window, grid.duration())),
         options_(options),
         progress_(progress) {
@@ -133,17 +146,23 @@ class TrainSearch {
     for (const Complex& constant : spectrum_.constant) {
       mean += constant / static_cast<double>(spectrum_.constant.size());
     }
+    // Beams all around are on average as long along the axis as their mean height.
+    if (all_around) mean /= mean_height(grid);
     if (std::abs(mean) > kTurnedFrame && std::abs(mean) < 1) {
       start_freedom_.frame = true;
       const double forward = std::sqrt(1 - std::norm(mean));
       frame_ = {std::atan2(mean.real(), forward),
                 std::atan2(-mean.imag(), std::hypot(forward, mean.real()))};
     }
+    frame_.axis_up = all_around;
+    // It shows all around, and motion is judged before anything else is freed.
+    start_freedom_.frame = start_freedom_.frame || all_around;
     choose_trial_window();
     compared_ = thinned(grid, 0, grid.size(), kComparedShots);
   }
 
   Identification run() {
+    if (all_around_) return compare(try_reflector());
     std::vector<Trial> trials;
     for (int prisms = 1; prisms <= options_.most_prisms; ++prisms) {
       if (static_cast<std::size_t>(prisms) > spectrum_.lines.size()) break;
@@ -163,6 +182,12 @@ class TrainSearch {
   }
 
  private:
+  static double mean_height(const ShotGrid& grid) {
+    double sum = 0;
+    for (const double zenith : grid.zenith) sum += std::cos(zenith);
+    return sum / static_cast<double>(grid.size());
+  }
+
   void choose_trial_window() {
     double slowest = options_.fastest, closest = options_.fastest;
     for (std::size_t a = 0; a < std::min<std::size_t>(3, spectrum_.lines.size()); ++a) {
@@ -205,16 +230,92 @@ class TrainSearch {
       line.coefficient(k, 1) = zero + own.angular_velocity * trial_end_;
     }
     model.rotors = resampled(line, RotorCurves(prisms, trial_begin_, trial_end_, 1, 4, false));
-    if (grid_.emitters > 1) {
-      const Complex off =
-          start_freedom_.frame ? Complex(std::sin(frame_.yaw), -std::sin(frame_.pitch)) : Complex{};
-      for (int j = 0; j < grid_.emitters; ++j) {
-        const Complex constant = spectrum_.constant[static_cast<std::size_t>(j)] - off;
-        model.train.set_place(place::incident_beam_horizontal(j, prisms), -constant.real());
-        model.train.set_place(place::incident_beam_vertical(j, prisms), constant.imag());
+    set_emitters(model.train);
+    return model;
+  }
+
+  /// The emitters where their constants say.
+  void set_emitters(PrismTrain& train) const {
+    if (grid_.emitters == 1) return;
+    const int prisms = train.prisms();
+    Complex off =
+        start_freedom_.frame ? Complex(std::sin(frame_.yaw), -std::sin(frame_.pitch)) : Complex{};
+    if (all_around_) off *= mean_height(grid_);
+    // Behind a mirror most of an emitter's lean turns with the reflector.
+    const double seen = all_around_ ? 0.35 : 1.0;
+    for (int j = 0; j < grid_.emitters; ++j) {
+      const Complex constant = (spectrum_.constant[static_cast<std::size_t>(j)] - off) / seen;
+      train.set_place(place::incident_beam_horizontal(j, prisms), -constant.real());
+      train.set_place(place::incident_beam_vertical(j, prisms), constant.imag());
+    }
+  }
+
+  /// A wedge and a reflector that turn with two of the lines, from the optics of the Mid-360.
+  /// @param between  angle of the wedge from the reflector in the middle of the window, rad
+  TrainModel start_of_reflector(std::size_t wedge, std::size_t reflector, double between) const {
+    TrainModel model;
+    model.train = PrismTrain({FaceOrder::angled_angled, FaceOrder::perpendicular_mirror_upright},
+                             grid_.emitters);
+    model.frame = frame_;
+    model.lag.assign(static_cast<std::size_t>(grid_.emitters), 0.0);
+    set_emitters(model.train);
+    const Line &a = spectrum_.lines[wedge], &b = spectrum_.lines[reflector];
+    // At rotation angle 0 the beam leaves the reflector downwards.
+    const double middle = 0.5 * (trial_begin_ + trial_end_);
+    const double zero = std::arg(b.amplitude) + 0.5 * kPi + b.angular_velocity * middle;
+    RotorCurves line(2, trial_begin_, trial_end_, 1, 1, true);
+    for (const int end : {0, 1}) {
+      const double since = (end == 0 ? trial_begin_ : trial_end_) - middle;
+      line.coefficient(0, end) = zero + between + a.angular_velocity * since;
+      line.coefficient(1, end) = zero + b.angular_velocity * since;
+    }
+    model.rotors = resampled(line, RotorCurves(2, trial_begin_, trial_end_, 1, 4, false));
+    return model;
+  }
+
+  /// The best fit with every pair of lines as the speeds of wedge and reflector, best first.
+  std::vector<Trial> try_reflector() const {
+    std::vector<Trial> trials;
+    const std::size_t own = std::min(kReflectorLines, spectrum_.lines.size());
+    for (std::size_t a = 0; a < own; ++a) {
+      for (std::size_t b = 0; b < own; ++b) {
+        if (a == b) continue;
+        trials.push_back(
+            {{{a, b}, {FaceOrder::angled_angled, FaceOrder::perpendicular_mirror_upright}}, {}});
       }
     }
-    return model;
+    if (trials.empty()) throw EstimationError("a scan all around with a single line");
+    const ShotGrid rough = thinned(trial_grid_, 0, trial_grid_.size(), kRoughShots);
+    TrainFreedom free_glass = start_freedom_;
+    free_glass.one_glass = false;
+    parallel::for_each(trials.size(), [&](std::size_t t) {
+      TrainFit& best = trials[t].fit;
+      best.rms = std::numeric_limits<double>::infinity();
+      const auto take_better = [&](TrainFit fit) {
+        if (fit.rms < best.rms) best = std::move(fit);
+      };
+      for (int phase = 0; phase < kReflectorPhases; ++phase) {
+        const TrainModel start =
+            start_of_reflector(trials[t].arrangement.lines[0], trials[t].arrangement.lines[1],
+                               kTwoPi * phase / kReflectorPhases);
+        take_better(fit_train(rough, start, {}, {.iterations = 12, .tolerance = kRoughTolerance},
+                              progress_.silent()));
+      }
+      if (!std::isfinite(best.rms)) return;
+      const TrainModel start = best.model;
+      best.rms = std::numeric_limits<double>::infinity();
+      take_better(
+          fit_train(trial_grid_, start, start_freedom_, {.iterations = 20}, progress_.silent()));
+      if (!std::isfinite(best.rms)) return;
+      take_better(fit_train(trial_grid_, TrainModel(best.model), free_glass, {.iterations = 15},
+                            progress_.silent()));
+    });
+    std::stable_sort(trials.begin(), trials.end(), better);
+    if (!std::isfinite(trials.front().fit.rms)) {
+      throw EstimationError(
+          "no wedge and reflector send their beams where this recording has them");
+    }
+    return trials;
   }
 
   /// The best fits of arrangements of sets of lines, on the trial window: of all of them roughly,
@@ -378,6 +479,7 @@ class TrainSearch {
     for (int round = 0; round < 3; ++round) {
       const TrainModel& model = chosen[leader].fit.model;
       TrainFit best;
+      best.rms = std::numeric_limits<double>::infinity();
       TrainFreedom wide = start_freedom_;
       wide.one_glass = chosen[leader].fit.model.train.prisms() < 2 || grid_.emitters == 1;
       motion = choose_motion(compared_, model, wide, progress_);
@@ -392,6 +494,11 @@ class TrainSearch {
       });
       const auto least = std::min_element(
           fits.begin(), fits.end(), [](const auto& a, const auto& b) { return a.rms < b.rms; });
+      if (!std::isfinite(least->rms)) {
+        throw EstimationError(
+            "no train follows the whole of this recording: its rotors could not be followed beyond "
+            "its middle");
+      }
       const auto now = static_cast<std::size_t>(least - fits.begin());
       progress_.report(0.6 + 0.1 * round);
       if (now == leader) break;
@@ -607,6 +714,7 @@ class TrainSearch {
 
   const ShotGrid& grid_;
   LineSpectrum spectrum_;
+  bool all_around_;
   double window_;
   IdentifyOptions options_;
   const Progress& progress_;
@@ -634,9 +742,32 @@ std::string to_string(EmitterTiming timing) {
 
 namespace {
 
+/// Directions of a sensor that turns about Z in the frame of its train, whose X is the axis.
+void to_train_frame(ShotGrid& grid) {
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const auto v = direction_from_angles<double>({grid.azimuth[i], grid.zenith[i]});
+    const auto angles = angles_from_direction(in_train_frame<kWedgeAndReflector>(v));
+    grid.azimuth[i] = angles.azimuth;
+    grid.zenith[i] = angles.zenith;
+  }
+}
+
+/// Whether a scan reaches all around Z.
+bool is_all_around(const ShotGrid& grid) {
+  std::array<std::size_t, kSectors> shots{};
+  for (const double azimuth : grid.azimuth) {
+    const double share = wrap_to_two_pi(azimuth) / kTwoPi;
+    ++shots[std::min(kSectors - 1, static_cast<std::size_t>(share * kSectors))];
+  }
+  const double fewest = kFewestInSector * static_cast<double>(grid.size()) / kSectors;
+  return static_cast<double>(*std::min_element(shots.begin(), shots.end())) >= fewest;
+}
+
 /// The lines of the beginning of a scan, and its emitters where they are not named.
-LineSpectrum lines_of(ShotGrid& grid, bool named, double window, const IdentifyOptions& options) {
+LineSpectrum lines_of(ShotGrid& grid, bool named, double window, bool all_around,
+                      const IdentifyOptions& options) {
   ShotGrid head = rows_of(grid, 0, row_at(grid, window));
+  if (all_around) to_train_frame(head);
   const LineSpectrumOptions lines{.fastest = options.fastest};
   LineSpectrum spectrum = line_spectrum(head, lines);
   const int period = named ? grid.emitters : emitter_period(head, spectrum.lines);
@@ -671,10 +802,22 @@ Identification identify(const estimation::AngleSeries& series, const IdentifyOpt
   if (grid.duration() > kLongest) grid = rows_of(grid, 0, row_at(grid, kLongest));
   const bool named = grid.emitters > 1;
   Identification result;
+  if (is_all_around(grid)) {
+    ShotGrid numbered = grid;
+    const double window = std::max(kLineWindow, kLineShots * grid.step);
+    try {
+      LineSpectrum spectrum = lines_of(numbered, named, window, true, options);
+      progress.report(0.1);
+      result = TrainSearch(numbered, std::move(spectrum), window, true, options, progress).run();
+      result.emitters_named = named;
+      if (result.fits) return result;
+    } catch (const EstimationError&) {  // prisms may still have made it
+    }
+  }
   for (double window = std::max(kLineWindow, kLineShots * grid.step);; window *= kLongerWindow) {
-    LineSpectrum spectrum = lines_of(grid, named, window, options);
+    LineSpectrum spectrum = lines_of(grid, named, window, false, options);
     progress.report(0.1);
-    result = TrainSearch(grid, std::move(spectrum), window, options, progress).run();
+    result = TrainSearch(grid, std::move(spectrum), window, false, options, progress).run();
     if (result.fits || window >= grid.duration()) break;
   }
   result.emitters_named = named;

@@ -30,13 +30,21 @@ constexpr double kLargestDeviation = radians_from_degrees(40);
 constexpr std::size_t kChunkShots = 4096;
 constexpr double kOutlierSigmas = 6;
 
-/// One constant that is fitted.
+/// One constant that is fitted. Of a prism the deviation stays while the glass changes; a wedge
+/// with two angles and a reflector have their angles as places.
 struct Unknown {
   enum class Kind { glass, deviation, place, lag, frame_yaw, frame_pitch };
   Kind kind;
   int first = 0, last = 0;  ///< prisms, both included; the place; the emitter
   double prior_sigma = 0;   ///< about 0; 0: none
 };
+
+bool is_prism(const PrismTrain& train, int element) {
+  return train.layout().kind[element] == ElementKind::prism;
+}
+bool has_two_angles(const PrismTrain& train, int element) {
+  return train.layout().kind[element] == ElementKind::wedge;
+}
 
 std::vector<Unknown> unknowns_of(const PrismTrain& train, const TrainFreedom& freedom) {
   using Kind = Unknown::Kind;
@@ -50,7 +58,16 @@ std::vector<Unknown> unknowns_of(const PrismTrain& train, const TrainFreedom& fr
         unknowns.push_back({Kind::glass, k, k});
       }
     }
-    for (int k = 0; k < prisms; ++k) unknowns.push_back({Kind::deviation, k, k});
+    for (int k = 0; k < prisms; ++k) {
+      if (is_prism(train, k)) {
+        unknowns.push_back({Kind::deviation, k, k});
+        continue;
+      }
+      if (has_two_angles(train, k)) {
+        unknowns.push_back({Kind::place, place::prism_tilt_vertical(k)});
+      }
+      unknowns.push_back({Kind::place, place::wedge_angle(k)});
+    }
   }
   if (freedom.emitters) {
     for (int j = 0; j < train.emitters(); ++j) {
@@ -67,7 +84,9 @@ std::vector<Unknown> unknowns_of(const PrismTrain& train, const TrainFreedom& fr
   }
   if (freedom.tilts) {
     for (int k = 0; k < prisms; ++k) {
-      unknowns.push_back({Kind::place, place::prism_tilt_vertical(k), 0, kTiltPrior});
+      if (!has_two_angles(train, k)) {
+        unknowns.push_back({Kind::place, place::prism_tilt_vertical(k), 0, kTiltPrior});
+      }
       if (k + 1 < prisms) {
         unknowns.push_back({Kind::place, place::bearing_tilt_horizontal(k), 0, kTiltPrior});
         unknowns.push_back({Kind::place, place::bearing_tilt_vertical(k), 0, kTiltPrior});
@@ -85,7 +104,7 @@ double deviation(const PrismTrain& train, int prism) {
 
 void set_glass(PrismTrain& train, int prism, double index, double deviation) {
   train.set_place(place::refractive_index(prism), index);
-  train.set_place(place::wedge_angle(prism), deviation / (index - 1.0));
+  if (is_prism(train, prism)) train.set_place(place::wedge_angle(prism), deviation / (index - 1.0));
 }
 
 /// All prisms of the mean index, their deviations as they were.
@@ -137,7 +156,7 @@ bool apply(const std::vector<Unknown>& unknowns, const Eigen::VectorXd& step, Tr
   }
   for (int k = 0; k < prisms; ++k) {
     const auto at = static_cast<std::size_t>(k);
-    if (!(std::abs(deviations[at]) < kLargestDeviation)) return false;
+    if (is_prism(train, k) && !(std::abs(deviations[at]) < kLargestDeviation)) return false;
     set_glass(train, k, index[at], deviations[at]);
   }
   if (yaw != 0 || pitch != 0) {
@@ -365,9 +384,12 @@ class TrainEquations {
       switch (unknown.kind) {
         case Kind::glass:
           for (int k = unknown.first; k <= unknown.last; ++k) {
-            const double over = 1.0 / (train[place::refractive_index(k)] - 1.0);
-            value += by(place::refractive_index(k)) -
-                     by(place::wedge_angle(k)) * train[place::wedge_angle(k)] * over;
+            double one = by(place::refractive_index(k));
+            if (is_prism(train, k)) {
+              const double over = 1.0 / (train[place::refractive_index(k)] - 1.0);
+              one -= by(place::wedge_angle(k)) * train[place::wedge_angle(k)] * over;
+            }
+            value += one;
           }
           break;
         case Kind::deviation:
@@ -429,6 +451,10 @@ void make_wedges_positive(TrainModel& model) {
     const int at = place::wedge_angle(k);
     if (model.train[at] >= 0) continue;
     model.train.set_place(at, -model.train[at]);
+    if (has_two_angles(model.train, k)) {
+      const int first = place::prism_tilt_vertical(k);
+      model.train.set_place(first, -model.train[first]);
+    }
     RotorCurves half_turn = model.rotors;  // weights of a smooth curve sum to one
     for (int m = 0; m < half_turn.coefficients(); ++m) {
       if (half_turn.smooth || m % (half_turn.degree + 1) == 0) {
@@ -466,13 +492,15 @@ void add_covariance(const NormalEquations& equations, const std::vector<Unknown>
   }
   for (int k = 0; k < train.prisms(); ++k) {
     const auto at = static_cast<std::size_t>(k);
-    if (by_deviation[at].isZero()) continue;
-    const double over = 1.0 / (train[place::refractive_index(k)] - 1.0);
+    if (by_index[at].isZero()) continue;
     add(fmt::format("refractive_index_{}", prism_letter(k)), by_index[at]);
+    if (!is_prism(train, k)) continue;
+    const double over = 1.0 / (train[place::refractive_index(k)] - 1.0);
     add(fmt::format("wedge_angle_{}_deg", prism_letter(k)),
         over * by_deviation[at] - train[place::wedge_angle(k)] * over * by_index[at]);
   }
   const auto& list = parameter_list(train.shape());
+  const auto [first_turn, second_turn] = estimation::turn_names(train.layout().axis_up);
   for (Eigen::Index u = 0; u < constants; ++u) {
     const Unknown& unknown = unknowns[static_cast<std::size_t>(u)];
     Eigen::VectorXd row = none;
@@ -485,9 +513,9 @@ void add_covariance(const NormalEquations& equations, const std::vector<Unknown>
     } else if (unknown.kind == Kind::lag) {
       add(fmt::format("lag_{}_s", unknown.first + 1), row);
     } else if (unknown.kind == Kind::frame_yaw) {
-      add("frame_yaw_deg", row);
+      add("frame_" + first_turn + "_deg", row);
     } else if (unknown.kind == Kind::frame_pitch) {
-      add("frame_pitch_deg", row);
+      add("frame_" + second_turn + "_deg", row);
     }
   }
   const RotorCurves& rotors = model.rotors;

@@ -21,6 +21,7 @@ constexpr std::size_t kPieces = 20;
 constexpr double kDensityDuration = 0.5;  // s, as in [B21 Fig. 2b]
 constexpr double kDensityCellDeg = 0.5;
 constexpr double kFieldCell = radians_from_degrees(1.0);
+constexpr double kCoarser = 2;  // cells of a sensor that scans all around, which has many
 constexpr double kAngleCell = radians_from_degrees(10.0);
 constexpr double kFewestShotsInCell = 5;  // shots that make a mean
 constexpr double kFewestOfTypical = 0.1;  // and of a typical cell's shots
@@ -52,15 +53,15 @@ ResidualPlane plane_of(ResidualMap map) {
   return result;
 }
 
-ShotDensity shot_density(const estimation::AngleSeries& head) {
+ShotDensity shot_density(const estimation::AngleSeries& head, double cell_deg) {
   ShotDensity result;
   result.duration = kDensityDuration;
-  result.cell = radians_from_degrees(kDensityCellDeg);
+  result.cell = radians_from_degrees(cell_deg);
   std::map<std::pair<long, long>, double> count;
   for (; result.total < head.size() && head.time(result.total) <= kDensityDuration;
        ++result.total) {
-    const auto cell = [](double angle) {
-      return std::lround(std::floor(degrees_from_radians(angle) / kDensityCellDeg));
+    const auto cell = [cell_deg](double angle) {
+      return std::lround(std::floor(degrees_from_radians(angle) / cell_deg));
     };
     count[{cell(head.azimuth[result.total]), cell(head.zenith[result.total])}] += 1.0;
   }
@@ -100,7 +101,9 @@ EstimateDetails estimate_details(const Estimate& estimate, const sensors::Sensor
     }
   }
   progress.report(0.8);
-  result.residuals_over_field = plane_of(estimation::residuals_over_field(estimate, kFieldCell));
+  const double coarser = estimate.sensor.train.layout().axis_up ? kCoarser : 1;
+  result.residuals_over_field =
+      plane_of(estimation::residuals_over_field(estimate, coarser * kFieldCell));
   for (int x = 0; x < estimate.states.prisms(); ++x) {
     for (int y = x + 1; y < estimate.states.prisms(); ++y) {
       progress.check();
@@ -108,7 +111,7 @@ EstimateDetails estimate_details(const Estimate& estimate, const sensors::Sensor
           {x, y, plane_of(estimation::residuals_over_angles(estimate, x, y, kAngleCell))});
     }
   }
-  result.density = shot_density(head);
+  result.density = shot_density(head, coarser * kDensityCellDeg);
   progress.report(1.0);
   return result;
 }

@@ -24,14 +24,18 @@ Json hypothesis_json(const identification::Identification& found, const Hypothes
     equivalent.push_back(to_string(found.hypotheses[other].train().face_order()));
   }
   for (const double lag : hypothesis.fit.model.lag) lags.push_back(lag);
-  const estimation::FrameTurn& frame = hypothesis.fit.model.frame;
+  const estimation::FrameTurn& turn = hypothesis.fit.model.frame;
+  const auto [first, second] = estimation::turn_names(hypothesis.train().layout().axis_up);
+  Json frame{{"yaw_deg", 0.0}};
+  frame[first + "_deg"] = deg(turn.yaw);
+  frame[second + "_deg"] = deg(turn.pitch);
   return {{"faces", to_string(hypothesis.train().face_order())},
           {"parameters", parameters},
           {"rms_deg", deg(hypothesis.fit.rms)},
           {"chi2_excess", hypothesis.excess},
           {"equivalent_to", equivalent},
           {"emitter_lags_s", lags},
-          {"frame", {{"yaw_deg", deg(frame.yaw)}, {"pitch_deg", deg(frame.pitch)}}},
+          {"frame", frame},
           {"observations_used", hypothesis.fit.shots},
           {"outliers", hypothesis.fit.outliers}};
 }

@@ -32,13 +32,17 @@ Json of(const sensors::PatternCoverage& coverage) {
   for (const int percent : sensors::kToldShares) {
     covers[fmt::format("{}", percent)] = coverage.time_to_cover(0.01 * percent);
   }
+  Json field = {{"after_s", coverage.field_after},
+                {"deg2", coverage.field_solid_angle / kSquareDegree},
+                {"sr", coverage.field_solid_angle},
+                {"half_angle_deg", deg(coverage.field_half_angle)}};
+  if (coverage.all_around) {
+    field["elevation_deg"] = {{"min", 90 - deg(coverage.field_half_angle)},
+                              {"max", 90 - deg(coverage.field_inner_angle)}};
+  }
   return {{"cell_deg", deg(coverage.cell)},
           {"ring_deg", deg(coverage.ring)},
-          {"field_of_view",
-           {{"after_s", coverage.field_after},
-            {"deg2", coverage.field_solid_angle / kSquareDegree},
-            {"sr", coverage.field_solid_angle},
-            {"half_angle_deg", deg(coverage.field_half_angle)}}},
+          {"field_of_view", field},
           {"time_to_cover_s", covers},
           {"after", after}};
 }

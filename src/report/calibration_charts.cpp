@@ -72,7 +72,7 @@ double after_millimetres(const SamplePoint& p) { return kMillimetres * p.after; 
 
 /// Cells of the field of view, coloured by values in the unit of the reader.
 Chart map_of_cells(std::string title, std::string note, const jobs::FieldCells& cells,
-                   const std::vector<double>& values, double unit) {
+                   const std::vector<double>& values, double unit, bool all_around) {
   Series series{"", "ink", SeriesKind::cells, {}, {}};
   series.cell_width = series.cell_height = degrees_from_radians(cells.side);
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -80,8 +80,7 @@ Chart map_of_cells(std::string title, std::string note, const jobs::FieldCells& 
     series.y.push_back(degrees_from_radians(cells.zenith[i]));
     series.value.push_back(unit * values[i]);
   }
-  return {std::move(title), "azimuth, deg",  "zenith, deg",
-          {series},         std::move(note), ChartKind::map};
+  return view_of_directions({std::move(title), {}, {}, {series}, std::move(note)}, all_around);
 }
 
 /// All diagrams of the page.
@@ -111,8 +110,9 @@ class CalibrationCharts {
       const View view(input_, i, recordings);
       if (view.empty()) continue;
       const std::string name = recording_name(input_, i);
-      charts.push_back(view.chart("Field of view: " + name, "azimuth, deg", azimuth_degrees,
-                                  "zenith, deg", zenith_degrees));
+      charts.push_back(view_of_directions(
+          view.chart("Field of view: " + name, {}, azimuth_degrees, {}, zenith_degrees),
+          all_around()));
       charts.push_back(view.chart_with_sensor(
           "From above: " + name, "right of the sensor (−Y), m",
           [](const SamplePoint& p) { return -p.point.y; }, "ahead of it (X), m",
@@ -136,7 +136,7 @@ class CalibrationCharts {
           fmt::format("Angle between the direction that the sensor reports and the one of this "
                       "calibration, {}; means over cells of {:.3g} degree.",
                       note, degrees_from_radians(field.cells.side)),
-          field.cells, errors, degrees_from_radians(1.0));
+          field.cells, errors, degrees_from_radians(1.0), all_around());
       result.value_label = "error, deg";
       const double largest = *std::max_element(errors.begin(), errors.end());
       result.value_range = {0.0, degrees_from_radians(largest)};
@@ -185,6 +185,8 @@ class CalibrationCharts {
   }
 
  private:
+  bool all_around() const { return c_.sensor.train.layout().axis_up; }
+
   /// The sample points of one recording, thinned and split by plane.
   class View {
    public:
@@ -217,8 +219,7 @@ class CalibrationCharts {
 
     Chart chart(std::string title, std::string x_label, const PointValue& x, std::string y_label,
                 const PointValue& y) const {
-      Chart chart{std::move(title), std::move(x_label), std::move(y_label), {}, note_,
-                  ChartKind::map};
+      Chart chart{std::move(title), std::move(x_label), std::move(y_label), {}, note_};
       for (const Group& group : groups_) {
         Series series{group.name, group.colour, SeriesKind::points, {}, {}};
         for (const SamplePoint* point : group.points) {
@@ -365,7 +366,7 @@ class CalibrationCharts {
                       count_text(field.points), degrees_from_radians(field.cells.side),
                       field.fewest_points, count_text(means.size()), kMillimetres * rms,
                       kMillimetres * field.noise),
-          field.cells, means, kMillimetres);
+          field.cells, means, kMillimetres, all_around());
       result.value_label = "mean distance, mm";
       result.palette = Palette::diverging;
       double largest = 0;

@@ -26,7 +26,8 @@ std::size_t stride_for(std::size_t rows, std::size_t most) {
 }
 
 constexpr const char* kSeriesKinds[] = {"points", "line", "steps", "cells"};
-constexpr const char* kChartKinds[] = {"plain", "full_turn", "two_turns", "map", "ground", "space"};
+constexpr const char* kChartKinds[] = {"plain",    "full_turn", "two_turns", "map",
+                                       "panorama", "ground",    "space"};
 constexpr const char* kPalettes[] = {"sequential", "diverging"};
 
 int digits_of(const std::vector<double>& values) {
@@ -71,6 +72,17 @@ Json if_any(const std::optional<Value>& value) {
 }
 
 }  // namespace
+
+Chart view_of_directions(Chart chart, bool all_around) {
+  chart.kind = all_around ? ChartKind::panorama : ChartKind::map;
+  chart.x_label = "azimuth, deg";
+  chart.y_label = all_around ? "elevation, deg" : "zenith, deg";
+  if (!all_around) return chart;
+  for (Series& series : chart.series) {
+    for (double& y : series.y) y = 90 - y;
+  }
+  return chart;
+}
 
 Json chart_json(const Chart& chart) {
   Json object = {{"title", chart.title},

@@ -138,10 +138,8 @@ class EstimateCharts {
         residual_histogram("Histogram of the azimuth residuals", all.azimuth, e.azimuth_moments,
                            "a"),
         residual_histogram("Histogram of the zenith residuals", all.zenith, e.zenith_moments, "b")};
-    for (Chart& chart : maps(input_.details->residuals_over_field, "the field of view",
-                             "azimuth, deg", "zenith, deg")) {
-      chart.kind = ChartKind::map;
-      charts.push_back(std::move(chart));
+    for (Chart& chart : maps(input_.details->residuals_over_field, "the field of view", {}, {})) {
+      charts.push_back(view_of_directions(std::move(chart), all_around()));
     }
     for (std::size_t rotor = 0; rotor < states_.rotation_angle.size(); ++rotor) {
       charts.push_back(over_angle(rotor));
@@ -170,16 +168,19 @@ class EstimateCharts {
       shots.x.push_back(degrees_from_radians(head.azimuth[i]));
       shots.y.push_back(degrees_from_radians(head.zenith[i]));
     }
-    return {{fmt::format("Scan pattern of the first {} s, as recorded", kPatternDuration),
-             "azimuth, deg",
-             "zenith, deg",
-             {shots},
-             every_nth_note(rows, kMostMapPoints),
-             ChartKind::map},
-            density()};
+    return {view_of_directions(
+                {fmt::format("Scan pattern of the first {} s, as recorded", kPatternDuration),
+                 {},
+                 {},
+                 {shots},
+                 every_nth_note(rows, kMostMapPoints)},
+                all_around()),
+            view_of_directions(density(), all_around())};
   }
 
  private:
+  bool all_around() const { return input_.estimate.sensor.train.layout().axis_up; }
+
   std::vector<estimation::TruthComparison> truths() const {
     return input_.evaluation ? input_.evaluation->parameters
                              : std::vector<estimation::TruthComparison>();
@@ -340,17 +341,18 @@ class EstimateCharts {
     for (std::size_t i = 0; i < density.x.size(); ++i) {
       cells.x.push_back(degrees_from_radians(density.x[i]));
       cells.y.push_back(degrees_from_radians(density.y[i]));
-      cells.value.push_back(density.shots[i] / (cell * cell));
+      // Cells of azimuth and zenith are narrower away from the horizon.
+      const double narrowing = all_around() ? std::sin(density.y[i]) : 1.0;
+      cells.value.push_back(density.shots[i] / (cell * cell * narrowing));
     }
     Chart chart{
         fmt::format("Density after {} s, as recorded", density.duration),
-        "azimuth, deg",
-        "zenith, deg",
+        {},
+        {},
         {cells},
         fmt::format("All {} shots, counted over cells of {:.3g}°. The colours end at ten times "
                     "the mean density.",
-                    count_text(density.total), cell),
-        ChartKind::map};
+                    count_text(density.total), cell)};
     chart.value_label = "shots per square degree";
     chart.value_range = {0.0, 10.0 * density.mean_per_cell / (cell * cell)};
     return chart;

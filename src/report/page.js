@@ -101,6 +101,18 @@
     });
   }
 
+  // Half the width and height of what a diagram shows about its places.
+  const halfCell = (one, key) => Math.max(...one.series.map((series) => series[key])) / 2;
+
+  // All around: equal scales, and limits at round numbers.
+  function panoramaLimits(one) {
+    const from = least(every(one, 'y')) - halfCell(one, 'cell_height');
+    const to = most(every(one, 'y')) + halfCell(one, 'cell_height');
+    const y = Number.isFinite(from + to)
+      ? { min: Math.floor(from / 20) * 20, max: Math.ceil(to / 20) * 20 } : { min: -90, max: 90 };
+    return [{ min: -180, max: 180 }, y];
+  }
+
   function cells(series) {
     return {
       type: 'custom', name: series.label, clip: true,
@@ -197,6 +209,11 @@
       Object.assign(y, limits[1], { inverse: turned, position: 'left' });
       // The ends are no round numbers.
       for (const one of [x, y]) Object.assign(one.axisLabel, { showMinLabel: false, showMaxLabel: false });
+    }
+    if (one.kind === 'panorama') {
+      const limits = panoramaLimits(one);
+      Object.assign(x, limits[0], { inverse: true, position: 'bottom', interval: below ? 90 : 45 });
+      Object.assign(y, limits[1], { position: 'left', interval: below ? 40 : 20 });
     }
     if (one.kind === 'full_turn' || one.kind === 'two_turns') {
       Object.assign(x, { min: 0, max: 360, interval: 60 });
@@ -333,9 +350,9 @@
   }
 
   function panBy(chart, one, right, up) {
-    const way = one.kind === 'map' ? -panStep : panStep; // its axes are turned
+    const turned = { map: [true, true], panorama: [true, false] }[one.kind] || [false, false];
     show(chart, limitsNow(chart).map(([from, to], k) => {
-      const step = way * (k === 0 ? right : up) * (to - from);
+      const step = (turned[k] ? -panStep : panStep) * (k === 0 ? right : up) * (to - from);
       return [from + step, to + step];
     }));
   }
@@ -392,7 +409,13 @@
 
   // ---- the page ----
 
-  const isSquare = (one) => ['map', 'ground', 'two_turns'].includes(one.kind);
+  // Height over width of a diagram with equal scales.
+  function shapeOf(one) {
+    if (['map', 'ground', 'two_turns'].includes(one.kind)) return 1;
+    if (one.kind !== 'panorama') return null;
+    const [x, y] = panoramaLimits(one);
+    return (y.max - y.min) / (x.max - x.min);
+  }
 
   // Pixels of a figure without its paddings.
   function room({ place }) {
@@ -404,12 +427,13 @@
   const isNarrow = (entry) => room(entry) < (entry.data.kind === 'space' ? narrowSpace : narrow);
 
   function size(entry) {
-    if (!isSquare(entry.data)) return;
-    const width = Math.min(room(entry), 640);
+    const shape = shapeOf(entry.data);
+    if (shape === null) return;
+    const width = Math.min(room(entry), entry.data.kind === 'panorama' ? Infinity : 640);
     const [right, bottom] = !hasValues(entry.data) ? [0, 0]
       : isNarrow(entry) ? [0, scaleHeight] : [barWidth, 0];
     entry.place.style.width = width + 'px';
-    entry.place.style.height = width - leftMargin(entry.data) - margins.right - right +
+    entry.place.style.height = shape * (width - leftMargin(entry.data) - margins.right - right) +
       margins.top + legendRow(entry.data) + margins.bottom + bottom + 'px';
   }
 

@@ -25,14 +25,15 @@ Chart rosette_chart(const jobs::PatternDetails& details) {
     dots.y.push_back(degrees_from_radians(rosette.zenith[i]));
   }
   const double duration = details.coverage.after.back().time;
-  Chart chart{fmt::format("The first {:g} s as it grows", duration),
-              "azimuth, deg",
-              "zenith, deg",
-              {dots},
-              details.rosette_every == 1
-                  ? "Every shot is drawn."
-                  : fmt::format("One in {} shots is drawn.", details.rosette_every),
-              ChartKind::map};
+  Chart chart =
+      view_of_directions({fmt::format("The first {:g} s as it grows", duration),
+                          {},
+                          {},
+                          {dots},
+                          details.rosette_every == 1
+                              ? "Every shot is drawn."
+                              : fmt::format("One in {} shots is drawn.", details.rosette_every)},
+                         details.coverage.all_around);
   chart.grows_for = duration;
   return chart;
 }
@@ -40,12 +41,21 @@ Chart rosette_chart(const jobs::PatternDetails& details) {
 /// Density in cells of the map, larger ones where there are too many to draw.
 Chart density_chart(const sensors::PatternCoverage& coverage, const sensors::CoverageAfter& after) {
   constexpr double kMostCells = 12'000;
-  const double merged = std::ceil(std::sqrt(static_cast<double>(coverage.cells()) / kMostCells));
-  const double edge = merged * coverage.cell;
+  // A panorama is drawn in azimuth and elevation, in which cells of the map become tall away from
+  // the horizon. Its squares hold at least one, and a whole number of them goes around.
+  double merged = std::ceil(std::sqrt(static_cast<double>(coverage.cells()) / kMostCells));
+  double edge = merged * coverage.cell;
+  if (coverage.all_around) {
+    const double tallest = 1 / std::sin(coverage.field_inner_angle);
+    merged = std::max(merged, std::ceil(tallest));
+    edge = kTwoPi / std::floor(kTwoPi / (merged * coverage.cell));
+  }
   std::map<std::pair<long, long>, std::pair<double, double>> sums;  // shots, cells
   for (std::size_t i = 0; i < coverage.cells(); ++i) {
-    auto& [shots, cells] = sums[{std::lround(std::floor(coverage.left[i] / edge)),
-                                 std::lround(std::floor(coverage.up[i] / edge))}];
+    const double x = coverage.all_around ? coverage.azimuth[i] : coverage.left[i];
+    const double y = coverage.all_around ? kPi / 2 - coverage.zenith[i] : coverage.up[i];
+    auto& [shots, cells] =
+        sums[{std::lround(std::floor(x / edge)), std::lround(std::floor(y / edge))}];
     shots += after.cell_shots[i];
     cells += 1;
   }
@@ -53,18 +63,19 @@ Chart density_chart(const sensors::PatternCoverage& coverage, const sensors::Cov
   Series cells{"", "ink", SeriesKind::cells, {}, {}};
   cells.cell_width = cells.cell_height = degrees_from_radians(edge);
   for (const auto& [place, sum] : sums) {
+    const double y = degrees_from_radians(edge) * (static_cast<double>(place.second) + 0.5);
     cells.x.push_back(degrees_from_radians(edge) * (static_cast<double>(place.first) + 0.5));
-    cells.y.push_back(-degrees_from_radians(edge) * (static_cast<double>(place.second) + 0.5));
+    cells.y.push_back(coverage.all_around ? y : -y);
     cells.value.push_back(sum.first / (sum.second * cell * cell));
   }
   Chart chart{fmt::format("Density after {:g} s", after.time),
-              "left of the axis, deg",
-              "below the axis, deg",
+              coverage.all_around ? "azimuth, deg" : "left of the axis, deg",
+              coverage.all_around ? "elevation, deg" : "below the axis, deg",
               {cells},
               fmt::format("{} shots, cells of {:.3g} degree. The colours end at four times the "
                           "mean.",
                           count_text(after.shots), degrees_from_radians(edge)),
-              ChartKind::map};
+              coverage.all_around ? ChartKind::panorama : ChartKind::map};
   chart.value_label = "shots per square degree";
   chart.value_range = {0.0, std::max(4 * after.mean_density * kSquareDegree, 1e-9)};
   return chart;
@@ -72,8 +83,8 @@ Chart density_chart(const sensors::PatternCoverage& coverage, const sensors::Cov
 
 Chart ring_chart(const sensors::PatternCoverage& coverage) {
   static constexpr const char* kColours[] = {"a", "b", "c", "d", "ink", "bad"};
-  Chart chart{"Density by the angle from the axis",
-              "angle from the X axis, deg",
+  Chart chart{coverage.all_around ? "Density by elevation" : "Density by the angle from the axis",
+              coverage.all_around ? "elevation, deg" : "angle from the X axis, deg",
               "shots per square degree",
               {},
               "Only the part of each ring inside the field of view counts."};
@@ -85,7 +96,9 @@ Chart ring_chart(const sensors::PatternCoverage& coverage) {
                 {},
                 {}};
     for (std::size_t i = 0; i < after.ring_density.size(); ++i) {
-      line.x.push_back(degrees_from_radians(coverage.ring) * (static_cast<double>(i) + 0.5));
+      if (coverage.all_around && std::isnan(after.ring_density[i])) continue;  // about the zenith
+      const double angle = degrees_from_radians(coverage.ring) * (static_cast<double>(i) + 0.5);
+      line.x.push_back(coverage.all_around ? 90 - angle : angle);
       line.y.push_back(after.ring_density[i] * kSquareDegree);
     }
     chart.series.push_back(std::move(line));
@@ -146,9 +159,28 @@ std::string coverage_html(const sensors::PatternCoverage& coverage) {
              "</tbody></table></div>\n<p class=\"note\">Covered: the share of cells of {:.3g} "
              "degree that hold a shot, among those that {:.3g} s reach ({:.5g} square degrees). "
              "Gap: the diameter of the largest circle that holds no shot, centred in this field "
-             "of view. Cells are squares of Lambert's equal-area map about the X axis.</p>\n",
+             "of view. Cells are squares of Lambert's {}.</p>\n",
              degrees_from_radians(coverage.cell), coverage.field_after,
-             coverage.field_solid_angle / kSquareDegree);
+             coverage.field_solid_angle / kSquareDegree,
+             coverage.all_around ? "cylindrical equal-area map about the Z axis"
+                                 : "equal-area map about the X axis");
+}
+
+/// What a prism is and its angles, as two cells of a table.
+std::string shape_cells(const PrismTrain& train, int prism) {
+  const double angle = degrees_from_radians(train[place::wedge_angle(prism)]);
+  switch (train.face_order()[static_cast<std::size_t>(prism)]) {
+    case FaceOrder::angled_perpendicular:
+      return fmt::format("<td>angled</td><td>{:.6g}</td>", angle);
+    case FaceOrder::perpendicular_angled:
+      return fmt::format("<td>perpendicular</td><td>{:.6g}</td>", angle);
+    case FaceOrder::angled_angled:
+      return fmt::format("<td>angled, as the second</td><td>faces {:.6g} and {:.6g}</td>",
+                         degrees_from_radians(train[place::prism_tilt_vertical(prism)]), angle);
+    case FaceOrder::perpendicular_mirror_upright:
+      break;
+  }
+  return fmt::format("<td>perpendicular, before a mirror</td><td>mirror {:.6g}</td>", angle);
 }
 
 std::string prisms_html(const sensors::Sensor& sensor) {
@@ -157,14 +189,10 @@ std::string prisms_html(const sensors::Sensor& sensor) {
       "<th>wedge angle, deg</th><th>refractive index</th><th>speed, rpm</th></tr></thead><tbody>\n";
   for (int i = 0; i < sensor.prisms(); ++i) {
     const auto k = static_cast<std::size_t>(i);
-    html += fmt::format(
-        "<tr><th scope=\"row\">{}</th><td>{}</td><td>{:.6g}</td><td>{:.6g}</td>"
-        "<td>{:.8g}</td></tr>\n",
-        prism_capital(i),
-        sensor.train.face_order()[k] == FaceOrder::angled_perpendicular ? "angled"
-                                                                        : "perpendicular",
-        degrees_from_radians(sensor.train[place::wedge_angle(i)]),
-        sensor.train[place::refractive_index(i)], 60 * sensor.angular_velocity[k] / kTwoPi);
+    html += fmt::format("<tr><th scope=\"row\">{}</th>{}<td>{:.6g}</td><td>{:.8g}</td></tr>\n",
+                        prism_capital(i), shape_cells(sensor.train, i),
+                        sensor.train[place::refractive_index(i)],
+                        60 * sensor.angular_velocity[k] / kTwoPi);
   }
   return html + fmt::format(
                     "</tbody></table></div>\n<p class=\"note\">In the order of the beam; {} "

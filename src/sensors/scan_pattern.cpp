@@ -19,14 +19,8 @@ class Swing {
  public:
   /// @param interval  at which speeds are added up, s
   Swing(const Sensor& sensor, const ScanSequence& sequence, double interval)
-      : interval_(sequence.swing.empty() ? 0 : interval) {
-    require_length_or_none("swing of the sequence", sequence.swing.size(),
-                           static_cast<std::size_t>(sensor.prisms()));
-    if (sequence.swing.empty()) return;
-    require_at_least("prisms of a sensor that swings", sensor.prisms(), 2);
-    half_step_ = 0.5 * sequence.swings_per_beat *
-                 std::abs(sensor.angular_velocity[1] - sensor.angular_velocity[0]) * interval;
-  }
+      : interval_(sequence.swing.empty() ? 0 : interval),
+        half_step_(0.5 * swing_angular_frequency(sensor) * interval) {}
 
   /// After a number of steps. @return rad per rad/s
   double at(std::uint64_t step) const {
@@ -39,7 +33,7 @@ class Swing {
   }
 
  private:
-  double interval_, half_step_ = 0;  // s, rad
+  double interval_, half_step_;  // s, rad
 };
 
 }  // namespace
@@ -51,6 +45,15 @@ std::vector<double> start_angles(const Sensor& sensor, const ScanPatternOptions&
   if (start.empty()) start.assign(prisms, 0.0);
   require_length("rotation_angle", start.size(), prisms);
   return start;
+}
+
+double swing_angular_frequency(const Sensor& sensor) {
+  if (!sensor.sequence || sensor.sequence->swing.empty()) return 0;
+  require_length("swing of the sequence", sensor.sequence->swing.size(),
+                 static_cast<std::size_t>(sensor.prisms()));
+  require_at_least("prisms of a sensor that swings", sensor.prisms(), 2);
+  return sensor.sequence->swings_per_beat *
+         std::abs(sensor.angular_velocity[1] - sensor.angular_velocity[0]);
 }
 
 ScanPattern scan_pattern(const Sensor& sensor, std::uint64_t first_row, std::size_t rows,

@@ -105,6 +105,13 @@ RotorMotion::RotorMotion(const RotorSettings& settings, int prism, double start_
     frequency_ = kTwoPi / settings.oscillation_period[prism];
     phase_ = kTwoPi * RandomStream(seed, stream::kOscillationPhases).uniform(prism);
   }
+  if (!settings.swing.empty()) {
+    require_at_least("values of swing", settings.swing.size(), prism + 1);
+    require_finite(fmt::format("swing[{}]", prism), settings.swing[prism], "rad/s");
+    require_above("swing_frequency", settings.swing_frequency, 0, "rad/s");
+    swing_ = settings.swing[prism];
+    swing_frequency_ = settings.swing_frequency;
+  }
   if (acceleration_noise_ > 0.0) {
     const auto last = static_cast<std::uint64_t>(last_time_ns / kKnotInterval_ns);
     Knot knot;
@@ -143,6 +150,10 @@ void RotorMotion::evaluate(std::span<const std::int64_t> time_ns, std::span<doub
     const double time = static_cast<double>(now) * 1e-9;
     angle[i] = start_angle_ + angular_velocity_ * time;
     speed[i] = angular_velocity_;
+    if (swing_ != 0.0) {
+      angle[i] += swing_ / swing_frequency_ * std::sin(swing_frequency_ * time);
+      speed[i] += swing_ * std::cos(swing_frequency_ * time);
+    }
     if (amplitude_ > 0.0) {
       const double turn = frequency_ * time + phase_;
       angle[i] += amplitude_ / frequency_ * (std::cos(phase_) - std::cos(turn));

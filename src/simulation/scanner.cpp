@@ -19,6 +19,7 @@
 #include "risley/optics/batch.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/sensors/range_values.hpp"
+#include "risley/sensors/scan_pattern.hpp"
 #include "risley/simulation/noise.hpp"
 
 #include "simulation/beam_returns.hpp"
@@ -77,6 +78,10 @@ SimulationSettings checked(SimulationSettings settings) {
   require_length("start_angles", settings.start_angles.size(), prisms);
   if (!settings.rotor_settings) {
     settings.rotor_settings = rotor_settings(settings.rotor, settings.truth.prisms());
+    settings.rotor_settings->swing_frequency = sensors::swing_angular_frequency(settings.truth);
+    if (settings.rotor_settings->swing_frequency > 0) {
+      settings.rotor_settings->swing = settings.truth.sequence->swing;
+    }
   }
   if (!settings.station.empty() && !settings.scene) {
     throw InvalidArgument(fmt::format("station \"{}\" needs a scene", settings.station));

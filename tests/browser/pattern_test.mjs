@@ -18,6 +18,13 @@ inspect('pattern', async () => {
   return file;
 }, /Coverage and gaps/, false);
 
+inspect('panorama', async () => {
+  const panorama = join(folder, 'mid-360.html');
+  await risley(folder, 0, 'pattern', '--sensor', 'mid-360', '--integration-s', '0.1,0.5',
+               '--report', panorama);
+  return panorama;
+}, /Density by elevation/, false);
+
 let browser, page;
 before(async () => {
   browser = await launch();

@@ -48,6 +48,20 @@ class IdentifyTest(CommandTest):
         self.expect(0, "preset", "check", "mine.yaml")
         self.expect(0, "simulate", "--sensor", "mine.yaml", "--duration-s", "0.1", "-o", "s.nc")
 
+    def test_a_scan_all_around_is_of_a_wedge_and_a_reflector(self):
+        self.expect(0, "simulate", "--sensor", "mid-360", "--duration-s", "1", "-o", "scan.nc")
+        result = self.expect_json(0, "identify", "scan.nc", "-o", "mine.yaml")
+        self.assertEqual((result["verdict"]["code"], result["preset"]), ("identified", "mid-360"))
+        self.assertEqual((result["emitters"], result["emitters_named"]), (4, True))
+        best = result["hypotheses"][0]
+        self.assertEqual(best["faces"], "AA-PMU")
+        self.assertEqual(set(best["frame"]), {"yaw_deg", "pitch_deg", "roll_deg"})
+        for name, truth in (("entrance_face_a_deg", 10), ("exit_face_a_deg", 29), ("mirror_face_b_deg", 50),
+                            ("refractive_index_a", 1.9682)):
+            value = best["parameters"][name]
+            self.assertLess(abs(value["value"] - truth), 4.5 * value["sigma"], name)
+        self.expect(0, "preset", "check", "mine.yaml")
+
     def test_what_does_not_turn_is_no_answer(self):
         rows = "\n".join(f"{0.0001 * i:.4f},10,90" for i in range(1, 3000))
         (self.folder / "still.csv").write_text(f"Time,Azimuth,Zenith\n{rows}\n")

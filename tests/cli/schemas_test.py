@@ -183,8 +183,10 @@ class SchemasTest(CommandTest):
             cls.print(3, "estimate", "hall.lvx", "bad.lvx", "cut.csv", "one.csv", "-o", "several", "--table",
                       "several.nc", "--resume")
         cls.print(0, "cloud", "--calibration", "mid-40", "--beam-origin-map", "map.html")
-        cls.print(0, "simulate", "-o", "round.nc", "--sensor", "mid-360", "--duration-s", 0.1)
+        cls.print(0, "simulate", "-o", "round.nc", "--sensor", "mid-360", "--duration-s", 0.2)
         cls.print(0, "estimate", "round.nc")
+        cls.print(0, "identify", "round.nc")
+        cls.print(0, "pattern", "--coverage", "--sensor", "mid-360", "--integration-s", 0.1)
         cls.print(0, "report", "estimated")
         cls.print(0, "report", "estimated", "calibrated", "-o", "two.html")
         cls.print(3, "report", "no")

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // A wedge and a reflector about an upright axis, as the Mid-360 has them.
+#include <cmath>
 #include <random>
 
 #include <Eigen/Geometry>
@@ -12,6 +13,7 @@
 #include "risley/estimation/sensor_recognition.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/sensors/scan_pattern.hpp"
 
 namespace risley::estimation::reflector_test {
 
@@ -27,17 +29,21 @@ sensors::Sensor random_unit(unsigned seed) {
   return unit;
 }
 
-/// Shots every 5 us, in turn of the emitters.
+/// Shots every 5 us, in turn of the emitters, with the swing of the unit's speeds.
 AngleSeries shots_of(const sensors::Sensor& unit, std::size_t shots, unsigned seed) {
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal(0.0, unit.angle_noise);
+  const double swing = sensors::swing_angular_frequency(unit);
   AngleSeries series;
   for (std::size_t i = 0; i < shots; ++i) {
     const std::int64_t ns = 5000 * static_cast<std::int64_t>(i);
     const double t = 1e-9 * static_cast<double>(ns);
     const int emitter = static_cast<int>(i % 4);
-    const std::array<double, 2> angles{1.0 + t * unit.angular_velocity[0],
-                                       2.5 + t * unit.angular_velocity[1]};
+    std::array<double, 2> angles{1.0 + t * unit.angular_velocity[0],
+                                 2.5 + t * unit.angular_velocity[1]};
+    for (std::size_t k = 0; swing > 0 && k < 2; ++k) {
+      angles[k] += unit.sequence->swing[k] / swing * std::sin(swing * t);
+    }
     const Observation shot = observe(unit.train, angles, emitter);
     series.append(ns, shot.azimuth + normal(generator), shot.zenith + normal(generator));
     series.beam.back() = static_cast<std::uint8_t>(emitter);
@@ -94,6 +100,26 @@ TEST(Reflector, ATurnOfTheFrameHoldsTheLeanOfTheLastAxis) {
   EXPECT_NEAR(found.frame_turn->turn.yaw, turned.yaw, radians_from_degrees(0.1));
   EXPECT_NEAR(found.frame_turn->turn.pitch, turned.pitch, radians_from_degrees(0.1));
   EXPECT_EQ(found.sensor.train[place::bearing_tilt_vertical(1)], 0.0);
+}
+
+// Rotor A's speed swings by 180 rpm at 20 Hz, as in the manufacturer's sequence.
+TEST(Reflector, ASwingIsFollowed) {
+  const sensors::Sensor sensor = sensors::load_sensor("mid-360-sequence");
+  const AngleSeries series = shots_of(sensor, 100'000, 5);
+  EstimateOptions options;
+  options.sensor = sensor;
+  const Estimate found = estimate(Method::map, series, series, options);
+  ASSERT_TRUE(found.converged) << found.reason;
+  EXPECT_NEAR(found.expected_residual, sensor.angle_noise, 0.05 * sensor.angle_noise);
+  int compared = 0;
+  for (const EstimatedValue& value : found.values) {
+    const ParameterInfo& info = find_parameter(value.name, sensor.shape());
+    if (info.kind != ParameterKind::train || !(value.sigma > 0)) continue;
+    const double truth = sensor.train[info.places.front()];
+    EXPECT_LT(std::abs(value.value - truth), 4.5 * value.sigma) << value.name;
+    ++compared;
+  }
+  EXPECT_GT(compared, 10);
 }
 
 TEST(Reflector, IsRecognisedAmongAllPresets) {

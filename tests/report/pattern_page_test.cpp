@@ -3,6 +3,7 @@
 #include "risley/report/pattern_page.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,36 @@ TEST(PatternPage, DrawsTheRosetteTheDensitiesAndTheirNumbers) {
     for (const double density : charts[k]["series"][0]["value"]) shots += density;
     EXPECT_NEAR(shots, static_cast<double>(details.coverage.after[k - 1].shots), 1e-3 * shots);
   }
+}
+
+TEST(PatternPage, AScanAllAroundIsAPanoramaOfAzimuthAndElevation) {
+  sensors::CoverageOptions options;
+  options.after = {0.1};
+  options.field_after = 3;
+  const jobs::PatternDetails details = jobs::pattern_details("mid-360", {}, options);
+  const nlohmann::json charts = charts_of(pattern_page(details, {}));
+  ASSERT_EQ(charts.size(), 4U);
+  for (const std::size_t k : {0UL, 1UL}) {
+    EXPECT_EQ(charts[k]["kind"], "panorama");
+    const std::vector<double> azimuth = charts[k]["series"][0]["x"];
+    const std::vector<double> elevation = charts[k]["series"][0]["y"];
+    EXPECT_NEAR(*std::min_element(azimuth.begin(), azimuth.end()), -180, 2);
+    EXPECT_NEAR(*std::max_element(azimuth.begin(), azimuth.end()), 180, 2);
+    EXPECT_NEAR(*std::min_element(elevation.begin(), elevation.end()), -7.2, 1);
+    EXPECT_NEAR(*std::max_element(elevation.begin(), elevation.end()), 52.2, 1);
+  }
+  // Density times solid angle, of cells that narrow away from the horizon; those on the rim, which
+  // the field of view does not fill, count whole.
+  const nlohmann::json& cells = charts[1]["series"][0];
+  const double edge = cells["cell_width"];
+  EXPECT_NEAR(std::remainder(360, edge), 0, 1e-9) << "a whole number of cells goes around";
+  EXPECT_LE(cells["x"].size(), 12'000U);
+  double shots = 0;
+  for (std::size_t i = 0; i < cells["x"].size(); ++i) {
+    const double up = radians_from_degrees(cells["y"][i].get<double>());
+    shots += cells["value"][i].get<double>() * edge * edge * std::cos(up);
+  }
+  EXPECT_NEAR(shots, static_cast<double>(details.coverage.after[0].shots), 0.08 * shots);
 }
 
 TEST(PatternPage, StaysSmallWithSmallCells) {

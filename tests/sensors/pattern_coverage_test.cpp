@@ -20,7 +20,7 @@
 namespace risley::sensors::pattern_coverage_test {
 
 TEST(PatternCoverage, CountsEveryShotOnce) {
-  for (const char* name : {"mid-40-sequence", "horizon"}) {
+  for (const char* name : {"mid-40-sequence", "horizon", "mid-360"}) {
     SCOPED_TRACE(name);
     CoverageOptions options;
     options.cell = radians_from_degrees(1.0);
@@ -74,9 +74,28 @@ TEST(PatternCoverage, TheFieldOfAMid40IsItsCone) {
   EXPECT_LT(coverage.field_solid_angle, 1.05 * cone);  // cells on the edge count whole
 }
 
+// The band of the elevations that its optics reach, all around, in cells of equal solid angle.
+TEST(PatternCoverage, TheFieldOfAMid360IsABandAllAround) {
+  CoverageOptions options;
+  options.after = {0.1, 1.0};
+  const PatternCoverage coverage = pattern_coverage(load_sensor("mid-360"), {}, options);
+  EXPECT_TRUE(coverage.all_around);
+  EXPECT_NEAR(degrees_from_radians(coverage.field_half_angle), 90 + 7.21, 0.01);
+  EXPECT_NEAR(degrees_from_radians(coverage.field_inner_angle), 90 - 52.16, 0.01);
+  const double band =
+      kTwoPi * (std::cos(coverage.field_inner_angle) - std::cos(coverage.field_half_angle));
+  // The row of emitters reaches less far to its sides.
+  EXPECT_GT(coverage.field_solid_angle, 0.94 * band);
+  EXPECT_LT(coverage.field_solid_angle, band);
+  const auto [least, most] = std::minmax_element(coverage.azimuth.begin(), coverage.azimuth.end());
+  EXPECT_NEAR(*most - *least, kTwoPi, 2 * coverage.cell);
+  EXPECT_GT(coverage.after[1].covered, 0.9);
+}
+
 /// No circle in the field of view is empty and larger, and the one that is named is empty.
 TEST(PatternCoverage, TheGapIsTheLargestEmptyCircle) {
-  for (const auto& [name, time] : {std::pair{"tele-15", 0.02}, {"avia", 0.1}, {"mid-70", 0.3}}) {
+  for (const auto& [name, time] :
+       {std::pair{"tele-15", 0.02}, {"avia", 0.1}, {"mid-70", 0.3}, {"mid-360", 0.1}}) {
     SCOPED_TRACE(name);
     const Sensor sensor = load_sensor(name);
     CoverageOptions options;

@@ -87,6 +87,27 @@ TEST(RotorMotion, AngleAndSpeedDoNotJumpAtKnots) {
   }
 }
 
+TEST(RotorMotion, ASwingStartsAtItsFastestAndEndsWhereItBegan) {
+  RotorSettings settings = rotor_settings(RotorKind::constant, 2);
+  settings.swing = {radians_from_degrees(1080.0), 0.0};
+  settings.swing_frequency = kTwoPi * 20;
+  for (const int prism : {0, 1}) {
+    const RotorMotion motion(settings, prism, 0.5, kNominal, kSecond_ns, 0);
+    const Track t = track(motion, kSecond_ns / 20, kSecond_ns / 200);
+    const double swing = settings.swing[static_cast<std::size_t>(prism)];
+    for (std::size_t i = 0; i < t.angle.size(); ++i) {
+      const double turn = kTwoPi * static_cast<double>(i) / 10, time = 0.005 * double(i);
+      EXPECT_NEAR(t.speed[i], kNominal + swing * std::cos(turn), 1e-9);
+      EXPECT_NEAR(t.angle[i],
+                  0.5 + kNominal * time + swing / settings.swing_frequency * std::sin(turn), 1e-9);
+    }
+  }
+  settings.swing = {1.0};
+  EXPECT_THROW(RotorMotion(settings, 1, 0, 1, 1, 0), InvalidArgument);
+  settings.swing_frequency = 0;
+  EXPECT_THROW(RotorMotion(settings, 0, 0, 1, 1, 0), InvalidArgument);
+}
+
 TEST(RotorMotion, SinusoidHasThePapersSpread) {
   // Whole periods of 3 s and 4.3 s; without the random walk the spread is exact.
   RotorSettings settings = rotor_settings(RotorKind::sinusoidal, 2);

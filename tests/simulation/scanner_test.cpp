@@ -17,6 +17,7 @@
 #include "risley/core/direction.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
+#include "risley/sensors/scan_pattern.hpp"
 
 namespace risley::simulation::scanner_test {
 
@@ -80,6 +81,24 @@ void expect_same(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 // What a calibration says of the ranges is what its simulation does.
+// Where the sequence swings, the simulated rotors do: as the pattern but for its sums over groups.
+TEST(Scanner, RotorsSwingAsTheSequenceOfTheirSensor) {
+  SimulationSettings settings;
+  settings.truth = sensors::load_sensor("mid-360-sequence");
+  settings.duration = 0.1;
+  settings.start_angles = {1.0, 2.0};
+  const Whole whole = scan(settings);
+  sensors::ScanPatternOptions options;
+  options.rotation_angle = settings.start_angles;
+  options.firing = sensors::Firing::in_turn;
+  const sensors::ScanPattern pattern =
+      sensors::scan_pattern(settings.truth, 0, whole.rows.size(), options);
+  for (std::size_t i = 0; i < pattern.size(); ++i) {
+    ASSERT_NEAR(wrap_to_pi(whole.truth.azimuth[i] - pattern.azimuth[i]), 0, 2e-4) << i;
+    ASSERT_NEAR(whole.truth.zenith[i], pattern.zenith[i], 2e-4) << i;
+  }
+}
+
 TEST(Scanner, AddsTheSensorsRangeOffset) {
   SimulationSettings settings = exact("mid-40-table3");
   settings.duration = 0.01;

@@ -12,6 +12,7 @@
 #include "risley/estimation/angle_series.hpp"
 #include "risley/estimation/frame_turn.hpp"
 #include "risley/estimation/free_parameters.hpp"
+#include "risley/estimation/rotor_process.hpp"
 #include "risley/estimation/spectral_lines.hpp"
 #include "risley/sensors/sensor.hpp"
 
@@ -36,6 +37,12 @@ struct StartOptions {
   friend bool operator==(const StartOptions&, const StartOptions&) = default;
 };
 
+/// How rotors are taken to move before the recording tells.
+struct FirstMotion {
+  double window = 0.025;  ///< s, in which a speed is as good as constant
+  RotorProcess process = kSettlingProcess;
+};
+
 /// What an estimation starts from. All of the recording as it is to be used: turned if mirrored,
 /// and turned into the sensor's frame.
 struct Start {
@@ -48,6 +55,7 @@ struct Start {
   bool mirrored = false;           ///< the recording is a mirror image and has to be turned
   std::optional<FrameTurn> frame;  ///< of the recording, where it is not the sensor's
   double residual_rms = 0;         ///< of the fit, rad; robust, so that outliers do not count
+  FirstMotion motion;              ///< faster where the sensor's speeds swing
 };
 
 /// What was found out about some shots on the way to a start, so that who asks next need not look

@@ -26,7 +26,7 @@ struct TrainModel {
 
 /// What is fitted besides the rotors' motion.
 struct TrainFreedom {
-  bool glass = false;      ///< indices and deviations of the prisms
+  bool glass = false;      ///< indices and deviations of the prisms, angles of faces and mirrors
   bool one_glass = false;  ///< all indices are the same
   bool emitters = false;   ///< directions of all emitters
   bool lags = false;       ///< of all emitters but the first

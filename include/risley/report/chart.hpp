@@ -36,6 +36,7 @@ enum class ChartKind {
   full_turn,  ///< x runs from 0 to 360 degree
   two_turns,  ///< square, both axes run from 0 to 360 degree
   map,        ///< square, equal scales, both axes turned: a view along the beam
+  panorama,   ///< equal scales, x from 180 to -180 degree, y up: a view all around
   ground,     ///< square, equal scales: from above or from the side, x to the right, y up
   space,      ///< three axes of equal scale, can be rotated; points only
 };
@@ -81,6 +82,10 @@ struct Chart {
   /// Choices for the colours of the first series, instead of its values; the first is shown first.
   std::optional<std::vector<Colouring>> colourings = {};
 };
+
+/// A diagram over azimuth and zenith in degrees as one looks out of the sensor: a map about X or,
+/// of a sensor that scans all around, a panorama of azimuth and elevation.
+Chart view_of_directions(Chart chart, bool all_around);
 
 /// Diagrams as pages and report.json have them; what is not finite is null. Columns keep seven
 /// significant digits, and more where numbers differ little beside their size, as the speeds of a

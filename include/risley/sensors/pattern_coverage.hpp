@@ -15,7 +15,7 @@ namespace risley::sensors {
 struct CoverageOptions {
   std::vector<double> after = {0.1, 0.2, 0.5, 1.0};  ///< integration times, s, rising
   double cell = radians_from_degrees(0.5);           ///< edge of a cell, rad
-  double ring = radians_from_degrees(1.0);           ///< width of a ring about the X axis, rad
+  double ring = radians_from_degrees(1.0);           ///< width of a ring about the axis, rad
   /// The field of view is what a scan of so many seconds reaches, if not more than ten million
   /// shots, and not less than the last of `after`.
   double field_after = 30.0;
@@ -42,14 +42,18 @@ struct CoverageAfter {
 /// Shares of the field of view for which time_to_cover() is told, percent.
 inline constexpr int kToldShares[] = {50, 90, 99};
 
-/// How a scan fills the field of view. Cells are squares of the equal-area map of Lambert about the
-/// X axis: they all have the same solid angle, and near the axis the map is in radians from it.
+/// How a scan fills the field of view. Cells are squares of an equal-area map of Lambert and have
+/// the same solid angle: of the azimuthal map about X, which near it is in radians from it, or, of
+/// a sensor that scans all around its Z, of the cylindrical map about Z, true to scale at an
+/// elevation of about 30 degrees. The axis is X or Z accordingly.
 struct PatternCoverage {
+  bool all_around = false;    ///< about Z
   double cell = 0, ring = 0;  ///< rad
   /// The field of view is every cell that a scan of so many seconds reaches.
   double field_after = 0;
   double field_solid_angle = 0;         ///< sr
-  double field_half_angle = 0;          ///< of the cone about X that holds every shot, rad
+  double field_half_angle = 0;          ///< of the cone about the axis that holds every shot, rad
+  double field_inner_angle = 0;         ///< of the cone about the axis that holds none, rad
   std::vector<double> left, up;         ///< [cells], centres in the map, rad
   std::vector<double> azimuth, zenith;  ///< [cells], the same as directions, rad
   std::vector<CoverageAfter> after;     ///< [options.after]

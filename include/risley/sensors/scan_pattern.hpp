@@ -35,6 +35,11 @@ struct ScanPattern {
 /// @throws InvalidArgument for angles that are not one per prism
 std::vector<double> start_angles(const Sensor& sensor, const ScanPatternOptions& options);
 
+/// Of the swing of a sensor's speeds, rad/s: see ScanSequence. 0 where none swings.
+/// @throws InvalidArgument for swings that are not one per prism, and for a single prism that
+/// swings
+double swing_angular_frequency(const Sensor& sensor);
+
 /// Rows [first_row, first_row + rows) of the scan sequence with rotors at constant speed: row r is
 /// shot every (r + 1) - 1; with whole groups of E emitters, (every (r / E + 1) - 1) E + r mod E.
 /// @throws InvalidArgument for angles or speeds that are not one per prism, a rate that is not

@@ -27,13 +27,17 @@ RotorKind rotor_kind_from(std::string_view name);
 /// All names: "constant", "sinusoidal", "hunting", "random-walk".
 const std::vector<std::string>& rotor_kind_names();
 
-/// Speed of a rotor = nominal + oscillation + random walk. The oscillation is a sine of constant
-/// amplitude whose phase the seed decides; the random walk is integrated white acceleration, zero
-/// at time zero, so its standard deviation after t seconds is acceleration_noise sqrt(t).
+/// Speed of a rotor = nominal + swing + oscillation + random walk. The swing is a cosine from time
+/// zero that belongs to the type of sensor (sensors::ScanSequence). The oscillation is a sine of
+/// constant amplitude whose phase the seed decides; the random walk is integrated white
+/// acceleration, zero at time zero, so its standard deviation after t seconds is acceleration_noise
+/// sqrt(t).
 struct RotorSettings {
   double oscillation_speed_std = 0;  ///< of the speed, rad/s; the amplitude is sqrt(2) times it
   std::vector<double> oscillation_period;  ///< s, one per prism in beam order
   double acceleration_noise = 0;           ///< rad/s/sqrt(s), the same for all prisms
+  std::vector<double> swing;               ///< of the speed, one per prism, rad/s; empty: none
+  double swing_frequency = 0;              ///< rad/s
 };
 
 /// The settings that a kind stands for. Every prism has its own period.
@@ -55,7 +59,8 @@ class RotorMotion {
   /// @param angular_velocity  nominal, rad/s
   /// @param last_time_ns      largest time that will be asked for
   /// @throws InvalidArgument for a prism that no train has, a last time below 0, settings that are
-  ///         negative, not finite or lack a period, and an angle or speed that is not finite
+  ///         negative, not finite or lack a period or swing, and an angle or speed that is not
+  ///         finite
   RotorMotion(const RotorSettings& settings, int prism, double start_angle, double angular_velocity,
               std::int64_t last_time_ns, std::uint64_t seed);
 
@@ -76,6 +81,7 @@ class RotorMotion {
 
   double start_angle_, angular_velocity_;
   double amplitude_ = 0, frequency_ = 0, phase_ = 0;  ///< rad/s, rad/s, rad
+  double swing_ = 0, swing_frequency_ = 0;            ///< rad/s
   double acceleration_noise_ = 0;
   std::int64_t last_time_ns_ = 0;
   RandomStream walk_;
