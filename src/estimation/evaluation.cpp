@@ -62,6 +62,20 @@ std::vector<std::size_t> matching_rows(const std::vector<std::int64_t>& shots,
   return rows;
 }
 
+/// What held parameters that are off in the truth add to the covariance of the free ones.
+Eigen::MatrixXd covariance_of_held_errors(const Estimate& estimate, const PrismTrain& truth) {
+  const auto count = static_cast<Eigen::Index>(estimate.free.size());
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(count, count);
+  const HeldChanges& changes = estimate.held_changes;
+  for (std::size_t j = 0; j < changes.held.size(); ++j) {
+    const int at = changes.held[j].places.front();
+    if (truth[at] == estimate.sensor.train[at]) continue;
+    const Eigen::VectorXd change = changes.values.col(static_cast<Eigen::Index>(j)).head(count);
+    sum += change * change.transpose();
+  }
+  return sum;
+}
+
 }  // namespace
 
 Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_sensor,
@@ -111,8 +125,10 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
     for (Eigen::Index i = 0; i < statics; ++i) {
       error[i] = result.parameters[static_cast<std::size_t>(i)].error;
     }
+    const Eigen::MatrixXd covariance =
+        estimate.covariance + covariance_of_held_errors(estimate, truth_sensor.train);
     result.nees_parameters =
-        algebra::SymmetricSolver(estimate.covariance).chi2(error) / static_cast<double>(statics);
+        algebra::SymmetricSolver(covariance).chi2(error) / static_cast<double>(statics);
   }
 
   std::vector<double> squares(rotor_count, 0.0), variances = squares, speed_squares = squares,

@@ -26,7 +26,8 @@ struct Evaluation {
   std::vector<double> angular_velocity_rmse;              ///< [prisms], rad/s
   /// Root mean square errors over the root mean square of the stated sigmas [prisms].
   std::vector<double> rotation_angle_rmse_over_sigma, angular_velocity_rmse_over_sigma;
-  double nees_parameters = 0;       ///< per degree of freedom; 1 is honest
+  /// Per degree of freedom; 1 is honest. Held parameters count where they are off in the truth.
+  double nees_parameters = 0;
   double nees_rotation_angles = 0;  ///< per degree of freedom, mean over shots
 };
 
