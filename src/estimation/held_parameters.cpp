@@ -19,9 +19,14 @@ using Eigen::Index;
 /// So many shots tell how answers hang on held parameters: shares of them do, not sigmas.
 constexpr double kSampleShots = 20000;
 
+/// What was estimated: the free parameters, and the frame's turn where that was free.
+const std::vector<FreeParameter>& constants_of(const Estimate& estimate) {
+  return estimate.constants.empty() ? estimate.free : estimate.constants;
+}
+
 /// Held parameters that some answer depends on.
 std::vector<FreeParameter> telling_held(const Estimate& estimate, const sensors::Sensor& sensor) {
-  std::vector<FreeParameter> held = uncertain_held(sensor, estimate.free);
+  std::vector<FreeParameter> held = uncertain_held(sensor, constants_of(estimate));
   const std::vector<std::size_t> shots = estimate.series.shots_of_beams();
   std::erase_if(held, [&](const FreeParameter& parameter) {
     const int emitter = place::emitter(parameter.places.front(), sensor.prisms());
@@ -63,7 +68,7 @@ HeldChanges changes_by_held_parameters(const Estimate& estimate, const sensors::
   HeldChanges result;
   result.held = telling_held(estimate, sensor);
   const std::vector<FreeParameter>& held = result.held;
-  std::vector<FreeParameter> all = estimate.constants.empty() ? estimate.free : estimate.constants;
+  std::vector<FreeParameter> all = constants_of(estimate);
   const auto free = static_cast<Index>(all.size());
   const auto parameters = static_cast<Index>(estimate.free.size());
   const Index prisms = sensor.prisms();
