@@ -110,6 +110,11 @@ std::vector<estimation::FreeParameter> calibration_parameters(
   for (const std::string& name : estimation::default_free_names(shape)) {
     if (name != "refractive_index") names.push_back(name);
   }
+  // Walls of unknown pose turn with the sensor as a lean of its last axis would turn it.
+  std::erase_if(names, [&](const std::string& name) {
+    const int at = find_parameter(name, shape).places.front();
+    return at == place::frame_yaw(shape.prisms) || at == place::frame_pitch(shape.prisms);
+  });
   for (const std::string& name : fixed) {
     if (find_parameter(name, shape).kind != ParameterKind::train) {
       throw InvalidArgument(
