@@ -539,6 +539,7 @@ class IdentifyHypothesis(Fields):
 class IdentifyHypothesisFrame(Fields):
     yaw_deg: float
     pitch_deg: float
+    roll_deg: float
 
 class IdentificationLines(Fields):
     frequency_hz: float
@@ -583,6 +584,11 @@ class PatternCoverageFieldOfView(Fields):
     deg2: float
     sr: float
     half_angle_deg: float
+    elevation_deg: PatternCoverageFieldOfViewElevationDeg
+
+class PatternCoverageFieldOfViewElevationDeg(Fields):
+    min: float
+    max: float
 
 class PatternCoverageTimeToCoverS(Fields):
     ...
