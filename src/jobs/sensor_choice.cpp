@@ -212,7 +212,13 @@ std::string span_text(double from, double to) {
 }
 
 /// What may have made shots that lie beyond the field of view of every sensor.
-std::string wide_words(const recordings::DirectionSpread& spread) {
+/// @param lines  of emitters that the file names
+std::string wide_words(const recordings::DirectionSpread& spread, int lines) {
+  constexpr int kMostEmitters = 6;  // of sensors with prisms
+  if (lines > kMostEmitters) {
+    return fmt::format(
+        "those of a spinning lidar of {} lines or more, which has no prisms to be found", lines);
+  }
   struct Wide {
     const char* name;
     double azimuth_deg, zenith_deg;
@@ -256,10 +262,11 @@ std::string too_near_words(const AngleSeries& shots, const Sensor& sensor) {
 }
 
 /// Says why no sensor can have made the shots, where that is so.
-/// @param names_emitters  whether the file says which emitter fired; without it, the rotors of a
-///                        sensor that sees all around are not found
+/// @param lines  of emitters that the file names; without them, the rotors of a sensor that sees
+/// all
+///               around are not found
 std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> candidates,
-                             bool names_emitters) {
+                             int lines) {
   if (shots.size() < recordings::kFewestJudged) return {};
   const double radius = recordings::cone_radius(shots.azimuth, shots.zenith);
   if (const auto problem = recordings::not_a_scan(radius, shots.size(), shots.range)) {
@@ -267,7 +274,7 @@ std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> c
   }
   double widest = 0;
   for (const Sensor& sensor : candidates) {
-    if (candidates.size() > 1 && sensor.train.layout().axis_up && !names_emitters) continue;
+    if (candidates.size() > 1 && sensor.train.layout().axis_up && lines <= 1) continue;
     if (!(sensor.field_of_view > 0)) return {};
     widest = std::max(widest, sensor.field_of_view);
   }
@@ -280,7 +287,8 @@ std::string impossible_words(const AngleSeries& shots, std::span<const Sensor> c
       "probably {}",
       span_text(spread.azimuth_from, spread.azimuth_to),
       span_text(spread.zenith_from, spread.zenith_to),
-      candidates.size() == 1 ? candidates.front().name : "any built-in preset", wide_words(spread));
+      candidates.size() == 1 ? candidates.front().name : "any built-in preset",
+      wide_words(spread, lines));
 }
 
 /// Looks at the first shots before any sensor is. @return whether one may have made them
@@ -289,7 +297,7 @@ bool are_possible(const FirstShots& shots, std::span<const Sensor> candidates,
   if (shots.beams == BeamSource::recorded) {
     for (const std::uint8_t beam : shots.head.beam) choice.lines = std::max(choice.lines, beam + 1);
   }
-  choice.impossible = impossible_words(shots.head, candidates, choice.lines > 1);
+  choice.impossible = impossible_words(shots.head, candidates, choice.lines);
   if (choice.impossible.empty()) return true;
   choice.chosen_by = ChosenBy::guess;
   choice.fits = false;
@@ -423,7 +431,8 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
     named = preset_of_type(device.type);
     if (!named) {
       throw InvalidArgument(fmt::format(
-          "there is no built-in preset for the recording's sensor ({}): name one with {}",
+          "the optics of a {} are not known, and this needs them; what does without reads its "
+          "recordings: info, convert; {} names a preset or calibration of its optics",
           recordings::device_type_name(device.type), name_of(kSetting.sensor)));
     }
   }
@@ -543,7 +552,11 @@ AngleSeries first_second(const recordings::Source& source, const recordings::Rea
 std::optional<Sensor> preset_of_type(int device_type) {
   const auto* type = recordings::livox_type(static_cast<std::uint8_t>(device_type));
   if (type == nullptr) return std::nullopt;
-  return sensors::load_sensor(lower_case(std::string(type->name)));
+  // Of some types nobody knows the optics.
+  const std::string name = lower_case(std::string(type->name));
+  const auto known = sensors::builtin_preset_names();
+  if (std::find(known.begin(), known.end(), name) == known.end()) return std::nullopt;
+  return sensors::load_sensor(name);
 }
 
 std::optional<Sensor> given_sensor(const std::string& name_or_path) {

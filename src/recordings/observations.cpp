@@ -180,6 +180,10 @@ std::string RecordingHeader::detail(const std::string& name, const std::string& 
   return fallback;
 }
 
+std::string RecordingHeader::device_detail(const Device& device, const std::string& name) const {
+  return detail(fmt::format("device_{}_{}", device.index, name));
+}
+
 void RecordingHeader::set_detail(const std::string& name, const std::string& value) {
   for (auto& [key, old] : details) {
     if (key == name) {

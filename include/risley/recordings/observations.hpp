@@ -237,6 +237,8 @@ struct RecordingHeader {
 
   /// Value of a detail, or the fallback.
   std::string detail(const std::string& name, const std::string& fallback = {}) const;
+  /// Value of a detail of one device, or nothing.
+  std::string device_detail(const Device& device, const std::string& name) const;
   /// Replaces the value of a detail, or appends it to the others.
   void set_detail(const std::string& name, const std::string& value);
 };

@@ -46,7 +46,7 @@ constexpr std::size_t kLvx2DurationAt = kLvxPublicHeaderBytes, kLvx2CountAt = 28
 constexpr std::size_t kLvx2SerialBytes = 16, kIdAt = 32, kLidarTypeAt = 36, kDeviceTypeAt = 37,
                       kEnableAt = 38, kPoseAt = 39;
 // In front of the points of a package.
-constexpr std::size_t kPackageBytes = 27, kPackageIdAt = 1, kPackageLidarTypeAt = 5,
+constexpr std::size_t kLvx2PackageBytes = 27, kPackageIdAt = 1, kPackageLidarTypeAt = 5,
                       kPackageTimeTypeAt = 6, kPackageTimeAt = 7, kPackageNumberAt = 15,
                       kPackageDataTypeAt = 17, kPackageLengthAt = 18, kPackageFrameAt = 22;
 constexpr std::uint8_t kPackageLidarType = 8;  // what Viewer 2 writes
@@ -64,7 +64,7 @@ bool recognises_lvx2(std::string_view head) {
 LidarId lidar_id(const std::uint8_t* bytes) { return {bytes[0], bytes[1], bytes[2], bytes[3]}; }
 
 /// The entries of the device table.
-std::vector<Device> read_devices(io::BlockInput& file, std::size_t count) {
+std::vector<Device> read_lvx2_devices(io::BlockInput& file, std::size_t count) {
   if (count == 0) {
     throw FileError(file.path(), {kLvx2CountAt, {}}, "number of devices = 0, allowed 1 to 255");
   }
@@ -93,7 +93,7 @@ struct Package {
   std::uint32_t length = 0;  ///< of the points, bytes
 };
 
-Package package_header(const std::uint8_t* bytes) {
+Package lvx2_package(const std::uint8_t* bytes) {
   Package package;
   package.id = lidar_id(bytes + kPackageIdAt);
   package.header.time_type = bytes[kPackageTimeTypeAt];
@@ -256,14 +256,14 @@ bool Lvx2Reader::read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t 
     }
     return true;
   };
-  const std::size_t known = std::min<std::uint64_t>(left, kPackageBytes);
+  const std::size_t known = std::min<std::uint64_t>(left, kLvx2PackageBytes);
   const std::uint8_t* bytes = file().at(position(), known);
   if (bytes[0] != 0) {
     fail(position(), fmt::format("package version = {}, expected 0", bytes[0]));
     return true;
   }
-  if (known < kPackageBytes) return stop({});
-  Package package = package_header(bytes);
+  if (known < kLvx2PackageBytes) return stop({});
+  Package package = lvx2_package(bytes);
   NumberedHeader& header = package.header;
   if (package.length > kMostPointBytes) {
     fail(position() + kPackageLengthAt,
@@ -274,7 +274,7 @@ bool Lvx2Reader::read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t 
   const auto layout_of_one = numbered_layout(header.data_type, 1);
   const std::size_t size = layout_of_one ? layout_of_one->bytes_per_record : 1;
   header.records = static_cast<std::uint16_t>(package.length / size);
-  const std::uint64_t whole = kPackageBytes + std::uint64_t{package.length};
+  const std::uint64_t whole = kLvx2PackageBytes + std::uint64_t{package.length};
   if (whole > left) return stop(header.records);
   if (!layout_of_one) {
     ++unknown_types_[header.data_type];
@@ -306,13 +306,14 @@ bool Lvx2Reader::read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t 
   }
   numbers.lost +=
       place.kind == PacketNumbers::Kind::late ? -1 : static_cast<std::int64_t>(place.lost);
-  const std::span records(file().at(position() + kPackageBytes, package.length), layout.bytes());
+  const std::span records(file().at(position() + kLvx2PackageBytes, package.length),
+                          layout.bytes());
   const std::size_t packets = chunk.packets.size();
   try {
     chunk.observations.resize(std::max(chunk.observations.size(), rows() + layout.rows()));
     decode_numbered_records_into(header, records, grids_[*row], device, chunk, rows());
   } catch (const BadPacket& bad) {
-    fail(position() + kPackageBytes + bad.byte_offset(), bad.problem());
+    fail(position() + kLvx2PackageBytes + bad.byte_offset(), bad.problem());
     return true;
   }
   for (std::size_t i = packets; i < chunk.packets.size(); ++i) {
@@ -366,9 +367,15 @@ std::unique_ptr<Reader> open_lvx2(const io::InputFile& input, const Progress&) {
   header.format = kLvx2Format.name;
   header.frame_duration_ms = load<std::uint32_t>(bytes);
   const std::size_t count = bytes[kLvx2CountAt - kLvx2DurationAt];
-  header.devices = read_devices(file, count);
+  header.devices = read_lvx2_devices(file, count);
   return std::make_unique<Lvx2Reader>(std::move(file), std::move(header),
                                       kLvx2TableAt + count * kLvx2DeviceBytes);
+}
+
+void require_time(std::int64_t time_ns, std::uint64_t row_number) {
+  if (time_ns >= 0 && static_cast<std::uint64_t>(time_ns) <= kLatestPackage) return;
+  throw InvalidArgument(fmt::format("row {}: time = {} ns of a package, allowed 0 to {}",
+                                    row_number, time_ns, kLatestPackage));
 }
 
 /// What stands in front of the first frame.
@@ -518,8 +525,8 @@ std::uint8_t* Lvx2Writer::package(State& state, const NumberedHeader& header) {
   }
   if (!state.frame_ns) state.frame_ns = time_ns;
   const std::size_t length = numbered_layout(header.data_type, header.records)->bytes();
-  std::uint8_t* bytes = output_.append(kPackageBytes + length);
-  std::fill_n(bytes, kPackageBytes, std::uint8_t{0});
+  std::uint8_t* bytes = output_.append(kLvx2PackageBytes + length);
+  std::fill_n(bytes, kLvx2PackageBytes, std::uint8_t{0});
   std::copy(state.id.begin(), state.id.end(), bytes + kPackageIdAt);
   bytes[kPackageLidarTypeAt] = kPackageLidarType;
   bytes[kPackageTimeTypeAt] = header.time_type;
@@ -528,7 +535,7 @@ std::uint8_t* Lvx2Writer::package(State& state, const NumberedHeader& header) {
   bytes[kPackageDataTypeAt] = header.data_type;
   store<std::uint32_t>(bytes + kPackageLengthAt, static_cast<std::uint32_t>(length));
   bytes[kPackageFrameAt] = header.frame;
-  return bytes + kPackageBytes;
+  return bytes + kLvx2PackageBytes;
 }
 
 Lvx2Writer::State& Lvx2Writer::state_of(std::uint8_t device, std::uint64_t row_number) {
@@ -672,10 +679,7 @@ void Lvx2Writer::start_package(State& state, std::int64_t time_ns, std::uint32_t
                                std::uint64_t row_number) {
   OpenPackage& open = state.open;
   open.time_ns = time_ns - state.grid.offset_ns(slot);
-  if (open.time_ns < 0) {
-    throw InvalidArgument(
-        fmt::format("row {}: time = {} ns, allowed 0 or later", row_number, time_ns));
-  }
+  require_time(open.time_ns, row_number);
   open.records = records();
   open.last_slot = 0;
   open.last_return = 0;
@@ -728,10 +732,7 @@ void Lvx2Writer::write_imu(const ImuSample& sample) {
   if (state.open.records > 0 && sample.time_ns >= state.open.time_ns + length_ns(state)) {
     flush(sample.device);
   }
-  if (sample.time_ns < 0) {
-    throw InvalidArgument(
-        fmt::format("time of an inertial sample = {} ns, allowed 0 or later", sample.time_ns));
-  }
+  require_time(sample.time_ns, rows_written_);
   NumberedHeader header;
   header.data_type = kNumberedImu;
   header.records = 1;

@@ -25,9 +25,9 @@ namespace {
 using io::load;
 using io::store;
 
-constexpr std::size_t kLengthAt = 1, kIntervalAt = 3, kRecordsAt = 5, kNumberAt = 7, kFrameAt = 9,
-                      kTypeAt = 10, kTimeTypeAt = 11, kSafetyAt = 12, kChecksumAt = 24,
-                      kTimeAt = 28;
+constexpr std::size_t kPacketLengthAt = 1, kIntervalAt = 3, kRecordsAt = 5, kNumberAt = 7,
+                      kFrameAt = 9, kTypeAt = 10, kTimeTypeAt = 11, kSafetyAt = 12,
+                      kChecksumAt = 24, kTimeAt = 28;
 constexpr std::uint16_t kShortBytes = 8;
 constexpr std::int64_t kIntervalUnit_ns = 100;
 /// A packet's last shot is later than its first: room for it is left.
@@ -96,8 +96,9 @@ NumberedHeader decode_numbered_header(std::span<const std::uint8_t> bytes) {
     throw BadPacket(0, fmt::format("packet version = {}, expected {}", bytes[0], kNumberedVersion));
   }
   const std::uint8_t* at = bytes.data();
-  if (const auto length = load<std::uint16_t>(at + kLengthAt); length != bytes.size()) {
-    throw BadPacket(kLengthAt, fmt::format("length = {}, expected {} bytes", length, bytes.size()));
+  if (const auto length = load<std::uint16_t>(at + kPacketLengthAt); length != bytes.size()) {
+    throw BadPacket(kPacketLengthAt,
+                    fmt::format("length = {}, expected {} bytes", length, bytes.size()));
   }
   NumberedHeader header;
   header.interval = load<std::uint16_t>(at + kIntervalAt);
@@ -127,7 +128,7 @@ NumberedHeader decode_numbered_header(std::span<const std::uint8_t> bytes) {
 void encode_numbered_header(const NumberedHeader& header, std::span<std::uint8_t> bytes) {
   std::uint8_t* at = bytes.data();
   std::fill_n(at, kNumberedHeaderBytes, std::uint8_t{0});
-  store<std::uint16_t>(at + kLengthAt, static_cast<std::uint16_t>(bytes.size()));
+  store<std::uint16_t>(at + kPacketLengthAt, static_cast<std::uint16_t>(bytes.size()));
   store<std::uint16_t>(at + kIntervalAt, header.interval);
   store<std::uint16_t>(at + kRecordsAt, header.records);
   store<std::uint16_t>(at + kNumberAt, header.number);
@@ -257,6 +258,26 @@ void encode_numbered_record(std::uint8_t data_type, const Observations& observat
   }
   bytes[6] = whole[12];
   bytes[7] = whole[13];
+}
+
+std::string tag_words(std::uint8_t device_type, std::uint8_t tag) {
+  if (tag == 0) return "a good point";
+  // Manuals and firmwares of the HAP differ in what else they say.
+  if (device_type == kHap || device_type == kHapT1) return "perhaps no good point";
+  struct Field {
+    unsigned at;
+    const char* doubt;
+  };
+  constexpr Field kFields[] = {{0, "between near objects"}, {2, "rain, fog or dust"}, {4, "other"}};
+  std::string words;
+  for (const Field& field : kFields) {
+    const unsigned value = tag >> field.at & 3U;
+    if (value == 0) continue;
+    constexpr const char* kConfidence[] = {"", "medium", "low", "unknown"};
+    words += fmt::format("{}{} confidence ({})", words.empty() ? "" : ", ", kConfidence[value],
+                         field.doubt);
+  }
+  return words.empty() ? "a good point" : words;
 }
 
 PacketNumbers::Place PacketNumbers::add(const Packet& packet) {

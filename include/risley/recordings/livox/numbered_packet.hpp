@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
@@ -99,6 +100,9 @@ void decode_numbered_packet(std::span<const std::uint8_t> bytes, std::uint8_t de
 /// @throws InvalidArgument when the record cannot hold a value
 void encode_numbered_record(std::uint8_t data_type, const Observations& observations,
                             std::size_t first_row, std::uint64_t row_number, std::uint8_t* bytes);
+
+/// What a tag says of a point, in words. @param device_type  Device::type
+std::string tag_words(std::uint8_t device_type, std::uint8_t tag);
 
 /// Counts packets of one sensor and port by their numbers of 16 bits. Where more than 32768 are
 /// missing, the times of the packets say how often the number went round.
