@@ -469,17 +469,25 @@ void MessageReader::describe_numbered_device(std::size_t topic, std::uint8_t num
     return;
   }
   if (first.intervals.empty()) return;
+  // Within packets; floating-point times of clouds have coarse steps, whose mean is right.
   std::vector<double> steps = first.intervals;
-  const double step = median(steps);
+  const double usual = median(steps);
+  double sum = 0, count = 0;
+  for (const double one : steps) {
+    if (std::fabs(one - usual) > 0.5 * usual) continue;
+    sum += one;
+    ++count;
+  }
+  const double step = sum / count;
   const auto& cloud = cloud_times_[topic];
   const std::int64_t tolerance = cloud ? static_cast<std::int64_t>(std::ceil(cloud->step_ns)) : 0;
   constexpr std::int64_t kStepOfMid360 = 4947, kStepOfHap = 2189;  // ns, as the driver writes them
   for (const auto& [type, written] :
        {std::pair(kMid360, kStepOfMid360), std::pair(kHap, kStepOfHap)}) {
     const livox::ShotGrid grid = *livox::numbered_grid(type);
-    const bool as_fired = std::fabs(step - static_cast<double>(grid.offset_ns(1))) <= 2;
-    const bool as_written =
-        std::fabs(step - static_cast<double>(written)) <= static_cast<double>(tolerance);
+    constexpr double kSame = 4;  // ns
+    const bool as_fired = std::fabs(step - static_cast<double>(grid.offset_ns(1))) <= kSame;
+    const bool as_written = std::fabs(step - static_cast<double>(written)) <= kSame;
     if ((!as_fired && !as_written) || first.last_line >= grid.beams) continue;
     const bool names_lines = first.last_line > 0;
     header_.devices[number].type = type;
@@ -496,23 +504,32 @@ void MessageReader::describe_numbered_device(std::size_t topic, std::uint8_t num
 }
 
 void MessageReader::mend_packets(std::uint8_t device, LidarMessage& message) const {
-  constexpr std::int64_t kPoints = 96;  // of a packet
+  constexpr std::int64_t kPoints = 96;   // of a packet
+  constexpr std::int64_t kJitter = 100;  // ns, of packets
   const DriverPackets& packets = driver_packets_[device];
   if (packets.step_ns == 0) return;
+  const std::int64_t period = packets.grid.offset_ns(kPoints);
+  const std::int64_t tolerance = 2 * packets.tolerance_ns;
   std::int64_t begin_ns = 0;  // of the packet, after the message's time
-  bool begun = false;
   for (MessagePoint& point : message.points) {
+    const auto place_after = [&](std::int64_t since, std::int64_t off) {
+      const std::int64_t place = (since + packets.step_ns / 2) / packets.step_ns;
+      const bool fits = since >= -off && place < kPoints &&
+                        std::abs(since - place * packets.step_ns) <= off &&
+                        (!packets.names_lines || place % packets.grid.beams == point.line);
+      return fits ? std::optional(place) : std::nullopt;
+    };
     const std::int64_t since = point.offset_ns - begin_ns;
-    std::int64_t place = (since + packets.step_ns / 2) / packets.step_ns;
-    const bool fits = begun && since >= 0 && place < kPoints &&
-                      std::abs(since - place * packets.step_ns) <= 2 * packets.tolerance_ns;
-    if (!fits) {
-      begin_ns = point.offset_ns;
-      begun = true;
-      place = 0;
+    std::optional<std::int64_t> place = place_after(since, tolerance);
+    if (!place) {
+      // Another packet. Where its first points are missing, the one before says when it began.
+      const std::int64_t later = since > 0 ? (since + kJitter + tolerance) / period * period : 0;
+      place = later > 0 ? place_after(since - later, kJitter + tolerance) : std::nullopt;
+      if (!place) place = packets.names_lines ? point.line : 0;
+      begin_ns = point.offset_ns - *place * packets.step_ns;
     }
-    point.offset_ns = begin_ns + packets.grid.offset_ns(static_cast<std::uint32_t>(place));
-    if (!packets.names_lines) point.line = static_cast<std::uint8_t>(place % packets.grid.beams);
+    point.offset_ns = begin_ns + packets.grid.offset_ns(static_cast<std::uint32_t>(*place));
+    if (!packets.names_lines) point.line = static_cast<std::uint8_t>(*place % packets.grid.beams);
   }
 }
 
@@ -654,12 +671,7 @@ void MessageReader::append(LidarMessage& message, Chunk& chunk) {
 namespace {
 
 void set_row(Observations& rows, std::size_t row, const MessagePoint& point, std::int64_t time_ns,
-             std::size_t return_number, std::uint8_t device, bool whole_millimetres) {
-  const Vector3<double> position =
-      whole_millimetres ? Vector3<double>{of_millimetres(point.x), of_millimetres(point.y),
-                                          of_millimetres(point.z)}
-                        : Vector3<double>{point.x, point.y, point.z};
-  set_cartesian(rows, row, position, kMillimetre);
+             std::size_t return_number, std::uint8_t device) {
   rows.time_ns[row] = time_ns;
   rows.intensity[row] = point.intensity;
   rows.return_number[row] = static_cast<std::uint8_t>(return_number);
@@ -668,14 +680,31 @@ void set_row(Observations& rows, std::size_t row, const MessagePoint& point, std
   rows.device[row] = device;
 }
 
+/// Directions and ranges of a message's points, in rows from one on.
+void set_points(Observations& rows, std::size_t first_row, const std::vector<MessagePoint>& points,
+                bool whole_millimetres) {
+  constexpr std::size_t kBlock = 256;
+  double x[kBlock], y[kBlock], z[kBlock];
+  for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+    const std::size_t count = std::min(kBlock, points.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      const MessagePoint& point = points[begin + i];
+      x[i] = whole_millimetres ? of_millimetres(point.x) : point.x;
+      y[i] = whole_millimetres ? of_millimetres(point.y) : point.y;
+      z[i] = whole_millimetres ? of_millimetres(point.z) : point.z;
+    }
+    set_cartesian(rows, first_row + begin, count, x, y, z, kMillimetre);
+  }
+}
+
 }  // namespace
 
 void MessageReader::append_points(const LidarMessage& message, std::uint8_t device,
                                   Observations& rows) {
   const std::vector<MessagePoint>& points = message.points;
-  const bool whole = is_second_generation(header_.devices[device].type);
   std::size_t row = rows.size();
   rows.resize(row + points.size());
+  set_points(rows, row, points, is_second_generation(header_.devices[device].type));
   // Offsets that grow are 32-bit numbers and begin again after 4.3 s.
   const std::int64_t grown =
       growth_from_ns_[device] ? message.time_ns - *growth_from_ns_[device] : 0;
@@ -696,7 +725,7 @@ void MessageReader::append_points(const LidarMessage& message, std::uint8_t devi
     }
     for (std::size_t i = 0; i < run; ++i, ++row) {
       const MessagePoint& point = points[first + i];
-      set_row(rows, row, point, time_of(point), is_shot ? i + 1 : 1, device, whole);
+      set_row(rows, row, point, time_of(point), is_shot ? i + 1 : 1, device);
     }
     first += run;
   }
@@ -708,10 +737,11 @@ void MessageReader::append_cloud(const LidarMessage& message, std::uint8_t devic
   const auto returns = static_cast<std::size_t>(cloud.returns);
   const std::size_t first_row = rows.size();
   rows.resize(first_row + message.points.size());
+  set_points(rows, first_row, message.points, is_second_generation(header_.devices[device].type));
   for (std::size_t i = 0; i < message.points.size(); ++i) {
     const std::int64_t offset_ns = cloud.grid.offset_ns(static_cast<std::uint32_t>(i / returns));
     set_row(rows, first_row + i, message.points[i], message.time_ns + offset_ns, i % returns + 1,
-            device, is_second_generation(header_.devices[device].type));
+            device);
   }
 }
 

@@ -47,33 +47,25 @@ std::optional<std::size_t> decode_spherical_records(const RecordLayout& layout,
   return sound < a.records ? std::optional(sound) : std::nullopt;
 }
 
-template <bool kTagged>
-void decode_cartesian(std::size_t points, const std::uint8_t* bytes, Observations& o,
+/// Records of three whole numbers, an intensity and perhaps a tag.
+/// @param step  of the numbers, m
+template <class Number, bool kTagged>
+void decode_cartesian(std::size_t points, const std::uint8_t* bytes, double step, Observations& o,
                       std::size_t row) {
-  constexpr std::size_t kBytes = kTagged ? 14 : 13;
-  for (const std::size_t end = row + points; row < end; ++row, bytes += kBytes) {
-    set_cartesian(
-        o, row,
-        {load<std::int32_t>(bytes) * kMillimetre, load<std::int32_t>(bytes + 4) * kMillimetre,
-         load<std::int32_t>(bytes + 8) * kMillimetre},
-        kMillimetre);
-    o.intensity[row] = bytes[12];
-    o.tag[row] = kTagged ? bytes[13] : 0;
-  }
-}
-
-/// Data type 2 of the second generation.
-void decode_short_points(std::size_t points, const std::uint8_t* bytes, Observations& o,
-                         std::size_t row) {
-  constexpr double kCentimetre = 1e-2;
-  for (const std::size_t end = row + points; row < end; ++row, bytes += 8) {
-    set_cartesian(
-        o, row,
-        {load<std::int16_t>(bytes) * kCentimetre, load<std::int16_t>(bytes + 2) * kCentimetre,
-         load<std::int16_t>(bytes + 4) * kCentimetre},
-        kCentimetre);
-    o.intensity[row] = bytes[6];
-    o.tag[row] = bytes[7];
+  constexpr std::size_t kCoordinates = 3 * sizeof(Number), kBytes = kCoordinates + 1 + kTagged;
+  constexpr std::size_t kBlock = 128;  // all records of a packet
+  double x[kBlock], y[kBlock], z[kBlock];
+  for (const std::size_t end = row + points; row < end;) {
+    const std::size_t count = std::min(kBlock, end - row);
+    for (std::size_t i = 0; i < count; ++i, bytes += kBytes) {
+      x[i] = load<Number>(bytes) * step;
+      y[i] = load<Number>(bytes + sizeof(Number)) * step;
+      z[i] = load<Number>(bytes + 2 * sizeof(Number)) * step;
+      o.intensity[row + i] = bytes[kCoordinates];
+      o.tag[row + i] = kTagged ? bytes[kCoordinates + 1] : 0;
+    }
+    set_cartesian(o, row, count, x, y, z, step);
+    row += count;
   }
 }
 
@@ -163,9 +155,9 @@ std::optional<std::size_t> decode_points(const RecordLayout& layout, const std::
                                          Observations& o, std::size_t first_row) {
   if (layout.cartesian) {
     if (layout.tagged) {
-      decode_cartesian<true>(layout.rows(), bytes, o, first_row);
+      decode_cartesian<std::int32_t, true>(layout.rows(), bytes, kMillimetre, o, first_row);
     } else {
-      decode_cartesian<false>(layout.rows(), bytes, o, first_row);
+      decode_cartesian<std::int32_t, false>(layout.rows(), bytes, kMillimetre, o, first_row);
     }
     return std::nullopt;
   }
@@ -209,7 +201,7 @@ void put_records(const RecordLayout& layout, const std::uint8_t* bytes, Coordina
       impossible = decode_float_points(layout.records, bytes, rows, first_row);
       break;
     case Coordinates::centimetres:
-      decode_short_points(layout.records, bytes, rows, first_row);
+      decode_cartesian<std::int16_t, true>(layout.records, bytes, kCentimetre, rows, first_row);
       break;
   }
   if (impossible) {

@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// Compiled once per instruction set under the rules of risley/core/simd.hpp. What is read must not
+// depend on the processor: nothing here multiplies and adds in one step, which not all can.
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#else
+#pragma GCC optimize("fp-contract=off")
+#endif
+#include "recordings/cartesian_kernel.hpp"
+
+#include <limits>
+
+#include "risley/core/angle.hpp"
+#include "risley/core/simd.hpp"
+
+namespace risley::recordings::RISLEY_KERNEL_NAMESPACE {
+namespace {
+
+using Batch = xsimd::batch<double>;
+constexpr std::size_t kLanes = Batch::size;
+
+/// atan2(y, x) of y >= 0: within an eighth of a turn by a polynomial in the quotient, which is
+/// turned by 45 degrees where it is above tan 22.5 degrees.
+Batch angle_of(const Batch& y, const Batch& x) {
+  constexpr double kTangentOfSixteenth = 0.41421356237309503;
+  const Batch wide = xsimd::abs(x);
+  const auto steep = y > wide;
+  const Batch more = xsimd::select(steep, y, wide), less = xsimd::select(steep, wide, y);
+  const auto turned = less > more * Batch(kTangentOfSixteenth);
+  const Batch quotient =
+      xsimd::select(turned, less - more, less) / xsimd::select(turned, less + more, more);
+  const Batch square = quotient * quotient;
+  constexpr std::size_t kCount = sizeof kArcTangentSeries / sizeof kArcTangentSeries[0];
+  Batch sum(kArcTangentSeries[kCount - 1]);
+#pragma GCC unroll 16
+  for (std::size_t i = kCount - 1; i > 0; --i) {
+    sum = sum * square + Batch(kArcTangentSeries[i - 1]);
+  }
+  Batch angle = quotient + quotient * (square * sum);
+  angle = xsimd::select(turned, angle + Batch(0.25 * kPi), angle);
+  angle = xsimd::select(steep, Batch(0.5 * kPi) - angle, angle);
+  return xsimd::select(x < Batch(0.0), Batch(kPi) - angle, angle);
+}
+
+struct Lanes {
+  alignas(64) double of[kLanes];
+};
+
+void set_points(const Lanes& x_lanes, const Lanes& y_lanes, const Lanes& z_lanes, std::size_t at,
+                std::size_t count, const CartesianArguments& a) {
+  const Batch x = Batch::load_aligned(x_lanes.of), y = Batch::load_aligned(y_lanes.of),
+              z = Batch::load_aligned(z_lanes.of);
+  const Batch zero(0.0);
+  const Batch flat = x * x + y * y;
+  const Batch horizontal = xsimd::sqrt(flat), range = xsimd::sqrt(flat + z * z);
+  Batch azimuth = angle_of(xsimd::abs(y), x);
+  azimuth = xsimd::select(y < zero, zero - azimuth, azimuth);
+  azimuth = xsimd::select(horizontal > zero, azimuth, zero);
+  Batch zenith = angle_of(horizontal, z);
+  const auto none = range == zero;
+  const Batch nan(std::numeric_limits<double>::quiet_NaN()), step(a.step);
+  // Close to the Z axis a step can turn the azimuth by any angle.
+  const Batch across =
+      xsimd::select(horizontal > zero, xsimd::min(step / horizontal, Batch(kTwoPi)), Batch(kTwoPi));
+  const Batch along = xsimd::min(step / range, Batch(kPi));
+  Lanes azimuths, zeniths, ranges, azimuth_steps, zenith_steps;
+  xsimd::select(none, nan, azimuth).store_aligned(azimuths.of);
+  xsimd::select(none, nan, zenith).store_aligned(zeniths.of);
+  range.store_aligned(ranges.of);
+  xsimd::select(none, zero, across).store_aligned(azimuth_steps.of);
+  xsimd::select(none, zero, along).store_aligned(zenith_steps.of);
+  for (std::size_t i = 0; i < count; ++i) {
+    a.azimuth[at + i] = azimuths.of[i];
+    a.zenith[at + i] = zeniths.of[i];
+    a.range[at + i] = ranges.of[i];
+    a.azimuth_resolution[at + i] = static_cast<float>(azimuth_steps.of[i]);
+    a.zenith_resolution[at + i] = static_cast<float>(zenith_steps.of[i]);
+    a.range_resolution[at + i] = static_cast<float>(a.step);
+    a.valid[at + i] = ranges.of[i] > 0 ? 1 : 0;
+  }
+}
+
+}  // namespace
+
+void set_cartesian_points(const CartesianArguments& a) {
+  for (std::size_t at = 0; at < a.points; at += kLanes) {
+    const std::size_t count = a.points - at < kLanes ? a.points - at : kLanes;
+    Lanes x, y, z;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const std::size_t from = at + (i < count ? i : 0);
+      x.of[i] = a.x[from];
+      y.of[i] = a.y[from];
+      z.of[i] = a.z[from];
+    }
+    if (count == kLanes) {
+      set_points(x, y, z, at, kLanes, a);
+    } else {
+      set_points(x, y, z, at, count, a);
+    }
+  }
+}
+
+}  // namespace risley::recordings::RISLEY_KERNEL_NAMESPACE
