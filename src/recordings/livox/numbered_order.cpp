@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/livox/numbered_order.hpp"
 
-#include <algorithm>
 #include <utility>
 
 namespace risley::recordings::livox {
 namespace {
 
-constexpr std::size_t kRememberedNumbers = 1024;
 constexpr std::size_t kChecked = 28;  // bytes in front of what the checksum is of
 
 }  // namespace
@@ -31,13 +29,11 @@ bool NumberedOrder::add(std::span<const std::uint8_t> packet, std::int64_t host_
   const PacketNumbers::Place place = track.numbers.add(chunk_.packets.front());
   if (place.kind == PacketNumbers::Kind::restarted) {
     while (!track.held.empty()) give_out(track);
-    track.recent.clear();
     track.restarted = track.last_index.has_value();
-  } else if (track.held.contains(place.index) || std::find(track.recent.begin(), track.recent.end(),
-                                                           place.index) != track.recent.end()) {
+  } else if (place.kind == PacketNumbers::Kind::duplicate) {
     ++counts_.duplicates;
     return true;
-  } else if (track.last_index && place.index < *track.last_index) {
+  } else if (track.last_index && place.index <= *track.last_index) {
     ++counts_.late;
     return true;
   }
@@ -64,11 +60,6 @@ void NumberedOrder::give_out(Track& track) {
   }
   track.restarted = false;
   track.last_index = first->first;
-  if (track.recent.size() < kRememberedNumbers) {
-    track.recent.push_back(first->first);
-  } else {
-    track.recent[track.recent_at++ % kRememberedNumbers] = first->first;
-  }
   ++counts_.packets;
   counts_.rows += packet.rows;
   if (packet.rows == 0) ++counts_.imu_samples;

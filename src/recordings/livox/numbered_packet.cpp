@@ -280,24 +280,31 @@ std::string tag_words(std::uint8_t device_type, std::uint8_t tag) {
   return words.empty() ? "a good point" : words;
 }
 
+PacketNumbers::Place PacketNumbers::advance(const Packet& packet, std::int64_t steps, Kind kind,
+                                            std::uint64_t lost) {
+  constexpr auto kMost = static_cast<std::int64_t>(kRemembered);
+  for (std::int64_t i = 1; i <= std::min(steps, kMost); ++i) {
+    came_.reset(static_cast<std::size_t>(index_ + i) % kRemembered);
+  }
+  index_ += steps;
+  came_.set(static_cast<std::size_t>(index_) % kRemembered);
+  last_ = packet;
+  return {kind, index_, lost};
+}
+
 PacketNumbers::Place PacketNumbers::add(const Packet& packet) {
   constexpr std::int64_t kRound = 65536, kFarBack = 1'000'000'000;  // numbers; ns
-  if (!last_) {
-    last_ = packet;
-    return {Kind::next, index_, 0};
-  }
+  if (!last_) return advance(packet, 1, Kind::next, 0);
   const std::int64_t passed =
       saturating_difference(numbered_time_ns(packet), numbered_time_ns(*last_));
   const bool same_clock = packet.timestamp_type == last_->timestamp_type;
   if (same_clock && passed < -kFarBack) {
-    last_ = packet;
-    return {Kind::restarted, ++index_, 0};
+    came_.reset();
+    return advance(packet, 1, Kind::restarted, 0);
   }
   // Numbers that begin anew with every frame.
   if (packet.reserved != last_->reserved && packet.number < last_->number) {
-    last_ = packet;
-    index_ += std::int64_t{packet.number} + 1;
-    return {Kind::next, index_, packet.number};
+    return advance(packet, std::int64_t{packet.number} + 1, Kind::next, packet.number);
   }
   const std::int64_t ahead = (std::int64_t{packet.number} - last_->number) & (kRound - 1);
   if (same_clock && ahead == 1 && passed > 0 && (period_ns_ == 0 || passed < period_ns_)) {
@@ -309,11 +316,15 @@ PacketNumbers::Place PacketNumbers::add(const Packet& packet) {
                              : 0.0;
   std::int64_t steps =
       ahead + kRound * std::llround((by_time - static_cast<double>(ahead)) / kRound);
-  if (steps == 0 && passed > 0) steps = 1;  // a writer that numbers no packets
-  if (steps <= 0) return {steps == 0 ? Kind::duplicate : Kind::late, index_ + steps, 0};
-  last_ = packet;
-  index_ += steps;
-  return {Kind::next, index_, static_cast<std::uint64_t>(steps - 1)};
+  if (steps == 0 && passed != 0) steps = 1;  // a writer that numbers no packets
+  if (steps > 0) return advance(packet, steps, Kind::next, static_cast<std::uint64_t>(steps - 1));
+  const std::int64_t index = index_ + steps;
+  const bool known = -steps < static_cast<std::int64_t>(kRemembered);
+  const std::size_t place =
+      static_cast<std::size_t>(std::max<std::int64_t>(index, 0)) % kRemembered;
+  if (known && index > 0 && came_.test(place)) return {Kind::duplicate, index, 0};
+  if (known && index > 0) came_.set(place);
+  return {Kind::late, index, 0};
 }
 
 }  // namespace risley::recordings::livox

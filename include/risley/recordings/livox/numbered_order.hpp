@@ -45,9 +45,7 @@ class NumberedOrder {
     PacketNumbers numbers;
     std::map<std::int64_t, Held> held;       // by index
     std::optional<std::int64_t> last_index;  // of those given out
-    std::vector<std::int64_t> recent;        // indices of the last of them, a ring
-    std::size_t recent_at = 0;
-    bool restarted = false;  // before the next packet that is given out
+    bool restarted = false;                  // before the next packet that is given out
   };
 
   void give_out(Track& track);

@@ -5,6 +5,7 @@
 // the header. All numbers are little-endian and packed.
 #pragma once
 
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -108,10 +109,13 @@ std::string tag_words(std::uint8_t device_type, std::uint8_t tag);
 /// missing, the times of the packets say how often the number went round.
 class PacketNumbers {
  public:
+  /// Packets behind the newest one that are known again.
+  static constexpr std::size_t kRemembered = 1024;
+
   /// What a packet is behind those before.
   enum class Kind : std::uint8_t {
     next,       ///< follows the newest one, perhaps behind a gap
-    duplicate,  ///< the newest one once more
+    duplicate,  ///< one of the last kRemembered once more
     late,       ///< belongs before the newest one
     restarted,  ///< the sensor began anew: nothing is known of what is missing
   };
@@ -125,9 +129,13 @@ class PacketNumbers {
   Place add(const Packet& packet);
 
  private:
-  std::optional<Packet> last_;  ///< the newest
-  std::int64_t index_ = 0;      ///< of it
-  std::int64_t period_ns_ = 0;  ///< shortest time between neighbours so far; 0 when unknown
+  /// Goes on by so many packets, of which only the last one came.
+  Place advance(const Packet& packet, std::int64_t steps, Kind kind, std::uint64_t lost);
+
+  std::bitset<kRemembered> came_;     ///< by index
+  std::optional<Packet> last_;        ///< the newest
+  std::int64_t index_ = kRemembered;  ///< of it
+  std::int64_t period_ns_ = 0;        ///< shortest time between neighbours so far; 0 when unknown
 };
 
 }  // namespace risley::recordings::livox
