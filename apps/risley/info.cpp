@@ -56,7 +56,7 @@ void add_numbered(const recordings::RecordingHeader& header, const recordings::D
   add_known("firmware", header.device_detail(device, "firmware"));
   add_known("field of view", header.device_detail(device, "field_of_view"));
   if (audit.outside_view > 0) {
-    table.add({"outside it", grouped(audit.outside_view) + " shots, which are no missing returns"});
+    table.add({"not looked at", grouped(audit.outside_view) + " shots outside the field of view"});
   }
   table.add({"lost packets", fmt::format("{}, by their numbers", audit.lost_packets)});
   for (std::size_t tag = 0; tag < audit.observations_by_tag.size(); ++tag) {
