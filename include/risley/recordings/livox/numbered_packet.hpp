@@ -126,6 +126,7 @@ class PacketNumbers {
     std::uint64_t lost = 0;  ///< packets between the newest one and this
   };
 
+  /// The next packet that came.
   Place add(const Packet& packet);
 
  private:
