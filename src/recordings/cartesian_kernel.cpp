@@ -44,13 +44,12 @@ Batch angle_of(const Batch& y, const Batch& x) {
 }
 
 struct Lanes {
-  alignas(64) double of[kLanes];
+  alignas(64) double of[kLanes] = {};
 };
 
-void set_points(const Lanes& x_lanes, const Lanes& y_lanes, const Lanes& z_lanes, std::size_t at,
-                std::size_t count, const CartesianArguments& a) {
-  const Batch x = Batch::load_aligned(x_lanes.of), y = Batch::load_aligned(y_lanes.of),
-              z = Batch::load_aligned(z_lanes.of);
+[[gnu::always_inline]] inline void set_points(const Batch& x, const Batch& y, const Batch& z,
+                                              std::size_t at, std::size_t count,
+                                              const CartesianArguments& a) {
   const Batch zero(0.0);
   const Batch flat = x * x + y * y;
   const Batch horizontal = xsimd::sqrt(flat), range = xsimd::sqrt(flat + z * z);
@@ -59,46 +58,46 @@ void set_points(const Lanes& x_lanes, const Lanes& y_lanes, const Lanes& z_lanes
   azimuth = xsimd::select(horizontal > zero, azimuth, zero);
   Batch zenith = angle_of(horizontal, z);
   const auto none = range == zero;
-  const Batch nan(std::numeric_limits<double>::quiet_NaN()), step(a.step);
-  // Close to the Z axis a step can turn the azimuth by any angle.
-  const Batch across =
-      xsimd::select(horizontal > zero, xsimd::min(step / horizontal, Batch(kTwoPi)), Batch(kTwoPi));
-  const Batch along = xsimd::min(step / range, Batch(kPi));
-  Lanes azimuths, zeniths, ranges, azimuth_steps, zenith_steps;
+  const Batch nan(std::numeric_limits<double>::quiet_NaN());
+  Lanes azimuths, zeniths, ranges, horizontals;
   xsimd::select(none, nan, azimuth).store_aligned(azimuths.of);
   xsimd::select(none, nan, zenith).store_aligned(zeniths.of);
   range.store_aligned(ranges.of);
-  xsimd::select(none, zero, across).store_aligned(azimuth_steps.of);
-  xsimd::select(none, zero, along).store_aligned(zenith_steps.of);
+  horizontal.store_aligned(horizontals.of);
+  const auto step = static_cast<float>(a.step);
+  for (std::size_t i = 0; i < count; ++i) a.azimuth[at + i] = azimuths.of[i];
+  for (std::size_t i = 0; i < count; ++i) a.zenith[at + i] = zeniths.of[i];
+  for (std::size_t i = 0; i < count; ++i) a.range[at + i] = ranges.of[i];
+  for (std::size_t i = 0; i < count; ++i) a.range_resolution[at + i] = step;
+  for (std::size_t i = 0; i < count; ++i) a.valid[at + i] = ranges.of[i] > 0 ? 1 : 0;
+  // Close to the Z axis a step can turn the azimuth by any angle.
+  constexpr auto kTurn = static_cast<float>(kTwoPi), kHalf = static_cast<float>(kPi);
   for (std::size_t i = 0; i < count; ++i) {
-    a.azimuth[at + i] = azimuths.of[i];
-    a.zenith[at + i] = zeniths.of[i];
-    a.range[at + i] = ranges.of[i];
-    a.azimuth_resolution[at + i] = static_cast<float>(azimuth_steps.of[i]);
-    a.zenith_resolution[at + i] = static_cast<float>(zenith_steps.of[i]);
-    a.range_resolution[at + i] = static_cast<float>(a.step);
-    a.valid[at + i] = ranges.of[i] > 0 ? 1 : 0;
+    const auto far = static_cast<float>(ranges.of[i]), wide = static_cast<float>(horizontals.of[i]);
+    const float across = step / wide, along = step / far;
+    a.azimuth_resolution[at + i] = far > 0 ? (across < kTurn ? across : kTurn) : 0.0F;
+    a.zenith_resolution[at + i] = far > 0 ? (along < kHalf ? along : kHalf) : 0.0F;
   }
 }
 
 }  // namespace
 
 void set_cartesian_points(const CartesianArguments& a) {
-  for (std::size_t at = 0; at < a.points; at += kLanes) {
-    const std::size_t count = a.points - at < kLanes ? a.points - at : kLanes;
-    Lanes x, y, z;
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      const std::size_t from = at + (i < count ? i : 0);
-      x.of[i] = a.x[from];
-      y.of[i] = a.y[from];
-      z.of[i] = a.z[from];
-    }
-    if (count == kLanes) {
-      set_points(x, y, z, at, kLanes, a);
-    } else {
-      set_points(x, y, z, at, count, a);
-    }
+  std::size_t at = 0;
+  for (; at + kLanes <= a.points; at += kLanes) {
+    set_points(Batch::load_unaligned(a.x + at), Batch::load_unaligned(a.y + at),
+               Batch::load_unaligned(a.z + at), at, kLanes, a);
   }
+  if (at == a.points) return;
+  Lanes x, y, z;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const std::size_t from = at + i < a.points ? at + i : at;
+    x.of[i] = a.x[from];
+    y.of[i] = a.y[from];
+    z.of[i] = a.z[from];
+  }
+  set_points(Batch::load_aligned(x.of), Batch::load_aligned(y.of), Batch::load_aligned(z.of), at,
+             a.points - at, a);
 }
 
 }  // namespace risley::recordings::RISLEY_KERNEL_NAMESPACE
