@@ -29,14 +29,19 @@ class Recording {
                ("risley-bench-" + std::to_string(::getpid()) + ending))
                   .string()) {
     simulation::SimulationSettings settings;
-    settings.truth = sensors::load_sensor("mid-40");
-    settings.rate = 100000.0;
+    const bool all_around = ending == ".lvx2";
+    settings.truth = sensors::load_sensor(all_around ? "mid-360" : "mid-40");
+    settings.rate = settings.truth.shot_rate;
     settings.duration = static_cast<double>(kShots) / *settings.rate;
     settings.scene = scenes::Scene{};
-    scenes::ScenePlane wall;
-    wall.name = "wall";
-    wall.plane = {{1, 0, 0}, 10.0};
-    settings.scene->planes.push_back(wall);
+    for (const Vector3<double>& normal : {Vector3<double>{1, 0, 0}, Vector3<double>{-1, 0, 0},
+                                          Vector3<double>{0, 1, 0}, Vector3<double>{0, -1, 0}}) {
+      scenes::ScenePlane wall;
+      wall.name = "wall";
+      wall.plane = {normal, 10.0};
+      settings.scene->planes.push_back(wall);
+      if (!all_around) break;
+    }
     simulation::Scanner scanner(settings);
     const auto writer = recordings::create_recording(path_, scanner.header());
     recordings::Chunk chunk;
@@ -80,6 +85,7 @@ void read(benchmark::State& state, const char* ending) {
   rates(state, recording);
 }
 BENCHMARK_CAPTURE(read, lvx, ".lvx")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(read, lvx2, ".lvx2")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read, netcdf, ".nc")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(read, sequence_csv, ".sequence.csv")->Unit(benchmark::kMillisecond);
 

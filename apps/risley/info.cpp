@@ -15,6 +15,7 @@
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/jobs/inspect_trajectory.hpp"
 #include "risley/jobs/prepared_recording.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 
 #include "command.hpp"
 #include "many_files.hpp"
@@ -43,6 +44,28 @@ std::string range_text(const std::optional<ValueRange>& range, double scale, int
   if (!range) return "none";
   return fmt::format("{:.{}f} to {:.{}f} {}", range->min * scale, decimals, range->max * scale,
                      decimals, unit);
+}
+
+/// What only a sensor of the second generation tells.
+void add_numbered(const recordings::RecordingHeader& header, const recordings::Device& device,
+                  const recordings::NumberedAudit& audit, Table& table) {
+  const auto add_known = [&table](const char* name, const std::string& value) {
+    if (!value.empty()) table.add({name, value});
+  };
+  add_known("address", device.address);
+  add_known("firmware", header.device_detail(device, "firmware"));
+  add_known("field of view", header.device_detail(device, "field_of_view"));
+  if (audit.outside_view > 0) {
+    table.add({"not looked at", grouped(audit.outside_view) + " shots outside the field of view"});
+  }
+  table.add({"lost packets", fmt::format("{}, by their numbers", audit.lost_packets)});
+  for (std::size_t tag = 0; tag < audit.observations_by_tag.size(); ++tag) {
+    if (audit.observations_by_tag[tag] == 0) continue;
+    table.add(
+        {fmt::format("tag 0x{:02X}", tag),
+         fmt::format("{} observations: {}", grouped(audit.observations_by_tag[tag]),
+                     recordings::livox::tag_words(device.type, static_cast<std::uint8_t>(tag)))});
+  }
 }
 
 void print_audit(const InspectedRecording& found) {
@@ -95,6 +118,11 @@ void print_audit(const InspectedRecording& found) {
     if (!device.hub_serial.empty()) table.add({"through the hub", device.hub_serial});
     if (const auto pose = recordings::stored_extrinsics(device)) {
       table.add({"states a pose", jobs::pose_text(*pose)});
+    }
+  }
+  for (std::size_t i = 0; i < audit.numbered_by_device.size(); ++i) {
+    if (audit.numbered_by_device[i]) {
+      add_numbered(header, header.devices[i], *audit.numbered_by_device[i], table);
     }
   }
   table.add({"warnings", grouped(found.warnings.size())});

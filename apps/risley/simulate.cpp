@@ -40,7 +40,8 @@ jobs::SimulationOptions job_of(const SimulateOptions& options, const CommonOptio
   job.rate = options.rate_hz;
   if (options.noise_angle_deg) job.angle_noise = radians_from_degrees(*options.noise_angle_deg);
   job.range_noise = options.noise_range_m;
-  job.quantize = options.quantize == "yes";
+  // Packets of the second generation hold coordinates, which LVX 2 itself rounds to 1 mm.
+  job.quantize = options.quantize == "yes" && !lower_case(options.output).ends_with(".lvx2");
   job.beam_origin = options.beam_origin == "yes";
   job.rotor = simulation::rotor_kind_from(options.rotor);
   for (const double angle_deg : options.start_angles_deg) {

@@ -32,7 +32,9 @@ recordings::RecordingHeader header_of(PreparedRecording& input,
     return header;
   }
   recordings::Device& device = header.devices.front();
-  const bool named = device.type != recordings::kUnknownDeviceType && !device.type_inferred;
+  // What has no preset cannot be told from others by its scan.
+  const bool named = device.type != recordings::kUnknownDeviceType &&
+                     (!device.type_inferred || !preset_of_type(device.type));
   if (named || header.devices.size() > 1) return header;
   result.choice = input.choose({}, progress);
   if (result.choice->chosen_by == ChosenBy::scan) {

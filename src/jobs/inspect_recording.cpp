@@ -30,7 +30,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   input.close_questions();
   const Progress reading = progress.stage("reading");
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
-  recordings::TimeAudit audit;
+  recordings::TimeAudit audit(reader->header());
   recordings::Chunk chunk;
   try {
     while (reader->read(chunk)) {

@@ -39,7 +39,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   estimation::SelectionOptions selection = options.selection;
   selection.ranges = options.selection.ranges || result.whole_steps;
   estimation::ShotSelector selector(selection);
-  recordings::TimeAudit audit;
+  recordings::TimeAudit audit(reader.header());
   // While some chunks are looked at, the next are read.
   std::array<recordings::Chunk, 4> chunks;
   const auto read_next = [&](std::size_t slot) {

@@ -214,7 +214,13 @@ std::string span_text(double from, double to) {
 }
 
 /// What may have made shots that lie beyond the field of view of every sensor.
-std::string wide_words(const recordings::DirectionSpread& spread) {
+/// @param lines  of emitters that the file names
+std::string wide_words(const recordings::DirectionSpread& spread, int lines) {
+  constexpr int kMostEmitters = 6;  // of sensors with prisms
+  if (lines > kMostEmitters) {
+    return fmt::format(
+        "those of a spinning lidar of {} lines or more, which has no prisms to be found", lines);
+  }
   struct Wide {
     const char* name;
     double azimuth_deg, zenith_deg;
@@ -259,7 +265,8 @@ std::string too_near_words(const AngleSeries& shots, const Sensor& sensor) {
 }
 
 /// Says why no sensor can have made the shots, where that is so.
-std::string impossible_words(FirstShots& first, std::span<const Sensor> candidates) {
+/// @param lines  of emitters that the file names
+std::string impossible_words(FirstShots& first, std::span<const Sensor> candidates, int lines) {
   const AngleSeries& shots = first.head;
   if (shots.size() < recordings::kFewestJudged) return {};
   const double radius = recordings::cone_radius(shots.azimuth, shots.zenith);
@@ -291,7 +298,7 @@ std::string impossible_words(FirstShots& first, std::span<const Sensor> candidat
       span_text(spread.zenith_from, spread.zenith_to),
       candidates.size() == 1 ? candidates.front().name
                              : "any built-in preset whose rotors show in them",
-      wide_words(spread));
+      wide_words(spread, lines));
 }
 
 /// Looks at the first shots before any sensor is. @return whether one may have made them
@@ -299,7 +306,7 @@ bool are_possible(FirstShots& shots, std::span<const Sensor> candidates, SensorC
   if (shots.beams == BeamSource::recorded) {
     for (const std::uint8_t beam : shots.head.beam) choice.lines = std::max(choice.lines, beam + 1);
   }
-  choice.impossible = impossible_words(shots, candidates);
+  choice.impossible = impossible_words(shots, candidates, choice.lines);
   if (choice.impossible.empty()) return true;
   choice.chosen_by = ChosenBy::guess;
   choice.fits = false;
@@ -433,7 +440,8 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
     named = preset_of_type(device.type);
     if (!named) {
       throw InvalidArgument(fmt::format(
-          "there is no built-in preset for the recording's sensor ({}): name one with {}",
+          "the optics of a {} are not known, and this needs them; what does without reads its "
+          "recordings: info, convert; {} names a preset or calibration of its optics",
           recordings::device_type_name(device.type), name_of(kSetting.sensor)));
     }
   }
@@ -553,7 +561,11 @@ AngleSeries first_second(const recordings::Source& source, const recordings::Rea
 std::optional<Sensor> preset_of_type(int device_type) {
   const auto* type = recordings::livox_type(static_cast<std::uint8_t>(device_type));
   if (type == nullptr) return std::nullopt;
-  return sensors::load_sensor(lower_case(std::string(type->name)));
+  // Of some types nobody knows the optics.
+  const std::string name = lower_case(std::string(type->name));
+  const auto known = sensors::builtin_preset_names();
+  if (std::find(known.begin(), known.end(), name) == known.end()) return std::nullopt;
+  return sensors::load_sensor(name);
 }
 
 std::optional<Sensor> given_sensor(const std::string& name_or_path) {

@@ -8,6 +8,7 @@
 #include "risley/jobs/convert_recording.hpp"
 #include "risley/jobs/inspect_recording.hpp"
 #include "risley/json/results.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 
 #include "json/parts.hpp"
 
@@ -27,6 +28,25 @@ std::array<double, 3> yaw_pitch_roll_deg(const recordings::Extrinsics& pose) {
   return {deg(pose.yaw), deg(pose.pitch), deg(pose.roll)};
 }
 
+/// What only sensors of the second generation tell.
+Json numbered_json(const recordings::RecordingHeader& header, const recordings::Device& device,
+                   const recordings::NumberedAudit& audit) {
+  Json tags = Json::array();
+  for (std::size_t tag = 0; tag < audit.observations_by_tag.size(); ++tag) {
+    if (audit.observations_by_tag[tag] == 0) continue;
+    tags.push_back(
+        {{"tag", tag},
+         {"observations", audit.observations_by_tag[tag]},
+         {"words", recordings::livox::tag_words(device.type, static_cast<std::uint8_t>(tag))}});
+  }
+  return {{"address", device.address},
+          {"firmware", header.device_detail(device, "firmware")},
+          {"field_of_view", header.device_detail(device, "field_of_view")},
+          {"outside_field_of_view", audit.outside_view},
+          {"lost_packets", audit.lost_packets},
+          {"tags", std::move(tags)}};
+}
+
 Json devices_json(const recordings::RecordingHeader& header, const TimeAuditResult& audit) {
   Json devices = Json::array();
   for (std::size_t i = 0; i < header.devices.size(); ++i) {
@@ -42,6 +62,10 @@ Json devices_json(const recordings::RecordingHeader& header, const TimeAuditResu
          {"translation_m",
           pose ? Json({pose->translation.x, pose->translation.y, pose->translation.z}) : Json()},
          {"observations", i < audit.rows_by_device.size() ? audit.rows_by_device[i] : 0}});
+    if (i < audit.numbered_by_device.size() && audit.numbered_by_device[i]) {
+      devices.back()["second_generation"] =
+          numbered_json(header, device, *audit.numbered_by_device[i]);
+    }
   }
   return devices;
 }

@@ -137,13 +137,18 @@ const LivoxType* livox_type(std::uint8_t number) {
   return found == kLivoxTypes.end() ? nullptr : found;
 }
 
-std::string livox_types_text() {
+std::string livox_types_text(bool first_generation) {
   std::string text;
   for (const LivoxType& type : kLivoxTypes) {
-    if (!type.first_generation) continue;
+    if (type.first_generation != first_generation) continue;
     text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", type.number, type.name);
   }
   return text;
+}
+
+bool is_second_generation(std::uint8_t type) {
+  const LivoxType* known = livox_type(type);
+  return known != nullptr && !known->first_generation;
 }
 
 std::string device_type_name(std::uint8_t type) {
@@ -173,6 +178,10 @@ std::string RecordingHeader::detail(const std::string& name, const std::string& 
     if (key == name) return value;
   }
   return fallback;
+}
+
+std::string RecordingHeader::device_detail(const Device& device, const std::string& name) const {
+  return detail(fmt::format("device_{}_{}", device.index, name));
 }
 
 void RecordingHeader::set_detail(const std::string& name, const std::string& value) {

@@ -10,7 +10,6 @@
 
 #include "risley/bags/bag.hpp"
 #include "risley/io/file_head.hpp"
-#include "risley/recordings/livox/packet.hpp"
 
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/livox_messages.hpp"
@@ -112,7 +111,7 @@ class SharedReader final : public Reader {
       const Packet& packet = all.packets[packet_];
       chunk.packets.push_back(packet);
       rows += packet.rows;
-      samples += packet.data_type == livox::kImuDataType ? 1 : 0;
+      samples += packet.is_imu() ? 1 : 0;
     }
     if (all.packets.empty()) {
       rows = rows_of_whole_packets(all, max_rows);

@@ -10,7 +10,6 @@
 #include "risley/bags/bag.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-#include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/reader.hpp"
 
 #include "recordings/shared_input.hpp"
@@ -35,7 +34,7 @@ void require_packets(const Chunk& data) {
   std::size_t rows = 0, samples = 0;
   for (const Packet& packet : data.packets) {
     rows += packet.rows;
-    samples += packet.data_type == livox::kImuDataType ? 1 : 0;
+    samples += packet.is_imu() ? 1 : 0;
   }
   require_length("rows of packets", rows, data.observations.size());
   require_length("inertial samples of packets", samples, data.imu.size());

@@ -59,11 +59,52 @@ void count_columns(const Observations& o, TimeAuditResult& totals) {
 
 }  // namespace
 
+TimeAudit::TimeAudit(const RecordingHeader& header) {
+  const auto is_second = [](const Device& one) { return is_second_generation(one.type); };
+  if (std::none_of(header.devices.begin(), header.devices.end(), is_second)) return;
+  for (const Device& device : header.devices) {
+    auto& numbered = totals_.numbered_by_device.emplace_back();
+    if (is_second(device)) numbered.emplace();
+  }
+}
+
+/// Counts what only sensors of the second generation tell.
+void TimeAudit::add_numbered(const Chunk& chunk) {
+  auto& devices = totals_.numbered_by_device;
+  const Observations& o = chunk.observations;
+  for (std::size_t row = 0; row < o.size(); ++row) {
+    if (o.device[row] >= devices.size() || !devices[o.device[row]]) continue;
+    NumberedAudit& device = *devices[o.device[row]];
+    if (o.valid[row] != 0) {
+      ++device.observations_by_tag[o.tag[row]];
+    } else if (o.range[row] == 0 && o.intensity[row] == livox::kOutsideViewIntensity) {
+      ++device.outside_view;
+      --totals_.no_return;
+    }
+  }
+  std::size_t row = 0, sample = 0;
+  for (const Packet& packet : chunk.packets) {
+    const bool is_imu = packet.is_imu();
+    const bool known = is_imu ? sample < chunk.imu.size() : row < o.size();
+    if (!known) break;
+    const std::uint8_t device = is_imu ? chunk.imu[sample].device : o.device[row];
+    row += packet.rows;
+    sample += is_imu ? 1 : 0;
+    if (packet.version != livox::kNumberedVersion || device >= devices.size() || !devices[device]) {
+      continue;
+    }
+    const auto place = numbers_[{device, is_imu}].add(packet);
+    devices[device]->lost_packets +=
+        place.kind == livox::PacketNumbers::Kind::late ? -1 : static_cast<std::int64_t>(place.lost);
+  }
+}
+
 void TimeAudit::add(const Chunk& chunk) {
   const Observations& o = chunk.observations;
   require_columns(o);
   totals_.imu += chunk.imu.size();
   count_columns(o, totals_);
+  if (!totals_.numbered_by_device.empty()) add_numbered(chunk);
   std::size_t row = 0;
   for (const Packet& packet : chunk.packets) {
     if (packet.data_type < totals_.packets_by_data_type.size()) {
@@ -190,7 +231,7 @@ TimeAuditResult TimeAudit::result() const {
 }
 
 TimeAuditResult audit_recording(Reader& reader, const Progress& progress) {
-  TimeAudit audit;
+  TimeAudit audit(reader.header());
   Chunk chunk;
   while (reader.read(chunk)) {
     audit.add(chunk);

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "risley/core/saturating.hpp"
-#include "risley/recordings/livox/packet.hpp"
 
 #include "recordings/reader_decorators.hpp"
 
@@ -20,7 +19,7 @@ void keep_front(Chunk& chunk, std::size_t rows, std::size_t samples) {
   if (!chunk.packets.empty()) {
     std::size_t row = 0, sample = 0, whole = 0;
     for (const Packet& packet : chunk.packets) {
-      const std::size_t own = packet.data_type == livox::kImuDataType ? 1 : 0;
+      const std::size_t own = packet.is_imu() ? 1 : 0;
       if (row + packet.rows > rows || sample + own > samples) break;
       row += packet.rows;
       sample += own;

@@ -187,6 +187,8 @@ class SchemasTest(CommandTest):
         cls.print(0, "estimate", "round.nc")
         cls.print(0, "identify", "round.nc")
         cls.print(0, "pattern", "--coverage", "--sensor", "mid-360", "--integration-s", 0.1)
+        cls.print(0, "simulate", "-o", "round.lvx2", "--sensor", "mid-360", "--scene", HALL, "--duration-s", 0.1)
+        cls.print(0, "info", "round.lvx2")
         cls.print(0, "report", "estimated")
         cls.print(0, "report", "estimated", "calibrated", "-o", "two.html")
         cls.print(3, "report", "no")

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "risley/bags/bag.hpp"
+#include "risley/recordings/livox/numbered_order.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
 #include "fuzz/invariants.hpp"
@@ -44,6 +45,42 @@ void run_packets(std::span<const std::uint8_t> bytes) {
     }
     bytes = bytes.subspan(1 + length);
   }
+  require_sound(chunk, header);
+}
+
+/// Packets of one sensor of the second generation: two bytes say how long each is.
+void run_numbered_packets(std::span<const std::uint8_t> bytes) {
+  using namespace recordings::livox;
+  if (bytes.empty()) return;
+  const std::uint8_t type = bytes[0];
+  bytes = bytes.subspan(1);
+  recordings::RecordingHeader header;
+  header.devices.resize(1);
+  Chunk chunk;
+  NumberedOrder order;
+  std::uint64_t given = 0, taken = 0;
+  while (bytes.size() > 2) {
+    const std::size_t length = std::min<std::size_t>(bytes.size() - 2, bytes[0] + 256U * bytes[1]);
+    const auto packet = bytes.subspan(2, length);
+    const std::size_t rows = chunk.observations.size();
+    try {
+      decode_numbered_packet(packet, type, 0, chunk);
+      require(chunk.observations.size() <= rows + length, "no more rows than bytes");
+    } catch (const BadPacket& bad) {
+      require(bad.byte_offset() <= length, "what is wrong stands in the packet");
+      require(chunk.observations.size() == rows, "a bad packet leaves no rows");
+    }
+    ++given;
+    order.add(packet, static_cast<std::int64_t>(given) * 480'000);
+    taken += order.take().size();
+    bytes = bytes.subspan(2 + length);
+  }
+  order.flush();
+  taken += order.take().size();
+  const PacketCounts& counts = order.counts();
+  require(taken == counts.packets, "what is counted is given");
+  require(counts.packets + counts.duplicates + counts.late + counts.rejected <= given,
+          "each packet is one of these");
   require_sound(chunk, header);
 }
 
@@ -97,6 +134,7 @@ void run_pose_message(std::span<const std::uint8_t> bytes) {
 
 std::vector<Target> decoder_targets() {
   return {{"packets", run_packets},
+          {"numbered-packets", run_numbered_packets},
           {"ros1-message", run_message<recordings::decode_ros1_message>},
           {"ros2-message", run_message<recordings::decode_ros2_message>},
           {"pose-message", run_pose_message}};

@@ -107,8 +107,8 @@ void write_and_read(const Format& format, const recordings::RecordingHeader& hea
 void convert(const recordings::RecordingHeader& header, const std::vector<Chunk>& chunks,
              std::size_t choice) {
   static const io::TestFolder folder;
-  constexpr std::array kEndings = {".lvx", ".openpylivox.csv", ".sequence.csv", ".csv",
-                                   ".no-format"};
+  constexpr std::array kEndings = {".lvx",          ".lvx2", ".openpylivox.csv",
+                                   ".sequence.csv", ".csv",  ".no-format"};
   const std::string path = folder.file(std::string("other") + kEndings[choice % kEndings.size()]);
   std::uint64_t written = 0;
   try {
@@ -182,6 +182,7 @@ std::vector<Target> recording_targets() {
   using namespace recordings;
   return {
       {"lvx-1.1", run<kLvx11Format, kPlainRows>},
+      {"lvx-2", run<kLvx2Format, kPlainRows>},
       {"lvx-1.0", run<kLvx10Format, kPlainRows>},
       {"scan-sequence-csv", run<kScanSequenceCsvFormat, kPlainRows>},
       {"openpylivox-csv", run<kOpenpylivoxCsvFormat, kPlainRows>},

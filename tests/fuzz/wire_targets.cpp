@@ -6,6 +6,7 @@
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
 #include "risley/wire/client_session.hpp"
+#include "risley/wire/control_frame.hpp"
 #include "risley/wire/sensor_session.hpp"
 
 #include "fuzz/invariants.hpp"
@@ -67,6 +68,40 @@ void run_frames(std::span<const std::uint8_t> bytes) {
   });
 }
 
+/// The same of the second generation, whose lists make the same bytes again, too.
+void run_control_frames(std::span<const std::uint8_t> bytes) {
+  while (bytes.size() > 2) {
+    const std::size_t length = std::min<std::size_t>(bytes.size() - 2, bytes[0] + 256U * bytes[1]);
+    const auto datagram = bytes.subspan(2, length);
+    const auto decoded = decode_control_frame(datagram);
+    const auto* frame = std::get_if<ControlFrame>(&decoded);
+    if (frame == nullptr) {
+      require(!to_string(std::get<FrameRefusal>(decoded)).empty(), "a refusal has words");
+    }
+    // No fuzzer finds checksums: what stands there is data of every command, too.
+    for (const auto command :
+         {ControlCommand::search, ControlCommand::set, ControlCommand::get, ControlCommand::push}) {
+      for (const bool reply : {false, true}) {
+        if (length + kControlHeaderBytes > kMostFrameBytes) continue;
+        const auto encoded = encode_control_frame({command, reply, true, 7, datagram});
+        const auto read = std::get<ControlFrame>(decode_control_frame(encoded));
+        require(std::equal(read.data.begin(), read.data.end(), datagram.begin(), datagram.end()),
+                "data are what they were");
+        const auto list = list_of(read);
+        require(list.size() * 4 <= length, "no more entries than bytes");
+        for (const KeyValue& entry : list) {
+          require(entry.value.size() <= length, "no longer values than bytes");
+          view_of(entry.value);
+        }
+        if (const auto found = search_reply_of(read)) {
+          require(found->serial.size() <= 16, "no longer serial numbers than their field");
+        }
+      }
+    }
+    bytes = bytes.subspan(2 + length);
+  }
+}
+
 void run_sensor(std::span<const std::uint8_t> bytes) {
   std::int64_t now = 0;
   SensorSession sensor(
@@ -123,7 +158,10 @@ void run_client(std::span<const std::uint8_t> bytes) {
 }  // namespace
 
 std::vector<Target> wire_targets() {
-  return {{"wire-frames", run_frames}, {"wire-sensor", run_sensor}, {"wire-client", run_client}};
+  return {{"wire-frames", run_frames},
+          {"control-frames", run_control_frames},
+          {"wire-sensor", run_sensor},
+          {"wire-client", run_client}};
 }
 
 }  // namespace risley::fuzz

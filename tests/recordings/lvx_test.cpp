@@ -577,7 +577,7 @@ TEST_F(LvxTest, DamagedHeadersAreNamed) {
     ASSERT_FALSE(result.opened);
     for (const char* word : words) EXPECT_THAT(result.error->what(), HasSubstr(word));
   };
-  refused({{16, 2}, {17, 0}}, {"LVX 2", "not supported"});
+  refused({{16, 2}}, {"byte 16", "2.1.0.0"});
   refused({{17, 7}}, {"byte 16", "1.7.0.0"});
   refused({{20, 0}}, {"byte 20", "AC0EA767"});
   refused({{28, 0}}, {"byte 28", "devices = 0"});

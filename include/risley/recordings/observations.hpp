@@ -100,12 +100,17 @@ bool is_further_return(const Observations& rows, std::size_t row);
 /// Header of one sensor data packet as it was recorded, kept so that a packet format can be
 /// written again byte by byte.
 struct Packet {
-  std::uint32_t rows = 0;   ///< observations of this packet in the chunk, in order; 0 for IMU
-  std::uint64_t frame = 0;  ///< number of the file's frame that holds it, from 0
+  std::uint32_t rows = 0;    ///< observations of this packet in the chunk, in order; 0 for IMU
+  std::uint64_t frame = 0;   ///< number of the file's frame that holds it, from 0
+  std::uint32_t number = 0;  ///< counter of the second generation's packets, 16 bits
+  /// Packets of the second generation have version 0, and no slot, lidar_id and status.
   std::uint8_t device_index = 0, version = 5, slot = 1, lidar_id = 1, reserved = 0;
   std::uint32_t status = 0;
   std::uint8_t timestamp_type = 0, data_type = 1;
   std::array<std::uint8_t, 8> timestamp{};
+
+  /// Whether it holds an inertial sample and no points.
+  bool is_imu() const { return rows == 0; }
 };
 
 /// One inertial sample as the sensor sends it: rad/s and multiples of g.
@@ -116,7 +121,7 @@ struct ImuSample {
 };
 
 /// A piece of a recording: rows, and, for packet formats, the packets they came in. The packets
-/// stand in file order, and each IMU packet (data type 6) owns the next entry of imu.
+/// stand in file order, and each IMU packet owns the next entry of imu.
 struct Chunk {
   Observations observations;
   std::vector<Packet> packets;
@@ -137,7 +142,12 @@ inline constexpr std::uint8_t kMid40 = 1,  ///< Mid-40
     kHorizon = 3,                          ///< Horizon
     kMid70 = 6,                            ///< Mid-70
     kAvia = 7,                             ///< Avia
-    kMid360 = 9;                           ///< Mid-360
+    kMid360 = 9,                           ///< Mid-360
+    kHap = 10,                             ///< HAP (TX)
+    kHapT1 = 15,                           ///< HAP (T1)
+    kPa = 16,                              ///< PA
+    kMid360s = 35,                         ///< Mid-360s
+    kAvia2 = 40;                           ///< Avia2
 /// A type of Livox's sensors.
 struct LivoxType {
   std::uint8_t number;           ///< Device::type
@@ -147,13 +157,18 @@ struct LivoxType {
 };
 /// All of them.
 inline constexpr std::array kLivoxTypes{
-    LivoxType{kMid40, "Mid-40", false},   LivoxType{kTele15, "Tele-15", true},
-    LivoxType{kHorizon, "Horizon", true}, LivoxType{kMid70, "Mid-70", false},
-    LivoxType{kAvia, "Avia", true},       LivoxType{kMid360, "Mid-360", true, false}};
+    LivoxType{kMid40, "Mid-40", false},     LivoxType{kTele15, "Tele-15", true},
+    LivoxType{kHorizon, "Horizon", true},   LivoxType{kMid70, "Mid-70", false},
+    LivoxType{kAvia, "Avia", true},         LivoxType{kMid360, "Mid-360", true, false},
+    LivoxType{kHap, "HAP", true, false},    LivoxType{kHapT1, "HAP (T1)", true, false},
+    LivoxType{kPa, "PA", true, false},      LivoxType{kMid360s, "Mid-360s", true, false},
+    LivoxType{kAvia2, "Avia2", true, false}};
 /// One by its number, or nullptr.
 const LivoxType* livox_type(std::uint8_t number);
-/// "1 (Mid-40), 2 (Tele-15), ...": those of the first generation, which messages allow.
-std::string livox_types_text();
+/// "1 (Mid-40), 2 (Tele-15), ...": those of a generation, which messages allow.
+std::string livox_types_text(bool first_generation = true);
+/// Whether sensors of this type send the packets of the second generation.
+bool is_second_generation(std::uint8_t type);
 /// Device::type of a sensor about which a format tells nothing, or only that it is no Mid-40.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;
 
@@ -162,6 +177,7 @@ struct Device {
   std::string serial;      ///< broadcast code, e.g. "0TFDG3B006H2Z11"; empty when unknown
   std::string topic;       ///< of a bag, on which its messages are; empty in other formats
   std::string hub_serial;  ///< broadcast code of the hub, empty without one
+  std::string address;     ///< of the second generation, "192.168.1.112"; empty when unknown
   std::uint8_t index = 0;  ///< the key by which packets name it
   std::uint8_t type = kMid40;
   /// The file does not name the type: it is what rates, tags and numbers of returns leave.
@@ -221,6 +237,8 @@ struct RecordingHeader {
 
   /// Value of a detail, or the fallback.
   std::string detail(const std::string& name, const std::string& fallback = {}) const;
+  /// Value of a detail of one device, or nothing.
+  std::string device_detail(const Device& device, const std::string& name) const;
   /// Replaces the value of a detail, or appends it to the others.
   void set_detail(const std::string& name, const std::string& value);
 };

@@ -4,10 +4,13 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 #include "risley/recordings/observations.hpp"
 #include "risley/recordings/reader.hpp"
 
@@ -27,11 +30,19 @@ struct TimeGaps {
   std::uint64_t largest_at_row = 0;   ///< first row after it, from 0
 };
 
+/// What a sensor of the second generation sent.
+struct NumberedAudit {
+  std::int64_t lost_packets = 0;   ///< missing between others, by their numbers
+  std::uint64_t outside_view = 0;  ///< rows outside the field of view that was set
+  std::array<std::uint64_t, 256> observations_by_tag{};  ///< valid rows
+};
+
 /// What a recording holds and how sound its times are.
 struct TimeAuditResult {
   std::uint64_t observations = 0;  ///< rows: one per return
   std::uint64_t shots = 0;
-  std::uint64_t no_return = 0;                       ///< rows that are not valid
+  /// Rows that are not valid, without those outside a field of view that was set.
+  std::uint64_t no_return = 0;
   std::int64_t first_time_ns = 0, last_time_ns = 0;  ///< of the first and the last row
   /// From the first to the last shot of the device that covers most, s; jumps of the clock, back
   /// or to another time source, do not count.
@@ -47,14 +58,20 @@ struct TimeAuditResult {
   std::optional<ValueRange> azimuth, zenith;  ///< of valid rows, rad
   std::optional<ValueRange> range;            ///< of valid rows that have one, m
   std::array<std::uint64_t, 256> rows_by_return_number{};
-  std::vector<std::uint64_t> rows_by_device;            ///< up to the last device with rows
-  std::array<std::uint64_t, 9> packets_by_data_type{};  ///< data types 0 to 8
-  std::uint64_t imu = 0;                                ///< inertial samples
+  std::vector<std::uint64_t> rows_by_device;             ///< up to the last device with rows
+  std::array<std::uint64_t, 18> packets_by_data_type{};  ///< data types 0 to 17
+  /// By device, of those of the second generation; not more than the header has.
+  std::vector<std::optional<NumberedAudit>> numbered_by_device;
+  std::uint64_t imu = 0;  ///< inertial samples
 };
 
 /// Audits a recording chunk by chunk; its memory does not grow with the recording.
 class TimeAudit {
  public:
+  TimeAudit() = default;
+  /// Of a recording whose devices it names.
+  explicit TimeAudit(const RecordingHeader& header);
+
   /// @throws InvalidArgument as require_columns()
   void add(const Chunk& chunk);
 
@@ -88,12 +105,14 @@ class TimeAudit {
     TimeGaps gaps;
   };
 
+  void add_numbered(const Chunk& chunk);
   void add_row(const Observations& rows, std::size_t row);
   void add_packet(const Packet& packet, std::uint8_t device, std::int64_t time_ns);
   static void add_step(DeviceState& state, const TimeStep& step);
   static void settle(DeviceState& state);
 
   TimeAuditResult totals_;
+  std::map<std::pair<std::uint8_t, bool>, livox::PacketNumbers> numbers_;  // by device; inertial
   std::vector<DeviceState> devices_;
 };
 

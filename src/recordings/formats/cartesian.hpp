@@ -16,6 +16,7 @@ namespace risley::recordings {
 
 /// Steps of the sensor's integers: 1 mm in distances and coordinates, 0.01 deg in angles.
 inline constexpr double kMillimetre = 1e-3;
+inline constexpr double kCentimetre = 1e-2;  ///< in short records of the second generation
 inline constexpr double kCentidegree = 0.01 * kRadiansPerDegree;
 
 /// Azimuth of a file, deg in [-180, 360], as an azimuth in (-pi, pi], rad. The two values that
@@ -71,6 +72,11 @@ inline void set_cartesian(Observations& rows, std::size_t row, const Vector3<dou
   rows.zenith_resolution[row] = static_cast<float>(std::min(step / range, kPi));
   rows.valid[row] = 1;
 }
+
+/// The same of many points, whose rows follow each other from one on; angles may differ from those
+/// by 4e-16 rad. @param x, y, z  [points], m
+void set_cartesian(Observations& rows, std::size_t row, std::size_t points, const double* x,
+                   const double* y, const double* z, double step);
 
 /// The point of a row, m; the origin where the shot had no return.
 inline Vector3<double> cartesian_point(const Observations& rows, std::size_t row) {

@@ -47,6 +47,7 @@ std::unique_ptr<Writer> create_with(const std::string& path, const RecordingHead
 
 extern const Format kLvx11Format;            // lvx11.cpp
 extern const Format kLvx10Format;            // lvx10.cpp
+extern const Format kLvx2Format;             // lvx2.cpp
 extern const Format kScanSequenceCsvFormat;  // scan_sequence_csv.cpp
 extern const Format kOpenpylivoxCsvFormat;   // openpylivox_csv.cpp
 extern const Format kOpenpylivoxBinFormat;   // openpylivox_bin.cpp

@@ -13,6 +13,8 @@
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/vector3.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
+#include "risley/wire/address.hpp"
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
@@ -45,6 +47,34 @@ std::string serial_of(std::string_view topic) {
                     code.back() >= '1' && code.back() <= '3' &&
                     std::any_of(code.begin(), code.end() - 1, is_digit);
   return fits ? std::string(code) : std::string();
+}
+
+/// The address with which a topic of the second generation's driver ends, or nothing:
+/// "/livox/lidar_192_168_1_112".
+std::string address_of(std::string_view topic) {
+  constexpr int kBytes = 4;
+  std::string address;
+  for (int i = 0; i < kBytes; ++i) {
+    const std::size_t underscore = topic.rfind('_');
+    if (underscore == topic.npos) return {};
+    const std::string_view part = topic.substr(underscore + 1);
+    address = fmt::format("{}{}{}", part, i == 0 ? "" : ".", address);
+    topic = topic.substr(0, underscore);
+  }
+  return wire::address_from(address) ? address : std::string();
+}
+
+/// What a topic says of its sensor.
+std::string identity_of(std::string_view topic) {
+  const std::string serial = serial_of(topic);
+  return serial.empty() ? address_of(topic) : serial;
+}
+
+/// A coordinate that a driver made of whole millimetres, m: what the millimetres are, and not the
+/// nearest number that 32 bits hold.
+double of_millimetres(double coordinate) {
+  const double exact = std::round(coordinate / kMillimetre) * kMillimetre;
+  return static_cast<float>(exact) == static_cast<float>(coordinate) ? exact : coordinate;
 }
 
 std::string_view name_space_of(std::string_view topic) {
@@ -191,6 +221,7 @@ void MessageReader::choose_topics() {
     }
     Device device;
     device.serial = serial_of(topic.name);
+    device.address = address_of(topic.name);
     device.topic = topic.name;
     device.index = static_cast<std::uint8_t>(header_.devices.size());
     device.type = kUnknownDeviceType;
@@ -240,6 +271,7 @@ void MessageReader::find_lidars() {
            "them",
            sharing, topics()[i].name);
       device.serial.clear();
+      device.address.clear();
     }
     for (std::size_t lidar = 0; lidar < sharing; ++lidar) {
       device.index = static_cast<std::uint8_t>(devices.size());
@@ -248,6 +280,7 @@ void MessageReader::find_lidars() {
   }
   header_.devices = std::move(devices);
   growth_from_ns_.assign(header_.devices.size(), std::nullopt);
+  driver_packets_.assign(header_.devices.size(), {});
 }
 
 std::optional<std::uint8_t> MessageReader::device_of(const LidarMessage& message) const {
@@ -266,13 +299,13 @@ void MessageReader::choose_imu_topics() {
                     [](const bags::Topic& topic) { return topic.kind == MessageKind::imu; });
   for (std::size_t i = 0; i < topics().size(); ++i) {
     if (topics()[i].kind != MessageKind::imu) continue;
-    const std::string serial = serial_of(topics()[i].name);
+    const std::string identity = identity_of(topics()[i].name);
     std::vector<std::uint8_t> candidates;
     for (std::size_t lidar = 0; lidar < topics().size(); ++lidar) {
       if (!devices_[lidar] || topics()[lidar].kind == MessageKind::imu) continue;
-      const bool same_sensor = serial == header_.devices[*devices_[lidar]].serial &&
-                               (!serial.empty() || name_space_of(topics()[lidar].name) ==
-                                                       name_space_of(topics()[i].name));
+      const bool same_sensor = identity == identity_of(topics()[lidar].name) &&
+                               (!identity.empty() || name_space_of(topics()[lidar].name) ==
+                                                         name_space_of(topics()[i].name));
       if (same_sensor && lidars_[lidar].empty()) candidates.push_back(*devices_[lidar]);
     }
     if (candidates.size() == 1) {
@@ -295,7 +328,8 @@ struct MessageReader::FirstMessages {
   std::vector<double> rates;      ///< of a cloud: points per second from a message to the next
   std::vector<double> intervals;  ///< between shots, ns
   std::size_t most_returns = 1;
-  bool tagged = false, several_lines = false;
+  bool tagged = false;
+  std::uint8_t last_line = 0;  ///< the greatest
   std::vector<double> accelerations;
   /// Times, stamps and earliest offsets of messages.
   std::vector<std::int64_t> times_ns, stamps_ns, offsets_ns;
@@ -317,7 +351,7 @@ struct MessageReader::FirstMessages {
     }
     for (std::size_t i = 0; i < points.size();) {
       tagged = tagged || points[i].tag != 0;
-      several_lines = several_lines || points[i].line != 0;
+      last_line = std::max(last_line, points[i].line);
       const std::size_t run = timed ? run_length(points, i) : 1;
       if (is_one_shot(points, i, run)) most_returns = std::max(most_returns, run);
       if (i + run < points.size() && timed && points[i + run].offset_ns > points[i].offset_ns) {
@@ -414,9 +448,88 @@ void MessageReader::describe_device(std::size_t topic, std::uint8_t number, Firs
   if (returns == 3) {
     device.type = kAvia;
   } else if (!is_cloud && !first.intervals.empty() && is_close(median(first.intervals), 1e4) &&
-             !first.several_lines) {
+             first.last_line == 0) {
     // Drivers and tools that know no tags write 0, too.
     device.type = first.tagged || returns > 1 ? kMid70 : kMid40;
+  }
+  describe_numbered_device(topic, number, first);
+}
+
+/// The second generation, by the steps between its shots, which the driver writes too short.
+void MessageReader::describe_numbered_device(std::size_t topic, std::uint8_t number,
+                                             const FirstMessages& first) {
+  if (!has_times(topic)) {
+    const livox::ShotGrid& grid = clouds_[topic].grid;
+    for (const std::uint8_t type : {kMid360, kHap}) {
+      const livox::ShotGrid known = *livox::numbered_grid(type);
+      if (grid.beams == known.beams && grid.interval_numerator_ns == known.interval_numerator_ns) {
+        header_.devices[number].type = type;
+      }
+    }
+    return;
+  }
+  if (first.intervals.empty()) return;
+  // Within packets; floating-point times of clouds have coarse steps, whose mean is right.
+  std::vector<double> steps = first.intervals;
+  const double usual = median(steps);
+  double sum = 0, count = 0;
+  for (const double one : steps) {
+    if (std::fabs(one - usual) > 0.5 * usual) continue;
+    sum += one;
+    ++count;
+  }
+  const double step = sum / count;
+  const auto& cloud = cloud_times_[topic];
+  const std::int64_t tolerance = cloud ? static_cast<std::int64_t>(std::ceil(cloud->step_ns)) : 0;
+  constexpr std::int64_t kStepOfMid360 = 4947, kStepOfHap = 2189;  // ns, as the driver writes them
+  for (const auto& [type, written] :
+       {std::pair(kMid360, kStepOfMid360), std::pair(kHap, kStepOfHap)}) {
+    const livox::ShotGrid grid = *livox::numbered_grid(type);
+    constexpr double kSame = 4;  // ns
+    const bool as_fired = std::fabs(step - static_cast<double>(grid.offset_ns(1))) <= kSame;
+    const bool as_written = std::fabs(step - static_cast<double>(written)) <= kSame;
+    if ((!as_fired && !as_written) || first.last_line >= grid.beams) continue;
+    const bool names_lines = first.last_line > 0;
+    header_.devices[number].type = type;
+    if (as_written) {
+      driver_packets_[number] = {written, tolerance, grid, names_lines};
+      warn(kWarning.times_corrected,
+           "the driver of topic {} divides the time of a packet by one point too many: its points "
+           "were put back to when a {} fires them, every {:.6g} us{}",
+           topics()[topic].name, device_type_name(type),
+           1e-3 * grid.interval_numerator_ns / grid.interval_denominator,
+           names_lines ? "" : "; it names no lines, and their order says which emitter it was");
+    }
+  }
+}
+
+void MessageReader::mend_packets(std::uint8_t device, LidarMessage& message) const {
+  constexpr std::int64_t kPoints = 96;   // of a packet
+  constexpr std::int64_t kJitter = 100;  // ns, of packets
+  const DriverPackets& packets = driver_packets_[device];
+  if (packets.step_ns == 0) return;
+  const std::int64_t period = packets.grid.offset_ns(kPoints);
+  const std::int64_t tolerance = 2 * packets.tolerance_ns;
+  std::int64_t begin_ns = 0;  // of the packet, after the message's time
+  for (MessagePoint& point : message.points) {
+    const auto place_after = [&](std::int64_t since, std::int64_t off) {
+      const std::int64_t place = (since + packets.step_ns / 2) / packets.step_ns;
+      const bool fits = since >= -off && place < kPoints &&
+                        std::abs(since - place * packets.step_ns) <= off &&
+                        (!packets.names_lines || place % packets.grid.beams == point.line);
+      return fits ? std::optional(place) : std::nullopt;
+    };
+    const std::int64_t since = point.offset_ns - begin_ns;
+    std::optional<std::int64_t> place = place_after(since, tolerance);
+    if (!place) {
+      // Another packet. Where its first points are missing, the one before says when it began.
+      const std::int64_t later = since > 0 ? (since + kJitter + tolerance) / period * period : 0;
+      place = later > 0 ? place_after(since - later, kJitter + tolerance) : std::nullopt;
+      if (!place) place = packets.names_lines ? point.line : 0;
+      begin_ns = point.offset_ns - *place * packets.step_ns;
+    }
+    point.offset_ns = begin_ns + packets.grid.offset_ns(static_cast<std::uint32_t>(*place));
+    if (!packets.names_lines) point.line = static_cast<std::uint8_t>(*place % packets.grid.beams);
   }
 }
 
@@ -456,26 +569,38 @@ void MessageReader::settle_cloud_grid(std::size_t topic, FirstMessages& first) {
     livox::ShotGrid grid;
     int returns;
   };
-  static constexpr std::array<Candidate, 5> kCandidates{{
+  static constexpr std::array<Candidate, 5> kFirstGeneration{{
       {100'000, livox::kGrid100kHz, 1},
       {200'000, livox::kGrid100kHz, 2},
       {240'000, livox::kGrid240kHz, 1},
       {480'000, livox::kGrid240kHz, 2},
       {720'000, livox::kGrid240kHz, 3},
   }};
+  static const std::array<Candidate, 2> kSecondGeneration{{
+      {200'000, *livox::numbered_grid(kMid360), 1},
+      {452'000, *livox::numbered_grid(kHap), 1},
+  }};
   const bool is_known = !first.rates.empty();
-  const double rate = is_known ? median(first.rates) : first.several_lines ? 240'000 : 100'000;
+  const double rate = is_known ? median(first.rates) : first.last_line > 0 ? 240'000 : 100'000;
+  // Lines of a cloud tell how many emitters there are; 240 kHz have six of them, too.
+  const auto is_second = [&](const Candidate& candidate) {
+    return first.last_line + 1 == candidate.grid.beams && is_close(rate, candidate.rate_hz);
+  };
+  const auto second = std::find_if(kSecondGeneration.begin(), kSecondGeneration.end(), is_second);
   const auto distance = [rate](const Candidate& c) {
     return std::fabs(std::log(rate / c.rate_hz));
   };
-  const Candidate& best =
-      *std::min_element(kCandidates.begin(), kCandidates.end(),
-                        [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+  const Candidate& best = second != kSecondGeneration.end()
+                              ? *second
+                              : *std::min_element(kFirstGeneration.begin(), kFirstGeneration.end(),
+                                                  [&](const auto& a, const auto& b) {
+                                                    return distance(a) < distance(b);
+                                                  });
   clouds_[topic] = {best.grid, best.returns};
   std::string message = fmt::format(
       "the points of topic {} have no times of their own: they were counted from the time of their "
-      "message, at {} us per shot, with {} per shot",
-      topics()[topic].name, best.grid.beams == 1 ? "10" : "4.1667",
+      "message, at {:.5g} us per shot, with {} per shot",
+      topics()[topic].name, 1e-3 * best.grid.interval_numerator_ns / best.grid.interval_denominator,
       best.returns == 1 ? "one point" : fmt::format("{} points", best.returns));
   if (!unused_times_[topic].empty()) message += fmt::format(" ({})", unused_times_[topic]);
   if (!is_known) {
@@ -518,13 +643,14 @@ void MessageReader::take_bag_warnings() {
       .lost_records = unknown_lidar_points_;
 }
 
-void MessageReader::append(const LidarMessage& message, Chunk& chunk) {
+void MessageReader::append(LidarMessage& message, Chunk& chunk) {
   const auto known = device_of(message);
   if (!known) {
     unknown_lidar_points_ += message.points.size();
     return;
   }
   const std::uint8_t device = *known;
+  if (has_times(message.topic)) mend_packets(device, message);
   switch (*topics()[message.topic].kind) {
     case MessageKind::points:
       append_points(message, device, chunk.observations);
@@ -546,13 +672,29 @@ namespace {
 
 void set_row(Observations& rows, std::size_t row, const MessagePoint& point, std::int64_t time_ns,
              std::size_t return_number, std::uint8_t device) {
-  set_cartesian(rows, row, {point.x, point.y, point.z}, kMillimetre);
   rows.time_ns[row] = time_ns;
   rows.intensity[row] = point.intensity;
   rows.return_number[row] = static_cast<std::uint8_t>(return_number);
   rows.tag[row] = point.tag;
   rows.beam[row] = point.line;
   rows.device[row] = device;
+}
+
+/// Directions and ranges of a message's points, in rows from one on.
+void set_points(Observations& rows, std::size_t first_row, const std::vector<MessagePoint>& points,
+                bool whole_millimetres) {
+  constexpr std::size_t kBlock = 256;
+  double x[kBlock], y[kBlock], z[kBlock];
+  for (std::size_t begin = 0; begin < points.size(); begin += kBlock) {
+    const std::size_t count = std::min(kBlock, points.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      const MessagePoint& point = points[begin + i];
+      x[i] = whole_millimetres ? of_millimetres(point.x) : point.x;
+      y[i] = whole_millimetres ? of_millimetres(point.y) : point.y;
+      z[i] = whole_millimetres ? of_millimetres(point.z) : point.z;
+    }
+    set_cartesian(rows, first_row + begin, count, x, y, z, kMillimetre);
+  }
 }
 
 }  // namespace
@@ -562,6 +704,7 @@ void MessageReader::append_points(const LidarMessage& message, std::uint8_t devi
   const std::vector<MessagePoint>& points = message.points;
   std::size_t row = rows.size();
   rows.resize(row + points.size());
+  set_points(rows, row, points, is_second_generation(header_.devices[device].type));
   // Offsets that grow are 32-bit numbers and begin again after 4.3 s.
   const std::int64_t grown =
       growth_from_ns_[device] ? message.time_ns - *growth_from_ns_[device] : 0;
@@ -594,6 +737,7 @@ void MessageReader::append_cloud(const LidarMessage& message, std::uint8_t devic
   const auto returns = static_cast<std::size_t>(cloud.returns);
   const std::size_t first_row = rows.size();
   rows.resize(first_row + message.points.size());
+  set_points(rows, first_row, message.points, is_second_generation(header_.devices[device].type));
   for (std::size_t i = 0; i < message.points.size(); ++i) {
     const std::int64_t offset_ns = cloud.grid.offset_ns(static_cast<std::uint32_t>(i / returns));
     set_row(rows, first_row + i, message.points[i], message.time_ns + offset_ns, i % returns + 1,

@@ -12,6 +12,11 @@
 // Offset times that grow from message to message as the time of the messages does are counted from
 // the first message, and are taken so.
 //
+// The driver of the second generation divides the time of a packet by its number of points, not by
+// that of their steps, and cuts the rest: the points of a Mid-360 stand 4947 ns apart, until the
+// next packet begins, and those of a HAP 2189 ns. They are put back where they were fired. Versions
+// that name no lines keep the order of the points, which says their emitters.
+//
 // Sensors. Every topic of points is one device, or one for each lidar number that its CustomMsg
 // have where drivers publish several sensors together; its serial is the broadcast code with which
 // the topic ends, if it does. Messages do not name the model: it is told only where the shot
@@ -96,6 +101,13 @@ class MessageReader final : public Reader {
     int returns = 1;
   };
   struct FirstMessages;
+  /// How the second generation's driver writes the packets of a device.
+  struct DriverPackets {
+    std::int64_t step_ns = 0;       ///< that it writes between points; 0: nothing to mend
+    std::int64_t tolerance_ns = 0;  ///< of the times of a cloud
+    livox::ShotGrid grid;
+    bool names_lines = true;
+  };
 
   const std::vector<bags::Topic>& topics() const { return bag_->topics(); }
   /// Chooses the topics of points and those of inertial samples.
@@ -118,6 +130,7 @@ class MessageReader final : public Reader {
   void take_bag_warnings();
   void choose_imu_topics();
   void describe_device(std::size_t topic, std::uint8_t device, FirstMessages& first);
+  void describe_numbered_device(std::size_t topic, std::uint8_t device, const FirstMessages& first);
   /// Device of a message of points; empty where it is none of those known.
   std::optional<std::uint8_t> device_of(const LidarMessage& message) const;
   /// Clocks of the times and of the stamps, and offset times that grow.
@@ -127,7 +140,9 @@ class MessageReader final : public Reader {
     return topics()[topic].kind == MessageKind::points || cloud_times_[topic];
   }
   void settle_cloud_grid(std::size_t topic, FirstMessages& first);
-  void append(const LidarMessage& message, Chunk& chunk);
+  /// Puts the points of the second generation's driver back to when they were fired.
+  void mend_packets(std::uint8_t device, LidarMessage& message) const;
+  void append(LidarMessage& message, Chunk& chunk);
   void append_points(const LidarMessage& message, std::uint8_t device, Observations& rows);
   void append_cloud(const LidarMessage& message, std::uint8_t device, Observations& rows) const;
   void append_imu(const LidarMessage& message, std::uint8_t device,
@@ -138,6 +153,7 @@ class MessageReader final : public Reader {
   std::vector<std::vector<std::uint8_t>> lidars_;     ///< by topic: numbers that share it
   std::vector<std::optional<std::int64_t>> growth_from_ns_;  ///< by device: offsets count from it
   std::vector<CloudGrid> clouds_;                            ///< by topic
+  std::vector<DriverPackets> driver_packets_;                ///< by device
   std::vector<std::optional<CloudTime>> cloud_times_;        ///< by topic
   std::vector<std::string> unused_times_;                    ///< by topic: why a field is not used
   std::vector<double> acceleration_units_;  ///< by topic: g per unit of the message

@@ -13,6 +13,7 @@
 
 #include "risley/io/block_file.hpp"
 #include "risley/io/little_endian.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 #include "risley/recordings/livox/packet_encoder.hpp"
 
 #include "recordings/formats/format.hpp"
@@ -33,21 +34,18 @@ constexpr std::size_t kDeviceTableAt = 29, kLvx11DeviceBytes = 59;
 constexpr std::size_t kSerialBytes = 16;
 constexpr std::uint32_t kUsualFrameDurationMs = 50;
 
-/// Every LVX file but 1.0, so that unknown versions get a message of their own.
+/// Every LVX file but 1.0 and 2, so that unknown versions get a message of their own.
 bool recognises_lvx11(std::string_view head) {
-  return head.starts_with(kLvxName) && !kLvx10Format.recognises(head);
+  return head.starts_with(kLvxName) && !kLvx10Format.recognises(head) &&
+         !kLvx2Format.recognises(head);
 }
 
 std::unique_ptr<Reader> open_lvx11(const io::InputFile& input, const Progress&) {
   io::BlockInput file(input);
   const auto version_bytes = lvx_version(file);
-  if (version_bytes[0] == 2) {
-    throw FileError(input.path(), {kLvxName.size(), {}},
-                    "LVX 2 (HAP and Mid-360 generation) is not supported, only LVX 1.0 and 1.1");
-  }
   if (version_bytes != std::array<std::uint8_t, 4>{1, 1, 0, 0}) {
     throw FileError(input.path(), {kLvxName.size(), {}},
-                    fmt::format("LVX version = {}, allowed 1.0.0.0 and 1.1.0.0",
+                    fmt::format("LVX version = {}, allowed 1.0.0.0, 1.1.0.0 and 2.0.0.0",
                                 fmt::join(version_bytes, ".")));
   }
   const std::uint8_t* bytes =
@@ -236,7 +234,10 @@ std::size_t Lvx11Writer::device_row(std::uint8_t device, std::uint64_t row_numbe
 }
 
 void Lvx11Writer::append(const Chunk& chunk) {
-  if (chunk.packets.empty()) {
+  // Packets of the second generation are none of this format's.
+  const auto is_of_first = [](const Packet& packet) { return packet.version != kNumberedVersion; };
+  if (!std::all_of(chunk.packets.begin(), chunk.packets.end(), is_of_first) ||
+      chunk.packets.empty()) {
     write_rows(chunk);
   } else {
     flush_all();

@@ -19,12 +19,11 @@ namespace {
 
 using io::load;
 
-/// Text of a field that is filled up with NUL.
-std::string text_field(const std::uint8_t* bytes, std::size_t count) {
+}  // namespace
+
+std::string lvx_text(const std::uint8_t* bytes, std::size_t count) {
   return {bytes, std::find(bytes, bytes + count, std::uint8_t{0})};
 }
-
-}  // namespace
 
 const std::uint8_t* lvx_header_bytes(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      std::string_view part) {
@@ -62,8 +61,8 @@ std::vector<Device> read_lvx_devices(io::BlockInput& file, std::uint64_t offset,
   std::vector<Device> devices(count);
   for (std::size_t i = 0; i < count; ++i, bytes += bytes_per_device) {
     Device& device = devices[i];
-    device.serial = text_field(bytes, 16);
-    device.hub_serial = text_field(bytes + 16, 16);
+    device.serial = lvx_text(bytes, 16);
+    device.hub_serial = lvx_text(bytes + 16, 16);
     device.index = bytes[32];
     device.type = bytes[33];
     device.extrinsic_enabled = has_extrinsic_flag && bytes[34] != 0;
@@ -83,9 +82,25 @@ std::vector<Device> read_lvx_devices(io::BlockInput& file, std::uint64_t offset,
   return devices;
 }
 
-LvxReader::LvxReader(io::BlockInput file, RecordingHeader header, const LvxVersion& version)
-    : file_(std::move(file)), version_(version) {
+LvxFrameReader::LvxFrameReader(io::BlockInput file, RecordingHeader header,
+                               std::uint64_t first_frame, std::size_t frame_header_bytes)
+    : file_(std::move(file)), first_frame_(first_frame), frame_header_bytes_(frame_header_bytes) {
   header_ = std::move(header);
+  rewind_frames();
+}
+
+void LvxFrameReader::rewind_frames() {
+  position_ = first_frame_;
+  frames_ = 0;
+  in_frame_ = open_ended_ = ended_ = told_end_ = false;
+  failure_.reset();
+  warnings_.clear();
+}
+
+LvxReader::LvxReader(io::BlockInput file, RecordingHeader header, const LvxVersion& version)
+    : LvxFrameReader(std::move(file), std::move(header), version.first_frame,
+                     version.frame_header_bytes),
+      float_points_(version.float_points) {
   grids_.resize(header_.devices.size());
   device_rows_.fill(-1);
   for (std::size_t row = 0; row < header_.devices.size(); ++row) {
@@ -96,11 +111,7 @@ LvxReader::LvxReader(io::BlockInput file, RecordingHeader header, const LvxVersi
 }
 
 void LvxReader::rewind() {
-  position_ = version_.first_frame;
-  frames_ = 0;
-  in_frame_ = open_ended_ = ended_ = false;
-  failure_.reset();
-  warnings_.clear();
+  rewind_frames();
   decoders_.clear();
   for (std::size_t row = 0; row < header_.devices.size(); ++row) make_decoder(row);
   clock_wraps_ = 0;
@@ -113,7 +124,7 @@ void LvxReader::make_decoder(std::size_t device_row) {
   const PacketDecoder decoder({.device_type = header_.devices[device_row].type,
                                .device = static_cast<std::uint8_t>(device_row),
                                .grid = grids_[device_row],
-                               .float_points = version_.float_points});
+                               .float_points = float_points_});
   if (device_row == decoders_.size()) {
     decoders_.push_back(decoder);
   } else {
@@ -148,13 +159,13 @@ void LvxReader::describe() {
     row += packet.rows;
   }
   if (!described) {
-    header_.cartesian = version_.float_points;
+    header_.cartesian = float_points_;
   }
 
   std::vector<Warning> unknown;
   for (std::size_t i = 0; i < first.size(); ++i) {
     const FirstPackets& device = first[i];
-    if (device.empty() || version_.float_points) continue;
+    if (device.empty() || float_points_) continue;
     grids_[i] = device.grid(header_.devices[i].type);
     if (!grids_[i]) continue;
     header_.returns_per_shot = std::max<int>(header_.returns_per_shot, grids_[i]->records_per_shot);
@@ -170,16 +181,16 @@ void LvxReader::describe() {
   warnings_ = std::move(unknown);
 }
 
-double LvxReader::fraction_read() const {
+double LvxFrameReader::fraction_read() const {
   return static_cast<double>(std::min(position_, file_.size())) / static_cast<double>(file_.size());
 }
 
-void LvxReader::fail(std::uint64_t offset, std::string problem) {
+void LvxFrameReader::fail(std::uint64_t offset, std::string problem) {
   failure_.emplace(file_.path(), FilePlace{offset, {}}, std::move(problem));
   ended_ = true;
 }
 
-bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
+bool LvxFrameReader::read(Chunk& chunk, std::size_t max_rows) {
   chunk.packets.clear();
   chunk.imu.clear();
   chunk.packet_begins.clear();
@@ -196,12 +207,13 @@ bool LvxReader::read(Chunk& chunk, std::size_t max_rows) {
     }
   }
   chunk.observations.resize(rows_);
+  if (ended_ && !std::exchange(told_end_, true)) at_end();
   if (!chunk.packets.empty()) return true;
   if (failure_) throw FileError(*failure_);
   return false;
 }
 
-void LvxReader::open_frame() {
+void LvxFrameReader::open_frame() {
   if (position_ == file_.size()) {
     ended_ = true;
     if (frames_ == 0) {
@@ -210,15 +222,15 @@ void LvxReader::open_frame() {
     return;
   }
   const std::uint64_t left = file_.size() - position_;
-  if (left < version_.frame_header_bytes) {
+  if (left < frame_header_bytes_) {
     warn(kWarning.cut_off, "cut off while recording: {} bytes are left, a frame header has {}",
-         left, version_.frame_header_bytes)
+         left, frame_header_bytes_)
         .place = {position_, {}};
     position_ = file_.size();
     ended_ = true;
     return;
   }
-  const std::uint8_t* bytes = file_.at(position_, version_.frame_header_bytes);
+  const std::uint8_t* bytes = file_.at(position_, frame_header_bytes_);
   const auto current = load<std::uint64_t>(bytes);
   if (current != position_) {
     fail(position_,
@@ -227,14 +239,14 @@ void LvxReader::open_frame() {
     return;
   }
   next_offset_ = load<std::uint64_t>(bytes + kLvxFrameNextAt);
-  position_ += version_.frame_header_bytes;
+  position_ += frame_header_bytes_;
   open_ended_ = next_offset_ < position_ || next_offset_ > file_.size();
   frame_end_ = open_ended_ ? file_.size() : next_offset_;
   in_frame_ = true;
   ++frames_;
 }
 
-void LvxReader::stop_at_cut(std::optional<std::size_t> records) {
+void LvxFrameReader::stop_at_cut(std::optional<std::size_t> records) {
   const std::uint64_t left = frame_end_ - position_;
   std::string message = "cut off while recording: ";
   if (left == 0) {
@@ -254,60 +266,70 @@ void LvxReader::stop_at_cut(std::optional<std::size_t> records) {
   ended_ = true;
 }
 
-void LvxReader::step_over(std::uint8_t data_type) {
-  // One warning per data type, however long the recording is.
-  const std::uint64_t frames = ++frames_stepped_over_[data_type];
-  const auto [entry, is_new] = stepped_over_.try_emplace(data_type, warnings_.size());
-  if (is_new) warnings_.push_back({kWarning.content_left_out, {}, {position_, {}}});
-  warnings_[entry->second].message = fmt::format(
-      "a packet has the unknown data type {}; the rest of {} was skipped", data_type,
-      frames == 1 ? std::string("its frame") : fmt::format("its frame and of {} more", frames - 1));
+void LvxFrameReader::pass_package(std::uint64_t bytes, std::size_t rows) {
+  rows_ += rows;
+  position_ += bytes;
+}
+
+void LvxFrameReader::skip_frame() {
   position_ = frame_end_;
   in_frame_ = false;
   ended_ = open_ended_;
 }
 
-bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
+bool LvxFrameReader::next_package(Chunk& chunk, std::size_t max_rows) {
   const std::uint64_t left = frame_end_ - position_;
   if (left == 0) {
     in_frame_ = false;
     if (open_ended_) stop_at_cut(0);
     return true;
   }
-  const bool at_file_end = frame_end_ == file_.size();
-  const std::size_t known = std::min<std::uint64_t>(left, kLvxPackageHeaderBytes);
-  const std::uint8_t* bytes = file_.at(position_, known);
-
   // A frame that was never closed may still be followed by a whole one.
-  if (open_ended_ && left >= version_.frame_header_bytes &&
-      load<std::uint64_t>(bytes) == position_) {
+  if (open_ended_ && left >= frame_header_bytes_ &&
+      load<std::uint64_t>(file_.at(position_, sizeof(std::uint64_t))) == position_) {
     warn(kWarning.header_contradicted, "the previous frame was never closed (next offset {})",
          next_offset_)
         .place = {position_, {}};
     in_frame_ = false;
     return true;
   }
+  return read_package(chunk, max_rows, left);
+}
 
+void LvxReader::step_over(std::uint8_t data_type) {
+  // One warning per data type, however long the recording is.
+  const std::uint64_t frames = ++frames_stepped_over_[data_type];
+  const auto [entry, is_new] = stepped_over_.try_emplace(data_type, warnings_.size());
+  if (is_new) warnings_.push_back({kWarning.content_left_out, {}, {position(), {}}});
+  warnings_[entry->second].message = fmt::format(
+      "a packet has the unknown data type {}; the rest of {} was skipped", data_type,
+      frames == 1 ? std::string("its frame") : fmt::format("its frame and of {} more", frames - 1));
+  skip_frame();
+}
+
+bool LvxReader::read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t left) {
+  const std::size_t known = std::min<std::uint64_t>(left, kLvxPackageHeaderBytes);
+  const std::uint8_t* bytes = file().at(position(), known);
   const int device = device_rows_[bytes[0]];
   if (device < 0) {
-    fail(position_,
+    fail(position(),
          fmt::format("a packet names device {}, which is not in the device table", bytes[0]));
     return true;
   }
   // LVX 1.0 was written before the version was settled.
-  if (known > 1 && (version_.float_points ? bytes[1] == 0 : bytes[1] != kPacketVersion)) {
-    fail(position_ + 1, fmt::format("packet version = {}, expected {}", bytes[1], kPacketVersion));
+  if (known > 1 && (float_points_ ? bytes[1] == 0 : bytes[1] != kPacketVersion)) {
+    fail(position() + 1, fmt::format("packet version = {}, expected {}", bytes[1], kPacketVersion));
     return true;
   }
   const RecordLayout* layout = nullptr;
   if (known > 1 + kDataTypeAt) {
     const std::uint8_t data_type = bytes[1 + kDataTypeAt];
-    layout = version_.float_points && data_type != 0 ? nullptr : record_layout(data_type);
+    layout = float_points_ && data_type != 0 ? nullptr : record_layout(data_type);
     if (!layout) {
-      if (known < kLvxPackageHeaderBytes && !at_file_end) {
-        fail(position_, fmt::format("a packet of the unknown data type {} does not fit into its "
-                                    "frame, which ends at byte {}",
-                                    data_type, frame_end_));
+      if (known < kLvxPackageHeaderBytes && !at_file_end()) {
+        fail(position(), fmt::format("a packet of the unknown data type {} does not fit into its "
+                                     "frame, which ends at byte {}",
+                                     data_type, frame_end()));
       } else {
         step_over(data_type);
       }
@@ -315,20 +337,17 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
     }
   }
   if (known < kLvxPackageHeaderBytes || kLvxPackageHeaderBytes + layout->bytes() > left) {
-    if (at_file_end) {
+    if (at_file_end()) {
       stop_at_cut(layout ? std::optional<std::size_t>(layout->records) : std::nullopt);
     } else {
-      fail(position_,
-           fmt::format("a packet does not fit into its frame, which ends at byte {}", frame_end_));
+      fail(position(),
+           fmt::format("a packet does not fit into its frame, which ends at byte {}", frame_end()));
     }
     return true;
   }
 
   // Packets stay whole; one alone is delivered however small the chunk is to be.
-  if (!chunk.packets.empty() &&
-      (rows_ + layout->rows() > max_rows || chunk.packets.size() >= max_rows)) {
-    return false;
-  }
+  if (has_to_wait(chunk, max_rows, layout->rows())) return false;
   const auto device_row = static_cast<std::size_t>(device);
   const std::uint8_t device_type = header_.devices[device_row].type,
                      data_type = bytes[1 + kDataTypeAt];
@@ -338,20 +357,19 @@ bool LvxReader::next_package(Chunk& chunk, std::size_t max_rows) {
   }
   PacketDecoder& decoder = decoders_[device_row];
   const std::uint64_t wraps_before = decoder.clock_wraps();
-  const std::span package(file_.at(position_, kLvxPackageHeaderBytes + layout->bytes()),
+  const std::span package(file().at(position(), kLvxPackageHeaderBytes + layout->bytes()),
                           kLvxPackageHeaderBytes + layout->bytes());
   try {
-    chunk.observations.resize(std::max(chunk.observations.size(), rows_ + layout->rows()));
-    decoder.decode_into(package.subspan(1), chunk, rows_);
+    chunk.observations.resize(std::max(chunk.observations.size(), rows() + layout->rows()));
+    decoder.decode_into(package.subspan(1), chunk, rows());
   } catch (const BadPacket& bad) {
-    fail(position_ + 1 + bad.byte_offset(), bad.problem());
+    fail(position() + 1 + bad.byte_offset(), bad.problem());
     return true;
   }
   clock_wraps_ += decoder.clock_wraps() - wraps_before;
-  rows_ += layout->rows();
   chunk.packets.back().device_index = package[0];
-  chunk.packets.back().frame = frames_ - 1;
-  position_ += kLvxPackageHeaderBytes + layout->bytes();
+  chunk.packets.back().frame = frames() - 1;
+  pass_package(kLvxPackageHeaderBytes + layout->bytes(), layout->rows());
   return true;
 }
 

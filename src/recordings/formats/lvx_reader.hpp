@@ -40,6 +40,9 @@ struct LvxVersion {
 const std::uint8_t* lvx_header_bytes(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      std::string_view part);
 
+/// Text of a field that is filled up with NUL.
+std::string lvx_text(const std::uint8_t* bytes, std::size_t count);
+
 /// Checks name and magic code, and returns the four version bytes. @throws FileError
 std::array<std::uint8_t, 4> lvx_version(io::BlockInput& file);
 
@@ -47,42 +50,82 @@ std::array<std::uint8_t, 4> lvx_version(io::BlockInput& file);
 std::vector<Device> read_lvx_devices(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      bool has_extrinsic_flag);
 
-/// Reads the frames and packages that all LVX 1 files consist of.
-class LvxReader final : public Reader {
+/// Reads the frames that all LVX files consist of. Which packages stand in them differs.
+class LvxFrameReader : public Reader {
+ public:
+  bool read(Chunk& chunk, std::size_t max_rows) final;
+  double fraction_read() const final;
+
+ protected:
+  /// @param first_frame  byte offset
+  LvxFrameReader(io::BlockInput file, RecordingHeader header, std::uint64_t first_frame,
+                 std::size_t frame_header_bytes);
+
+  /// Back to the first frame, without warnings.
+  void rewind_frames();
+  /// Reads the package at position(), of whose frame so many bytes are left, at least one.
+  /// @return false when it has to wait for the next chunk
+  virtual bool read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t left) = 0;
+  /// The file has ended, or nothing more of it can be read: the time for last warnings.
+  virtual void at_end() {}
+
+  io::BlockInput& file() { return file_; }
+  std::uint64_t position() const { return position_; }    ///< of the next package, or frame
+  std::uint64_t frame_end() const { return frame_end_; }  ///< byte offset
+  std::uint64_t frames() const { return frames_; }        ///< begun so far
+  std::size_t rows() const { return rows_; }              ///< of the chunk that is being read
+  /// Whether the present frame ends with the file.
+  bool at_file_end() const { return frame_end_ == file_.size(); }
+  /// Whether a package waits for the next chunk, because packages stay whole.
+  bool has_to_wait(const Chunk& chunk, std::size_t max_rows, std::size_t more_rows) const {
+    return !chunk.packets.empty() &&
+           (rows_ + more_rows > max_rows || chunk.packets.size() >= max_rows);
+  }
+  /// A package of so many bytes was read, with so many rows.
+  void pass_package(std::uint64_t bytes, std::size_t rows);
+  /// The rest of the frame cannot be read.
+  void skip_frame();
+  /// The file was cut off within a package of so many records.
+  void stop_at_cut(std::optional<std::size_t> records);
+  /// Nothing behind this damage can be read.
+  void fail(std::uint64_t offset, std::string problem);
+
+ private:
+  void open_frame();
+  bool next_package(Chunk& chunk, std::size_t max_rows);
+
+  io::BlockInput file_;
+  std::uint64_t first_frame_;
+  std::size_t frame_header_bytes_;
+  std::uint64_t position_ = 0;
+  std::uint64_t frame_end_ = 0;
+  std::uint64_t next_offset_ = 0;  // as the frame header gives it
+  std::uint64_t frames_ = 0;
+  std::size_t rows_ = 0;
+  bool in_frame_ = false;
+  bool open_ended_ = false;  // the frame header does not say where the frame ends
+  bool ended_ = false, told_end_ = false;
+  std::optional<FileError> failure_;
+};
+
+/// Reads the packages of LVX 1: packets of the first generation.
+class LvxReader final : public LvxFrameReader {
  public:
   LvxReader(io::BlockInput file, RecordingHeader header, const LvxVersion& version);
-
-  bool read(Chunk& chunk, std::size_t max_rows) override;
-  double fraction_read() const override;
 
  private:
   void describe();
   void rewind();
-  void open_frame();
-  /// @return false when the next packet has to wait for the next chunk
-  bool next_package(Chunk& chunk, std::size_t max_rows);
+  bool read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t left) override;
   void make_decoder(std::size_t device_row);
-  void stop_at_cut(std::optional<std::size_t> records);
   void step_over(std::uint8_t data_type);
-  void fail(std::uint64_t offset, std::string problem);
 
-  io::BlockInput file_;
-  LvxVersion version_;
+  bool float_points_;
   std::array<int, 256> device_rows_{};                 // by device index, -1 for none
   std::vector<std::optional<livox::ShotGrid>> grids_;  // by device row; empty: as the types say
   std::vector<livox::PacketDecoder> decoders_;         // by device row
   std::map<std::uint8_t, std::size_t> stepped_over_;   // data type -> its warning
   std::map<std::uint8_t, std::uint64_t> frames_stepped_over_;
-
-  std::uint64_t position_ = 0;  // of the next package, or of the next frame
-  std::uint64_t frame_end_ = 0;
-  std::uint64_t next_offset_ = 0;  // as the frame header gives it
-  std::uint64_t frames_ = 0;       // begun so far
-  std::size_t rows_ = 0;           // of the chunk that is being read
-  bool in_frame_ = false;
-  bool open_ended_ = false;  // the frame header does not say where the frame ends
-  bool ended_ = false;
-  std::optional<FileError> failure_;
 };
 
 }  // namespace risley::recordings

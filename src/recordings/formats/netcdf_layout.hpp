@@ -45,6 +45,7 @@ struct NetcdfColumn {
   const char* long_name;
   const char* inner_dimension = nullptr;  ///< of tables with several values per entry
   std::size_t width = 1;
+  bool second_generation = false;  ///< only in files of sensors of Livox's second generation
 };
 
 /// Calls a function with every column of the row table.
@@ -73,6 +74,7 @@ void for_each_packet_column(Function&& f) {
   f(NetcdfColumn{"packet_data_type", "1", "kind of the records"}, &Packet::data_type);
   f(NetcdfColumn{"packet_timestamp", "1", "time stamp as sent", kByteDimension, 8},
     &Packet::timestamp);
+  f(NetcdfColumn{"packet_number", "1", "counter of the packet", nullptr, 1, true}, &Packet::number);
 }
 
 template <class Function>
@@ -93,6 +95,8 @@ void for_each_device_column(std::size_t serial_length, Function&& f) {
   f(NetcdfColumn{"device_hub_serial", nullptr, "broadcast code of the hub", kSerialDimension,
                  serial_length},
     &Device::hub_serial);
+  f(NetcdfColumn{"device_address", nullptr, "IP address", kSerialDimension, serial_length, true},
+    &Device::address);
   f(NetcdfColumn{"device_index", "1", "index by which packets name the device"}, &Device::index);
   f(NetcdfColumn{"device_type", "1", "device type of the sensor"}, &Device::type);
   f(NetcdfColumn{"device_extrinsic_enabled", "1", "1 where the pose is to be applied"},

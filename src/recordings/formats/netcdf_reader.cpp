@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/recordings/livox/packet.hpp"
 #include "risley/tables/netcdf.hpp"
 
 #include "recordings/formats/format.hpp"
@@ -35,6 +34,7 @@ struct RequireColumns {
   template <class Values>
   void operator()(const NetcdfColumn& column, const Values&) const {
     using T = ElementOf<Values>;
+    if (column.second_generation && !file.has_variable(column.name)) return;
     if (column.inner_dimension == nullptr) {
       variables.emplace(column.name, file.variable<T>(column.name, {&dimension}, block));
     } else {
@@ -66,6 +66,7 @@ struct GetRecords {
 
   template <class T>
   void operator()(const NetcdfColumn& column, T Record::*member) const {
+    if (column.second_generation && !variables.contains(column.name)) return;
     std::vector<ElementOf<T>> values;
     file.get(variables.at(column.name), start, records.size(), values);
     for (auto from = values.begin(); Record & record : records) {
@@ -200,7 +201,7 @@ class NetcdfReader final : public Reader {
       }
       packets.push_back(known_packets_[next_packet_++]);
       rows += packets.back().rows;
-      if (packets.back().data_type == livox::kImuDataType) ++samples;
+      if (packets.back().is_imu()) ++samples;
     }
     const bool last = packets_read_ == packet_count_ && next_packet_ == known_packets_.size();
     const std::size_t rows_left = row_count_ - row_, samples_left = imu_count_ - imu_sample_;
@@ -241,10 +242,10 @@ class NetcdfReader final : public Reader {
     std::size_t rows = 0, samples = 0, whole = 0;
     for (const auto& packet : chunk.packets) {
       rows += packet.rows;
-      samples += packet.data_type == livox::kImuDataType ? 1 : 0;
+      samples += packet.is_imu() ? 1 : 0;
       if (rows > chunk.observations.size() || samples > chunk.imu.size()) {
         rows -= packet.rows;
-        samples -= packet.data_type == livox::kImuDataType ? 1 : 0;
+        samples -= packet.is_imu() ? 1 : 0;
         break;
       }
       ++whole;

@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
-#include "risley/recordings/livox/packet.hpp"
 #include "risley/tables/netcdf.hpp"
 
 #include "recordings/formats/format.hpp"
@@ -32,10 +31,12 @@ struct DefineColumns {
   const Dimensions& inner;
   const tables::NetcdfDimension& dimension;
   std::size_t block;
+  bool second_generation = false;
 
   template <class Values>
   void operator()(const NetcdfColumn& column, const Values&) const {
     using T = ElementOf<Values>;
+    if (column.second_generation && !second_generation) return;
     const tables::NetcdfStorage storage{block, block > 0, block > 0};
     const auto variable =
         column.inner_dimension == nullptr
@@ -70,6 +71,7 @@ struct PutRecords {
 
   template <class T>
   void operator()(const NetcdfColumn& column, T Record::*member) const {
+    if (column.second_generation && !variables.contains(column.name)) return;
     std::vector<ElementOf<T>> values;
     for (const Record& record : records) {
       const T& value = record.*member;
@@ -87,7 +89,8 @@ struct PutRecords {
 std::size_t serial_length_of(const std::vector<Device>& devices) {
   std::size_t length = kShortestSerial;
   for (const Device& device : devices) {
-    length = std::max({length, device.serial.size(), device.hub_serial.size()});
+    length =
+        std::max({length, device.serial.size(), device.hub_serial.size(), device.address.size()});
   }
   return length;
 }
@@ -150,10 +153,14 @@ class NetcdfWriter final : public Writer {
     const auto row = file_.define_growing_dimension(kRowDimension);
     for_each_row_column(rows_, DefineColumns{file_, variables_, inner, row, kRowBlock});
     const auto packet = file_.define_growing_dimension(kPacketDimension);
-    for_each_packet_column(DefineColumns{file_, variables_, inner, packet, kPacketBlock});
+    const bool second = std::any_of(
+        header.devices.begin(), header.devices.end(),
+        [](const Device& one) { return !one.address.empty() || is_second_generation(one.type); });
+    for_each_packet_column(DefineColumns{file_, variables_, inner, packet, kPacketBlock, second});
     const auto sample = file_.define_growing_dimension(kImuDimension);
     for_each_imu_column(DefineColumns{file_, variables_, inner, sample, kImuBlock});
-    for_each_device_column(serial_length, DefineColumns{file_, variables_, inner, device, 0});
+    for_each_device_column(serial_length,
+                           DefineColumns{file_, variables_, inner, device, 0, second});
     file_.end_definitions();
     for_each_device_column(serial_length, PutRecords<Device>{file_, variables_, 0, header.devices});
   }
@@ -165,7 +172,7 @@ class NetcdfWriter final : public Writer {
     std::size_t rows = 0, samples = 0;
     for (const auto& packet : chunk.packets) {
       rows += packet.rows;
-      if (packet.data_type == livox::kImuDataType) ++samples;
+      if (packet.is_imu()) ++samples;
     }
     if (*with_packets_ ? rows == chunk.observations.size() && samples == chunk.imu.size()
                        : chunk.packets.empty()) {

@@ -4,6 +4,10 @@
 // apart by address and port, and behind a hub by slot and number. Broadcasts and replies in the
 // capture name serial number, type and firmware. Packets are put into their order, and what is
 // missing is counted, as while recording from the network.
+//
+// Sensors of the second generation are told apart by their address alone, as points and inertial
+// samples come from ports of their own. Their packets have numbers, by which they are ordered and
+// counted. Replies to searches and pushes name serial number, type, firmware and field of view.
 #include <algorithm>
 #include <array>
 #include <deque>
@@ -15,10 +19,14 @@
 
 #include <fmt/format.h>
 
+#include "risley/io/little_endian.hpp"
 #include "risley/recordings/livox/first_packets.hpp"
+#include "risley/recordings/livox/numbered_order.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 #include "risley/recordings/livox/packet_order.hpp"
 #include "risley/wire/commands.hpp"
+#include "risley/wire/control_frame.hpp"
 
 #include "recordings/formats/capture_file.hpp"
 #include "recordings/formats/format.hpp"
@@ -37,30 +45,61 @@ constexpr std::size_t kMostPending = 4096;         // packets of a frame
 constexpr std::uint8_t kHub = 0;                   // Broadcast::device_type
 constexpr std::uint8_t kDataTypes = 9;
 
-/// Who sent a packet: address, port, and slot and number behind a hub.
+/// Who sent a packet: address, port, and slot and number behind a hub. Of sensors of the second
+/// generation the address, and port 0.
 using Sender = std::tuple<wire::Address, std::uint16_t, std::uint8_t, std::uint8_t>;
 
+bool is_numbered(Bytes bytes) { return !bytes.empty() && bytes[kVersionAt] == kNumberedVersion; }
+
 Sender sender_of(const CapturedDatagram& datagram) {
+  if (is_numbered(datagram.bytes)) return {datagram.from.address, 0, 0, 0};
   return {datagram.from.address, datagram.from.port, datagram.bytes[1], datagram.bytes[2]};
 }
 
-/// The layout of a datagram that may be a packet, also one whose end was not captured; nullptr for
-/// others.
-const RecordLayout* layout_of(const CapturedDatagram& datagram) {
+/// The layout of a datagram that may be a packet of the second generation, also one whose end was
+/// not captured.
+std::optional<RecordLayout> numbered_layout_of(const CapturedDatagram& datagram) {
   const Bytes bytes = datagram.bytes;
-  if (bytes.size() > kVersionAt && bytes[kVersionAt] != kPacketVersion) return nullptr;
+  constexpr std::size_t kLengthFrom = 1, kRecordsFrom = 5, kTypeFrom = 10;
+  if (!is_numbered(bytes) || bytes.size() <= kTypeFrom ||
+      io::load<std::uint16_t>(&bytes[kLengthFrom]) != datagram.length) {
+    return std::nullopt;
+  }
+  const auto layout =
+      numbered_layout(bytes[kTypeFrom], io::load<std::uint16_t>(&bytes[kRecordsFrom]));
+  const bool fits = layout && kNumberedHeaderBytes + layout->bytes() <= datagram.length;
+  return fits ? layout : std::nullopt;
+}
+
+/// The layout of a datagram that may be a packet, also one whose end was not captured; empty for
+/// others.
+std::optional<RecordLayout> layout_of(const CapturedDatagram& datagram) {
+  const Bytes bytes = datagram.bytes;
+  if (const auto numbered = numbered_layout_of(datagram)) return numbered;
+  if (bytes.size() > kVersionAt && bytes[kVersionAt] != kPacketVersion) return std::nullopt;
   for (std::uint8_t type = 0; type < kDataTypes; ++type) {
     const RecordLayout* layout = record_layout(type);
     if (bytes.size() > kDataTypeAt && bytes[kDataTypeAt] != type) continue;
-    if (datagram.length == kPacketHeaderBytes + layout->bytes()) return layout;
+    if (datagram.length == kPacketHeaderBytes + layout->bytes()) return *layout;
   }
-  return nullptr;
+  return std::nullopt;
+}
+
+/// Rows of a whole packet of the second generation.
+std::size_t numbered_rows(Bytes packet) {
+  const NumberedHeader header = decode_numbered_header(packet);
+  return numbered_layout(header.data_type, header.records)->rows();
 }
 
 /// What a sensor says of itself; behind one address there may be several.
 struct Named {
   std::optional<wire::Broadcast> broadcast;
   std::string firmware;
+  // Of the second generation.
+  std::optional<std::uint8_t> type;
+  std::string serial;
+  std::array<std::optional<wire::FieldOfView>, 2> views;
+  std::uint8_t views_used = 0;  ///< bits 0 and 1
 };
 
 /// What a datagram says, if it says that. @tparam Whole  wire::Message or wire::Reply
@@ -80,6 +119,39 @@ std::optional<wire::Broadcast> broadcast_of(const CapturedDatagram& datagram) {
   return said_in<wire::Broadcast, wire::Message>(datagram, wire::decode_message);
 }
 
+/// Takes what a frame of the second generation's control protocol says of its sensor.
+void take_control_frame(const wire::ControlFrame& frame, Named& named) {
+  if (const auto reply = wire::search_reply_of(frame)) {
+    named.type = reply->device_type;
+    named.serial = reply->serial;
+  }
+  for (const wire::KeyValue& entry : wire::list_of(frame)) {
+    if (entry.key == wire::kSerialKey) {
+      named.serial.assign(entry.value.begin(),
+                          std::find(entry.value.begin(), entry.value.end(), std::uint8_t{0}));
+    } else if (entry.key == wire::kFirmwareKey) {
+      named.firmware = wire::version_text(entry.value);
+    } else if (entry.key == wire::kViewKey || entry.key == wire::kViewKey + 1) {
+      named.views[entry.key - wire::kViewKey] = wire::view_of(entry.value);
+    } else if (entry.key == wire::kViewSwitchKey && entry.value.size() == 1) {
+      named.views_used = entry.value[0];
+    }
+  }
+}
+
+/// The directions that a sensor was set to measure in, in words; empty where nothing limits them.
+std::string view_words(const Named& named) {
+  std::string words;
+  for (std::size_t i = 0; i < named.views.size(); ++i) {
+    if ((named.views_used >> i & 1U) == 0 || !named.views[i]) continue;
+    const wire::FieldOfView& view = *named.views[i];
+    words += fmt::format("{}azimuth {} to {} deg, elevation {} to {} deg",
+                         words.empty() ? "" : "; ", view.yaw_start_deg, view.yaw_stop_deg,
+                         view.pitch_start_deg, view.pitch_stop_deg);
+  }
+  return words;
+}
+
 /// Reads captures. The first look at the file finds its sensors.
 class PcapReader final : public Reader {
  public:
@@ -94,6 +166,8 @@ class PcapReader final : public Reader {
     explicit Seen(Sender whose) : sender(std::move(whose)) {}
 
     Sender sender;
+    bool numbered = false;                             ///< of the second generation
+    std::uint64_t interval_sum_ns = 0, intervals = 0;  ///< of its shots
     FirstPackets first;
     PacketDecoder decoder{{.grid = kGrid100kHz}};
     std::size_t rows = 0;
@@ -101,8 +175,27 @@ class PcapReader final : public Reader {
   };
   /// A sensor while its packets are read.
   struct Live {
+    std::uint8_t type;
+    bool numbered;
     PacketOrder order;
     PacketDecoder decoder;
+    NumberedOrder numbered_order;
+
+    const PacketCounts& counts() const {
+      return numbered ? numbered_order.counts() : order.counts();
+    }
+    bool add(Bytes bytes, std::int64_t time_ns) {
+      return numbered ? numbered_order.add(bytes, time_ns) : order.add(bytes, time_ns);
+    }
+    void flush() { numbered ? numbered_order.flush() : order.flush(); }
+    std::vector<std::vector<std::uint8_t>> take(std::int64_t now_ns) {
+      if (!numbered) {
+        order.advance(now_ns);
+        return order.take();
+      }
+      numbered_order.advance(now_ns);
+      return numbered_order.take();
+    }
   };
   struct Ready {
     std::size_t device = 0;
@@ -113,6 +206,7 @@ class PcapReader final : public Reader {
   void look_through(const Progress& progress);
   void look_at_packet(const CapturedDatagram& datagram, Chunk& chunk);
   void add_device(const Seen& seen);
+  void add_numbered_device(const Seen& seen);
   void take(const CapturedDatagram& datagram);
   void give_frame();
   void end();
@@ -142,9 +236,13 @@ PcapReader::PcapReader(const io::InputFile& file, const Progress& progress) : fi
   look_through(progress);
   for (std::size_t row = 0; row < header_.devices.size(); ++row) {
     const std::uint8_t type = header_.devices[row].type;
-    live_.push_back({PacketOrder(type), PacketDecoder({.device_type = type,
-                                                       .device = static_cast<std::uint8_t>(row),
-                                                       .grid = grids_[row]})});
+    live_.push_back(
+        {type,
+         endpoints_[row].port == 0,
+         PacketOrder(type),
+         PacketDecoder(
+             {.device_type = type, .device = static_cast<std::uint8_t>(row), .grid = grids_[row]}),
+         {}});
     if (grids_[row]) live_.back().order.set_grid(*grids_[row]);
   }
   seen_.clear();
@@ -160,13 +258,20 @@ void PcapReader::look_through(const Progress& progress) {
     for (std::size_t count = 0; const auto datagram = file_.next(); ++count) {
       constexpr std::size_t kSometimes = 1024;
       if (count % kSometimes == 0) progress.check();
-      if (layout_of(*datagram) != nullptr) {
+      constexpr std::size_t kMostNames = 4096;
+      const bool known = named_.size() < kMostNames || named_.contains(datagram->from.address);
+      const auto control = wire::decode_control_frame(datagram->bytes);
+      if (layout_of(*datagram)) {
         look_at_packet(*datagram, chunk);
+      } else if (const auto* frame = std::get_if<wire::ControlFrame>(&control)) {
+        // What a host sets is told by the sensor that replies or pushes.
+        if (known && frame->from_sensor) {
+          take_control_frame(*frame, named_[datagram->from.address]);
+        }
       } else if (const auto broadcast = broadcast_of(*datagram)) {
-        constexpr std::size_t kMostNames = 4096;
-        if (named_.size() < kMostNames || named_.contains(datagram->from.address)) {
-          auto& known = named_[datagram->from.address].broadcast;
-          if (!known) known = *broadcast;
+        if (known) {
+          auto& first = named_[datagram->from.address].broadcast;
+          if (!first) first = *broadcast;
         }
       } else if (const auto info =
                      said_in<wire::DeviceInfo, wire::Reply>(*datagram, wire::decode_reply);
@@ -198,11 +303,11 @@ void PcapReader::look_through(const Progress& progress) {
   if (damage) throw FileError(*damage);
   throw FileError(file_.path(), {},
                   cut_ > 0
-                      ? fmt::format("holds no whole packet of a Livox sensor of the first "
-                                    "generation: {} were cut by the snap length of {} bytes; "
-                                    "capture whole packets, as tcpdump -s 0 does",
+                      ? fmt::format("holds no whole packet of a Livox sensor: {} were cut by the "
+                                    "snap length of {} bytes; capture whole packets, as tcpdump "
+                                    "-s 0 does",
                                     cut_, file_.snap_length())
-                      : std::string("holds no packet of a Livox sensor of the first generation"));
+                      : std::string("holds no packet of a Livox sensor"));
 }
 
 void PcapReader::look_at_packet(const CapturedDatagram& datagram, Chunk& chunk) {
@@ -216,23 +321,38 @@ void PcapReader::look_at_packet(const CapturedDatagram& datagram, Chunk& chunk) 
   constexpr std::size_t kEnoughRows = 20'000;
   if (found != seen_rows_.end() && seen_[found->second].rows >= kEnoughRows) return;
   Seen seen = found == seen_rows_.end() ? Seen(sender) : seen_[found->second];
+  seen.numbered = is_numbered(datagram.bytes);
   chunk.clear();
   try {
-    seen.decoder.decode(datagram.bytes, chunk);
+    if (seen.numbered) {
+      decode_numbered_packet(datagram.bytes, kUnknownDeviceType, 0, chunk);
+    } else {
+      seen.decoder.decode(datagram.bytes, chunk);
+    }
   } catch (const BadPacket&) {
     return;
   }
+  if (chunk.packets.empty()) return;
   const Packet& packet = chunk.packets.front();
   if (packet.rows > 0) {
-    const RecordLayout& layout = *record_layout(packet.data_type);
+    const RecordLayout layout =
+        seen.numbered ? *numbered_layout(packet.data_type, 1) : *record_layout(packet.data_type);
     const bool is_first =
         std::none_of(seen_.begin(), seen_.end(), [](const Seen& one) { return one.has_points; });
     if (is_first) {
-      header_.time_reference = time_reference_of(packet.timestamp_type);
+      header_.time_reference = seen.numbered ? numbered_time_reference(packet.timestamp_type)
+                                             : time_reference_of(packet.timestamp_type);
       header_.cartesian = layout.cartesian;
       header_.returns_per_shot = layout.returns;
     }
-    seen.first.add(packet, chunk.observations, 0);
+    if (seen.numbered) {
+      const NumberedHeader header = decode_numbered_header(datagram.bytes);
+      constexpr std::uint64_t kUnit_ns = 100;
+      seen.interval_sum_ns += header.interval * kUnit_ns;
+      seen.intervals += header.records - 1U;
+    } else {
+      seen.first.add(packet, chunk.observations, 0);
+    }
     seen.rows += packet.rows;
     seen.has_points = true;
   }
@@ -244,7 +364,51 @@ void PcapReader::look_at_packet(const CapturedDatagram& datagram, Chunk& chunk) 
   }
 }
 
+void PcapReader::add_numbered_device(const Seen& seen) {
+  const std::size_t row = header_.devices.size();
+  const wire::Address address = std::get<0>(seen.sender);
+  const auto found = named_.find(address);
+  const Named named = found == named_.end() ? Named{} : found->second;
+  Device device;
+  device.index = static_cast<std::uint8_t>(row);
+  device.address = to_string(address);
+  device.serial = named.serial;
+  device.type = named.type.value_or(kUnknownDeviceType);
+  if (!named.type) {
+    device.type_inferred = true;
+    const double interval_ns = seen.intervals == 0 ? 0.0
+                                                   : static_cast<double>(seen.interval_sum_ns) /
+                                                         static_cast<double>(seen.intervals);
+    for (const std::uint8_t type : {kMid360, kHap}) {
+      const ShotGrid grid = *numbered_grid(type);
+      constexpr double kNear = 0.05;
+      const double usual =
+          static_cast<double>(grid.interval_numerator_ns) / grid.interval_denominator;
+      if (std::abs(interval_ns / usual - 1.0) < kNear) device.type = type;
+    }
+  }
+  const auto detail = [row](const char* name) { return fmt::format("device_{}_{}", row, name); };
+  if (!named.firmware.empty()) header_.set_detail(detail("firmware"), named.firmware);
+  if (const std::string view = view_words(named); !view.empty()) {
+    header_.set_detail(detail("field_of_view"), view);
+  }
+  devices_.emplace(seen.sender, row);
+  endpoints_.push_back({address, 0});
+  grids_.emplace_back();
+  if (device.serial.empty()) {
+    warn(kWarning.devices_unclear,
+         "device {} is {}: nothing in the capture names its serial "
+         "number{}",
+         row, device.address,
+         device.type == kUnknownDeviceType ? std::string(" or its type")
+         : named.type                      ? std::string()
+                      : fmt::format("; by its packets it is a {}", device_type_name(device.type)));
+  }
+  header_.devices.push_back(std::move(device));
+}
+
 void PcapReader::add_device(const Seen& seen) {
+  if (seen.numbered) return add_numbered_device(seen);
   const std::size_t row = header_.devices.size();
   const wire::Address address = std::get<0>(seen.sender);
   const std::uint16_t port = std::get<1>(seen.sender);
@@ -284,6 +448,7 @@ void PcapReader::add_device(const Seen& seen) {
 
 std::string PcapReader::name_of(std::size_t device) const {
   const std::string& serial = header_.devices[device].serial;
+  if (serial.empty() && live_[device].numbered) return header_.devices[device].address;
   return serial.empty() ? to_string(endpoints_[device]) : serial;
 }
 
@@ -294,7 +459,7 @@ void PcapReader::take(const CapturedDatagram& datagram) {
       pending_ >= kMostPending) {
     give_frame();
   }
-  if (const RecordLayout* layout = layout_of(datagram)) {
+  if (const auto layout = layout_of(datagram)) {
     if (datagram.bytes.size() < datagram.length) {
       ++cut_;
       cut_rows_ += layout->rows();
@@ -304,7 +469,7 @@ void PcapReader::take(const CapturedDatagram& datagram) {
     if (found == devices_.end()) {
       ++strangers_;
     } else {
-      live_[found->second].order.add(datagram.bytes, now_ns_);
+      live_[found->second].add(datagram.bytes, now_ns_);
       ++pending_;
     }
   } else if (broadcast_of(datagram)) {
@@ -318,8 +483,7 @@ void PcapReader::take(const CapturedDatagram& datagram) {
 void PcapReader::give_frame() {
   bool any = false;
   for (std::size_t row = 0; row < live_.size(); ++row) {
-    live_[row].order.advance(now_ns_);
-    for (auto& packet : live_[row].order.take()) {
+    for (auto& packet : live_[row].take(now_ns_)) {
       ready_.push_back({row, frames_, std::move(packet)});
       any = true;
     }
@@ -331,14 +495,14 @@ void PcapReader::give_frame() {
 
 void PcapReader::end() {
   ended_ = true;
-  for (Live& live : live_) live.order.flush();
+  for (Live& live : live_) live.flush();
   give_frame();
   say_what_is_missing();
 }
 
 void PcapReader::say_what_is_missing() {
   for (std::size_t row = 0; row < live_.size(); ++row) {
-    const PacketCounts& counts = live_[row].order.counts();
+    const PacketCounts& counts = live_[row].counts();
     if (counts.lost > 0) {
       warn(kWarning.shots_lost, "{}: {} packets are missing between others", name_of(row),
            counts.lost);
@@ -347,6 +511,12 @@ void PcapReader::say_what_is_missing() {
       warn(kWarning.content_left_out,
            "{}: {} packets were captured twice; the second ones were left out", name_of(row),
            counts.duplicates);
+    }
+    const std::uint64_t wrong = live_[row].numbered_order.wrong_checksums();
+    if (wrong > 0) {
+      warn(kWarning.implausible_values,
+           "{}: {} packets have another checksum than their bytes; they were kept", name_of(row),
+           wrong);
     }
     if (counts.rejected > 0) {
       warn(kWarning.content_left_out, "{}: {} packets that no sensor sends were left out",
@@ -389,24 +559,34 @@ bool PcapReader::read(Chunk& chunk, std::size_t max_rows) {
       continue;
     }
     const Ready& next = ready_.front();
-    const std::size_t rows = record_layout(next.bytes[kDataTypeAt])->rows();
+    Live& live = live_[next.device];
+    const std::size_t rows =
+        live.numbered ? numbered_rows(next.bytes) : record_layout(next.bytes[kDataTypeAt])->rows();
     // Packets stay whole; one alone is delivered however small the chunk is to be.
     if (!chunk.packets.empty() &&
         (chunk.observations.size() + rows > max_rows || chunk.packets.size() >= max_rows)) {
       return true;
     }
-    PacketDecoder& decoder = live_[next.device].decoder;
+    PacketDecoder& decoder = live.decoder;
     const std::uint64_t wraps_before = decoder.clock_wraps();
+    const std::size_t packets_before = chunk.packets.size();
     try {
-      decoder.decode(next.bytes, chunk);
+      if (live.numbered) {
+        decode_numbered_packet(next.bytes, live.type, static_cast<std::uint8_t>(next.device),
+                               chunk);
+      } else {
+        decoder.decode(next.bytes, chunk);
+      }
     } catch (const BadPacket&) {  // a clock whose seconds do not fit 64 bits any more
       ++strangers_;
       ready_.pop_front();
       continue;
     }
     clock_wraps_ += decoder.clock_wraps() - wraps_before;
-    chunk.packets.back().device_index = header_.devices[next.device].index;
-    chunk.packets.back().frame = next.frame;
+    for (std::size_t i = packets_before; i < chunk.packets.size(); ++i) {
+      chunk.packets[i].device_index = header_.devices[next.device].index;
+      chunk.packets[i].frame = next.frame;
+    }
     ready_.pop_front();
   }
   if (!chunk.packets.empty()) return true;

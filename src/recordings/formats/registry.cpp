@@ -8,6 +8,7 @@ const std::vector<const Format*>& all_formats() {
   static const std::vector<const Format*> formats{
       &kLvx11Format,
       &kLvx10Format,
+      &kLvx2Format,
       &kNetcdfFormat,
       &kOpenpylivoxBinFormat,
       &kViewerCsvFormat,

@@ -16,6 +16,7 @@
 #include "risley/io/little_endian.hpp"
 
 #include "recordings/formats/cartesian.hpp"
+#include "recordings/livox/records.hpp"
 #include "recordings/spherical_kernel.hpp"
 
 namespace risley::recordings::livox {
@@ -46,18 +47,25 @@ std::optional<std::size_t> decode_spherical_records(const RecordLayout& layout,
   return sound < a.records ? std::optional(sound) : std::nullopt;
 }
 
-template <bool kTagged>
-void decode_cartesian(std::size_t points, const std::uint8_t* bytes, Observations& o,
+/// Records of three whole numbers, an intensity and perhaps a tag.
+/// @param step  of the numbers, m
+template <class Number, bool kTagged>
+void decode_cartesian(std::size_t points, const std::uint8_t* bytes, double step, Observations& o,
                       std::size_t row) {
-  constexpr std::size_t kBytes = kTagged ? 14 : 13;
-  for (const std::size_t end = row + points; row < end; ++row, bytes += kBytes) {
-    set_cartesian(
-        o, row,
-        {load<std::int32_t>(bytes) * kMillimetre, load<std::int32_t>(bytes + 4) * kMillimetre,
-         load<std::int32_t>(bytes + 8) * kMillimetre},
-        kMillimetre);
-    o.intensity[row] = bytes[12];
-    o.tag[row] = kTagged ? bytes[13] : 0;
+  constexpr std::size_t kCoordinates = 3 * sizeof(Number), kBytes = kCoordinates + 1 + kTagged;
+  constexpr std::size_t kBlock = 128;  // all records of a packet
+  double x[kBlock], y[kBlock], z[kBlock];
+  for (const std::size_t end = row + points; row < end;) {
+    const std::size_t count = std::min(kBlock, end - row);
+    for (std::size_t i = 0; i < count; ++i, bytes += kBytes) {
+      x[i] = load<Number>(bytes) * step;
+      y[i] = load<Number>(bytes + sizeof(Number)) * step;
+      z[i] = load<Number>(bytes + 2 * sizeof(Number)) * step;
+      o.intensity[row + i] = bytes[kCoordinates];
+      o.tag[row + i] = kTagged ? bytes[kCoordinates + 1] : 0;
+    }
+    set_cartesian(o, row, count, x, y, z, step);
+    row += count;
   }
 }
 
@@ -113,7 +121,7 @@ void set_shots(const RecordLayout& layout, std::int64_t time_ns, const ShotGrid&
   };
   std::fill_n(at(o.device), layout.rows(), device);
   const std::uint32_t rows_per_shot = std::uint32_t{layout.returns} * grid.records_per_shot;
-  if (rows_per_shot == 1 && grid.interval_denominator == 1 && grid.beams == 1) {
+  if (rows_per_shot == 1 && grid.interval_denominator == 1) {
     const std::int64_t step = grid.interval_numerator_ns;
     const std::int64_t last = saturating_sum(time_ns, std::int64_t{layout.records} * step);
     if (last < std::numeric_limits<std::int64_t>::max()) {
@@ -123,6 +131,9 @@ void set_shots(const RecordLayout& layout, std::int64_t time_ns, const ShotGrid&
         shot_time += step;
       }
       std::fill_n(at(o.beam), layout.rows(), std::uint8_t{0});
+      for (std::size_t row = 0; grid.beams > 1 && row < layout.rows(); ++row) {
+        o.beam[first_row + row] = static_cast<std::uint8_t>(row % grid.beams);
+      }
       std::fill_n(at(o.return_number), layout.rows(), std::uint8_t{1});
       return;
     }
@@ -144,30 +155,13 @@ std::optional<std::size_t> decode_points(const RecordLayout& layout, const std::
                                          Observations& o, std::size_t first_row) {
   if (layout.cartesian) {
     if (layout.tagged) {
-      decode_cartesian<true>(layout.rows(), bytes, o, first_row);
+      decode_cartesian<std::int32_t, true>(layout.rows(), bytes, kMillimetre, o, first_row);
     } else {
-      decode_cartesian<false>(layout.rows(), bytes, o, first_row);
+      decode_cartesian<std::int32_t, false>(layout.rows(), bytes, kMillimetre, o, first_row);
     }
     return std::nullopt;
   }
   return decode_spherical_records(layout, bytes, o, first_row);
-}
-
-/// Puts the rows of records where a chunk's columns have room for them already.
-/// @param float_points  of data type 0, in metres
-void put_records(const RecordLayout& layout, const std::uint8_t* bytes, bool float_points,
-                 std::int64_t time_ns, const ShotGrid& grid, std::uint8_t device,
-                 Observations& rows, std::size_t first_row) {
-  const std::optional<std::size_t> impossible =
-      float_points ? decode_float_points(layout.records, bytes, rows, first_row)
-                   : decode_points(layout, bytes, rows, first_row);
-  if (impossible) {
-    throw BadPacket(*impossible * layout.bytes_per_record,
-                    float_points ? "a point has a coordinate that is not a finite number"
-                                 : "a return has an angle outside zenith [0, 18000] or azimuth "
-                                   "[0, 36000] x 0.01 deg");
-  }
-  set_shots(layout, time_ns, grid, device, rows, first_row);
 }
 
 /// Gives columns room for more rows while a function fills them; takes it back where that throws.
@@ -194,6 +188,31 @@ void behind_header(Function&& function) {
 }
 
 }  // namespace
+
+void put_records(const RecordLayout& layout, const std::uint8_t* bytes, Coordinates coordinates,
+                 std::int64_t time_ns, const ShotGrid& grid, std::uint8_t device,
+                 Observations& rows, std::size_t first_row) {
+  std::optional<std::size_t> impossible;
+  switch (coordinates) {
+    case Coordinates::millimetres:
+      impossible = decode_points(layout, bytes, rows, first_row);
+      break;
+    case Coordinates::metres:
+      impossible = decode_float_points(layout.records, bytes, rows, first_row);
+      break;
+    case Coordinates::centimetres:
+      decode_cartesian<std::int16_t, true>(layout.records, bytes, kCentimetre, rows, first_row);
+      break;
+  }
+  if (impossible) {
+    throw BadPacket(*impossible * layout.bytes_per_record,
+                    coordinates == Coordinates::metres
+                        ? "a point has a coordinate that is not a finite number"
+                        : "a return has an angle outside zenith [0, 18000] or azimuth "
+                          "[0, 36000] x 0.01 deg");
+  }
+  set_shots(layout, time_ns, grid, device, rows, first_row);
+}
 
 BadPacket::BadPacket(std::size_t byte_offset, std::string problem)
     : Error(fmt::format("byte {} of a packet: {}", byte_offset, problem)),
@@ -250,8 +269,9 @@ void PacketDecoder::decode_into(std::span<const std::uint8_t> bytes, Chunk& chun
     }
     behind_header([&] {
       require_rows("rows", row, row + layout->rows(), chunk.observations.size());
-      put_records(*layout, records.data(), options_.float_points, *time_ns, *grid, options_.device,
-                  chunk.observations, row);
+      put_records(*layout, records.data(),
+                  options_.float_points ? Coordinates::metres : Coordinates::millimetres, *time_ns,
+                  *grid, options_.device, chunk.observations, row);
     });
   }
   chunk.packets.push_back(packet);
@@ -282,7 +302,8 @@ void decode_records(const RecordLayout& layout, std::span<const std::uint8_t> by
   check_grid(grid);
   require_bytes(bytes.size(), layout.bytes(), "records");
   with_more_rows(rows, layout.rows(), [&](std::size_t first_row) {
-    put_records(layout, bytes.data(), false, time_ns, grid, device, rows, first_row);
+    put_records(layout, bytes.data(), Coordinates::millimetres, time_ns, grid, device, rows,
+                first_row);
   });
 }
 

@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+// The command frame of Livox's second generation (Mid-360, HAP), and the lists of keys and values
+// that most of its commands carry. All numbers are little-endian.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "risley/wire/address.hpp"
+#include "risley/wire/frame.hpp"
+
+namespace risley::wire {
+
+/// Bytes in front of the data of a control frame.
+inline constexpr std::size_t kControlHeaderBytes = 24;
+
+/// Commands of the second generation.
+enum class ControlCommand : std::uint16_t {
+  search = 0x0000,         ///< who is there?
+  set = 0x0100,            ///< a list of keys and values
+  get = 0x0101,            ///< a list of keys; the reply has their values
+  push = 0x0102,           ///< a list that a sensor sends once a second
+  reboot = 0x0200,         ///< after a delay
+  factory_reset = 0x0201,  ///< all settings
+  gps_time = 0x0202,       ///< of the last PPS edge
+  log_data = 0x0300,       ///< a piece of a log
+  log_switch = 0x0301,     ///< logs on and off
+};
+
+/// A control frame without what only carries it.
+struct ControlFrame {
+  ControlCommand command = ControlCommand::search;
+  bool reply = false;
+  bool from_sensor = false;
+  std::uint32_t sequence = 0;          ///< a reply repeats that of its request
+  std::span<const std::uint8_t> data;  ///< of the bytes that were decoded, or are to be encoded
+};
+
+/// The bytes of a frame. @throws InvalidArgument for more data than a frame can carry
+std::vector<std::uint8_t> encode_control_frame(const ControlFrame& frame);
+
+/// The frame of a datagram, behind which bytes may stand. Needs no memory, whatever the bytes are.
+/// @return the frame, whose data are a part of the bytes, or why they are none
+std::variant<ControlFrame, FrameRefusal> decode_control_frame(std::span<const std::uint8_t> bytes);
+
+/// Keys of a sensor's settings and state.
+inline constexpr std::uint16_t kDataTypeKey = 0x0000,  ///< of points, 1 byte
+    kPushTargetKey = 0x0005,                           ///< HostTarget of pushes
+    kPointTargetKey = 0x0006,                          ///< HostTarget of points
+    kImuTargetKey = 0x0007,                            ///< HostTarget of inertial samples
+    kAttitudeKey = 0x0012,                             ///< of installation, 24 bytes
+    kViewKey = 0x0015,                                 ///< FieldOfView; that of the second follows
+    kViewSwitchKey = 0x0017,                           ///< bits 0 and 1: which views count
+    kTargetStateKey = 0x001A,                          ///< work state that is wanted, 1 byte
+    kImuSwitchKey = 0x001C,                            ///< inertial samples on, 1 byte
+    kSerialKey = 0x8000,                               ///< 16 characters
+    kFirmwareKey = 0x8002,                             ///< version, 4 bytes
+    kStateKey = 0x8006,                                ///< work state, 1 byte
+    kTemperatureKey = 0x8007,                          ///< of the core, 0.01 degrees Celsius
+    kSyncKey = 0x800C,                                 ///< 0 none, 1 PTP, 2 GPS
+    kFirmwareTypeKey = 0x8010;                         ///< 0 loader, 1 application
+
+/// One entry of a list.
+struct KeyValue {
+  std::uint16_t key = 0;
+  std::span<const std::uint8_t> value;
+};
+
+/// The list that a frame carries: those of set and push, and of the reply to get. Unknown keys are
+/// entries like others; a list that is cut off ends with its last whole entry. Empty for others.
+std::vector<KeyValue> list_of(const ControlFrame& frame);
+/// Data of a set or push with such a list.
+std::vector<std::uint8_t> encode_list(std::span<const KeyValue> list);
+/// Data of a get of these keys.
+std::vector<std::uint8_t> encode_keys(std::span<const std::uint16_t> keys);
+/// Data of the reply to a get. @param code  0 where it succeeded
+std::vector<std::uint8_t> encode_list_reply(std::uint8_t code, std::span<const KeyValue> list);
+
+/// What a sensor replies to a search.
+struct SearchReply {
+  std::uint8_t code = 0;         ///< 0 where it succeeded
+  std::uint8_t device_type = 0;  ///< as recordings::Device::type
+  std::string serial;
+  Address address;
+  std::uint16_t command_port = 0;
+  friend bool operator==(const SearchReply&, const SearchReply&) = default;
+};
+/// Empty for other frames.
+std::optional<SearchReply> search_reply_of(const ControlFrame& frame);
+/// Data of it.
+std::vector<std::uint8_t> encode_search_reply(const SearchReply& reply);
+
+/// Where a sensor is to send something.
+struct HostTarget {
+  Address address;
+  std::uint16_t host_port = 0, sensor_port = 0;
+  friend bool operator==(const HostTarget&, const HostTarget&) = default;
+};
+/// Value of a target's key.
+std::array<std::uint8_t, 8> encode_target(const HostTarget& target);
+
+/// A part of the directions in which a sensor measures, degrees: yaw 0 to 360, pitch -10 to 60.
+struct FieldOfView {
+  std::int32_t yaw_start_deg = 0, yaw_stop_deg = 0, pitch_start_deg = 0, pitch_stop_deg = 0;
+  friend bool operator==(const FieldOfView&, const FieldOfView&) = default;
+};
+/// Value of a view's key. @return empty for another length
+std::optional<FieldOfView> view_of(std::span<const std::uint8_t> value);
+/// The inverse.
+std::array<std::uint8_t, 20> encode_view(const FieldOfView& view);
+
+/// "13.18.2.44" of the value of kFirmwareKey; empty for another length.
+std::string version_text(std::span<const std::uint8_t> value);
+/// A work state in words: "sampling"; "state 12" for those that nobody described.
+std::string work_state_words(std::uint8_t state);
+
+}  // namespace risley::wire
