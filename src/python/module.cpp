@@ -24,6 +24,9 @@ PYBIND11_MODULE(_risley, module) {
   bind_recordings(module);
   bind_optics(module);
   bind_sensors(module);
+  bind_trajectories(module);
+  bind_rotors(module);
+  bind_points(module);
   bind_jobs(module);
   bind_network(module);
 }

@@ -56,10 +56,10 @@ jobs::RecordOptions record_options(const Options& options) {
   }
   options.take("imu", job.imu);
   options.take("output", job.output);
-  std::string optics;
+  jobs::GivenSensor optics;
   options.take("optics", optics);
   job.watch_optics = !optics.empty();
-  if (optics != "own") job.optics_reference = optics;
+  if (optics.path() != "own") job.optics_reference = optics;
   return job;
 }
 
