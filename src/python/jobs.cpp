@@ -104,6 +104,7 @@ py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const 
                              [](const Found& found) { return solution_of(found).sensor; });
   type.def_property_readonly("table", &table_with_covariance<Found>);
   type.def_property_readonly("html", [](const Found& found) { return html_of(json::of(found)); });
+  type.def_property_readonly("text", [](const Found& found) { return text_of(json::of(found)); });
   type.def("to_dict", [](const Found& found) { return dict_of(json::of(found)); });
   type.def(
       "report_text",
@@ -524,7 +525,8 @@ std::vector<std::pair<std::string, std::vector<std::string>>> settings_of(const 
   std::vector<std::pair<std::string, std::vector<std::string>>> settings;
   for (const auto& [name, value] : values) {
     if (py::str(name).equal(py::str("output"))) continue;
-    settings.push_back({py::str(name), {py::str(value)}});
+    const bool in_memory = py::hasattr(value, "to_text");  // whose repr does not tell its content
+    settings.push_back({py::str(name), {py::str(in_memory ? value.attr("to_text")() : value)}});
   }
   return settings;
 }

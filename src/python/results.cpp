@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "python/results.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -20,6 +22,20 @@ namespace {
 
 double number_of(const Json& object, const char* key) {
   return object.contains(key) && object[key].is_number() ? object[key].get<double>() : std::nan("");
+}
+
+using Row = std::array<std::string, 4>;
+
+/// Name, value, sigma and unit of everything in a table, in the units of files.
+std::vector<Row> rows_of(const ValueTable& table) {
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < table.names.size(); ++i) {
+    const FileUnit unit = file_unit(table.units[i]);
+    const NumberText text =
+        number_text(table.values[i] / unit.si_per_unit, table.sigmas[i] / unit.si_per_unit);
+    rows.push_back({table.file_names[i], text.value, text.sigma, unit.name});
+  }
+  return rows;
 }
 
 }  // namespace
@@ -52,20 +68,34 @@ ValueTable table_of(const Json& result) {
 
 std::string html_of(const Json& result) {
   const Json& verdict = result.at("verdict");
-  const ValueTable table = table_of(result);
   std::string html = fmt::format(
       "<p><b>{}</b>: {}</p><table><tr><th>parameter</th><th>value</th><th>&plusmn; sigma</th>"
       "<th>unit</th></tr>",
       verdict.at("code").get<std::string>(),
       report::escape_html(verdict.at("words").get<std::string>()));
-  for (std::size_t i = 0; i < table.names.size(); ++i) {
-    const FileUnit unit = file_unit(table.units[i]);
-    const NumberText text =
-        number_text(table.values[i] / unit.si_per_unit, table.sigmas[i] / unit.si_per_unit);
-    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-                        table.file_names[i], text.value, text.sigma, unit.name);
+  for (const Row& row : rows_of(table_of(result))) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>", row[0], row[1],
+                        row[2], row[3]);
   }
   return html + "</table>";
+}
+
+std::string text_of(const Json& result) {
+  const Json& verdict = result.at("verdict");
+  std::vector<Row> rows = rows_of(table_of(result));
+  rows.insert(rows.begin(), {"parameter", "value", "+- sigma", "unit"});
+  std::array<std::size_t, 4> width{};
+  for (const Row& row : rows) {
+    for (std::size_t i = 0; i < width.size(); ++i) width[i] = std::max(width[i], row[i].size());
+  }
+  std::string text = fmt::format("{}\nwhat to do: {}\n\n", verdict.at("words").get<std::string>(),
+                                 verdict.at("to_do").get<std::string>());
+  for (const Row& row : rows) {
+    text += fmt::format("{:<{}}  {:>{}}  {:>{}}  {:>{}}\n", row[0], width[0], row[1], width[1],
+                        row[2], width[2], row[3], width[3]);
+  }
+  text.pop_back();
+  return text;
 }
 
 }  // namespace risley::python

@@ -90,6 +90,7 @@ void bind_sensors(py::module_& module) {
       .def_readwrite("name", &Sensor::name, "Name of the preset.")
       .def_readonly("manufacturer", &Sensor::manufacturer, "Who makes it.")
       .def_readonly("model", &Sensor::model, "Commercial name.")
+      .def_readonly("device_type", &Sensor::device_type, "Livox number of its type.")
       .def_readwrite("serial", &Sensor::serial, "Serial number; empty for a type.")
       .def_property_readonly(
           "train", [](const Sensor& sensor) { return sensor.train; }, "A copy of its optics.")
