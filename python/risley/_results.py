@@ -338,7 +338,7 @@ class Estimate(Solution, _answers.Estimate):
     def __init__(self, found: _risley.EstimatedRecording) -> None:
         super().__init__(found)
         self._residuals: Optional[Tuple[Any, Any]] = None
-        self._motion = found.motion
+        self._motion: Optional[_risley.RotorMotion] = None
 
     def rotation_angles(self, time_ns: Any = None) -> RotationAngles:
         """Rotation angles of the prisms with their covariance.
@@ -353,16 +353,22 @@ class Estimate(Solution, _answers.Estimate):
         RotationAngles
             NaN at times from which no such shot is within 2 ms.
         """
+        motion = self._rotor_motion()
         if time_ns is None:
-            time_ns, found = self._motion.shot_time_ns, self._motion.at_shots()
-            outlier = self._motion.outlier
+            time_ns, found, outlier = motion.shot_time_ns, motion.at_shots(), motion.outlier
         else:
-            found, outlier = self._motion.at(time_ns), None
+            found, outlier = motion.at(time_ns), None
         return RotationAngles(time_ns, *found, outlier)
 
     def plot(self, axes: Any = None) -> Any:
         """Histograms of the residuals, as `Solution.plot`."""
         return _plots.residuals(self, axes)
+
+    def _rotor_motion(self) -> _risley.RotorMotion:
+        if self._motion is None:
+            assert isinstance(self._found, _risley.EstimatedRecording)
+            self._motion = self._found.motion
+        return self._motion
 
     def _both_residuals(self) -> Tuple[Any, Any]:
         if self._residuals is None:  # nobody asked before: they are as many as shots
@@ -381,6 +387,7 @@ class Estimate(Solution, _answers.Estimate):
         return self._both_residuals()[1]
 
     def __getstate__(self) -> Dict[str, Any]:
+        self._rotor_motion()
         self._both_residuals()  # gone with the C++ object, as what the page needs
         return super().__getstate__()
 
@@ -396,16 +403,17 @@ class FlightCalibration(Solution, _answers.FlightCalibration):
     ----------
     mount : Mount
         How the sensor sits on the platform, as found.
-    trajectory : Trajectory
-        Where the platform was, corrected.
+    corrected_trajectory : Trajectory
+        Where the platform was, as found.
     """
 
     def __init__(self, found: _risley.CalibratedFlight) -> None:
         super().__init__(found)
-        self.mount, self.trajectory = found.mount, found.trajectory
+        self.mount, self.corrected_trajectory = found.mount, found.trajectory
 
     def _as_option(self, name: str) -> Any:
-        return {"mount": self.mount, "trajectory": self.trajectory}.get(name, self.sensor)
+        return {"mount": self.mount,
+                "trajectory": self.corrected_trajectory}.get(name, self.sensor)
 
 
 class Plan(_Columns):

@@ -45,8 +45,11 @@ class Given {
   std::shared_ptr<const T> value_;
 };
 
+/// A preset by name, a preset or calibration file or its folder, or a sensor: see load_result().
 using GivenSensor = Given<sensors::Sensor>;
+/// A mount or its file: see mount_of().
 using GivenMount = Given<trajectories::Mount>;
+/// A trajectory or its file: see trajectory_of().
 using GivenTrajectory = Given<trajectories::Trajectory>;
 
 }  // namespace risley::jobs
