@@ -4,6 +4,8 @@
 import os
 from typing import Any, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union, overload
 
+import numpy as np
+
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._results import (Answer, Calibration, Cloud, Estimate, FlightCalibration, Identification,
@@ -432,7 +434,7 @@ def identify(recording: Source, *, output: Path = "", force: bool = False, most_
 
 @overload
 def pattern(sensor: AnySensor, *, start: float = 0.0, duration: float = 1.0,
-            dtype: str = "float64", rate: Optional[float] = None, every: int = 1,
+            dtype: Any = "float64", rate: Optional[float] = None, every: int = 1,
             firing: Optional[str] = None, start_angles: Optional[Sequence[float]] = None,
             start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
             progress: Progress = None) -> Scan: ...
@@ -444,7 +446,7 @@ def pattern(sensor: AnySensor, format: str, output: Path, *, duration: float = 1
             progress: Progress = None) -> Pattern: ...
 @suggesting
 def pattern(sensor: AnySensor, format: str = "", output: Path = "", *, start: float = 0.0,
-            duration: float = 1.0, dtype: str = "float64", rate: Optional[float] = None,
+            duration: float = 1.0, dtype: Any = "float64", rate: Optional[float] = None,
             every: int = 1, firing: Optional[str] = None,
             start_angles: Optional[Sequence[float]] = None,
             start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
@@ -463,7 +465,7 @@ def pattern(sensor: AnySensor, format: str = "", output: Path = "", *, start: fl
         Where the scan that is returned begins, s after the rotors' start.
     duration : float, default 1
         Length of the scan, s.
-    dtype : {'float64', 'float32'}
+    dtype : {'float64', 'float32'} or what numpy takes for them
         Precision of the directions that are returned. Single precision is right to 2e-6 rad, and
         several times as fast.
     rate : float, optional
@@ -489,6 +491,7 @@ def pattern(sensor: AnySensor, format: str = "", output: Path = "", *, start: fl
     FileError, ValueError
         For files that cannot be written, and for options that make no sense.
     """
+    dtype = np.dtype(dtype).name
     options = options_of(locals())
     with telling(progress) as tell:
         if not output:

@@ -254,9 +254,14 @@ class PointReader {
   /// Arrays and header of the next piece of at least so many points, but for the last one.
   py::tuple next() {
     if (!made_) throw py::stop_iteration();
-    run([&](const Progress&) {
-      while (more_ && keeper_.rows() < rows_) more_ = made_->next();
-    });
+    try {
+      run([&](const Progress&) {
+        while (more_ && keeper_.rows() < rows_) more_ = made_->next();
+      });
+    } catch (...) {
+      close();
+      throw;
+    }
     if (keeper_.rows() == 0) {
       result_ = told_of(made_->result());
       close();

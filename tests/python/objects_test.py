@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import risley
-from command import help_of
+from command import command_text, help_of
 
 DATA = pathlib.Path(os.environ["RISLEY_SOURCE_DIR"]) / "data"
 
@@ -231,6 +231,8 @@ def test_results_show_themselves(estimate, calibration, points, recording, folde
         assert one._repr_html_().startswith("<")
         assert pickle.loads(pickle.dumps(one)).summary() == one.summary()
     assert calibration.verdict.code in repr(calibration)
+    printed = command_text("estimate", folder / "hall.nc", "--rate-hz", 5000).splitlines()
+    assert set(str(risley.estimate(folder / "hall.nc", rate=5000)).splitlines()[2:]) <= set(printed)
     assert "prism_tilt_a_vertical_deg" in str(calibration) and calibration.verdict.words in calibration.summary()
     assert isinstance(compared, dict) and compared.pairs[0].differences
     pyplot = pytest.importorskip("matplotlib.pyplot")
