@@ -88,6 +88,7 @@ constexpr std::size_t kSquare[] = {cloud::kXX, cloud::kXY, cloud::kXZ, cloud::kX
 class PointArrays {
  public:
   void append(const Points& points) {
+    if (points.size() == 0) return;  // which does not tell columns that are not there
     std::size_t place = 0;
     for_each_entry_of_points(points, [&](const PointColumn& entry, const auto& numbers,
                                          const std::vector<py::ssize_t>& shape) {

@@ -243,7 +243,7 @@ SharedRecording recording_from_arrays(const py::object& time_ns, const py::objec
 }
 
 /// Some rows as a recording of their own. @param key  as numpy takes it of an array of all rows
-SharedRecording rows_of(const SharedRecording& recording, const py::object& key) {
+SharedRecording some_rows(const SharedRecording& recording, const py::object& key) {
   const Observations& all = recording->data.observations;
   const py::module_ numpy = py::module_::import("numpy");
   const py::object chosen = numpy.attr("arange")(all.size()).attr("__getitem__")(key);
@@ -351,7 +351,7 @@ void bind_recordings(py::module_& module) {
       "NaN.\n"
       "`read` and `read_chunks` make recordings of files, `from_arrays` of numbers.");
   type.def("__len__", [](const Recording& recording) { return recording.data.observations.size(); })
-      .def("__getitem__", &rows_of, py::arg("key"))
+      .def("__getitem__", &some_rows, py::arg("key"))
       .def_property_readonly("xyz", &xyz_of,
                              "Points in the sensor's frame, m, NaN where there is no return; shape "
                              "(rows, 3). A new array of float64.")

@@ -76,7 +76,7 @@ std::vector<T> column_of(const py::handle& array) {
   return {values.data(), values.data() + values.size()};
 }
 
-py::tuple state_of(const RotorMotion& motion) {
+py::tuple motion_state(const RotorMotion& motion) {
   const RotorTrajectory& t = motion.trajectory;
   return py::make_tuple(t.prisms, copy_of(t.time_ns), t.first_shot, t.last_shot, t.stretch_begin,
                         copy_of(t.state), copy_of(t.covariance), copy_of(motion.shot_time_ns),
@@ -133,7 +133,7 @@ void bind_rotors(py::module_& module) {
                 [&](std::size_t row) { return knot_near(motion.trajectory, times.data()[row]); });
           },
           py::arg("time_ns"))
-      .def(py::pickle(&state_of, &motion_from));
+      .def(py::pickle(&motion_state, &motion_from));
 }
 
 }  // namespace risley::python

@@ -35,7 +35,7 @@ std::vector<double> numbers_of(const std::array<StatedValue, 3>& stated,
 
 /// Vectors of Eigen, or quaternions, as an array [rows, numbers].
 template <class Row>
-py::array_t<double> rows_of(const std::vector<Row>& rows, py::ssize_t numbers) {
+py::array_t<double> array_of_rows(const std::vector<Row>& rows, py::ssize_t numbers) {
   py::array_t<double> array({static_cast<py::ssize_t>(rows.size()), numbers});
   double* to = array.mutable_data();
   for (const Row& row : rows) {
@@ -77,15 +77,15 @@ SharedTrajectory trajectory_from_arrays(const py::object& time_ns, const py::obj
 }
 
 /// What copies of a trajectory need: the text that keeps every digit does not keep how it was read.
-py::tuple state_of(const Trajectory& t) {
+py::tuple trajectory_state(const Trajectory& t) {
   py::list accuracy;
   for (const trajectories::PoseAccuracy& one : t.accuracy) {
     accuracy.append(py::make_tuple(one.position[0], one.position[1], one.position[2], one.roll,
                                    one.pitch, one.heading));
   }
   return py::make_tuple(t.format, t.source, static_cast<int>(t.time_scale), t.gps_week,
-                        static_cast<int>(t.frame), t.time_ns, rows_of(t.position, 3),
-                        rows_of(t.attitude, 4), rows_of(t.velocity, 3), accuracy);
+                        static_cast<int>(t.frame), t.time_ns, array_of_rows(t.position, 3),
+                        array_of_rows(t.attitude, 4), array_of_rows(t.velocity, 3), accuracy);
 }
 
 SharedTrajectory trajectory_from(const py::tuple& state) {
@@ -214,13 +214,13 @@ void bind_trajectories(py::module_& module) {
           },
           "Times, ns; shape (rows,).")
       .def_property_readonly(
-          "position", [](const Trajectory& t) { return rows_of(t.position, 3); },
+          "position", [](const Trajectory& t) { return array_of_rows(t.position, 3); },
           "Of the reference point, in the frame, m; shape (rows, 3).")
       .def_property_readonly(
-          "attitude", [](const Trajectory& t) { return rows_of(t.attitude, 4); },
+          "attitude", [](const Trajectory& t) { return array_of_rows(t.attitude, 4); },
           "Quaternions w, x, y, z from the body to the frame; shape (rows, 4).")
       .def_property_readonly(
-          "velocity", [](const Trajectory& t) { return rows_of(t.velocity, 3); },
+          "velocity", [](const Trajectory& t) { return array_of_rows(t.velocity, 3); },
           "Along the axes of the frame, m/s; shape (rows, 3), or (0, 3) without velocities.")
       .def(
           "write",
@@ -237,7 +237,7 @@ void bind_trajectories(py::module_& module) {
                                 t.format.empty() ? to_string(t.frame) : t.format, t.size(),
                                 1e-9 * static_cast<double>(t.time_ns.back() - t.time_ns.front()));
            })
-      .def(py::pickle(&state_of, &trajectory_from));
+      .def(py::pickle(&trajectory_state, &trajectory_from));
   module.def(
       "load_trajectory",
       [](const std::string& path, const std::string& topic, const py::object& tell) {
