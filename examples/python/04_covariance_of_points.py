@@ -65,5 +65,5 @@ for n, axis in enumerate("XYZ"):
 # %%
 if pyplot:
     figure, axes = pyplot.subplots(figsize=(6, 3), layout="constrained")
-    points[::20].plot(axes)
+    points[::60].plot(axes)
     figure.savefig(folder / "cloud.png", dpi=80)

@@ -10,6 +10,10 @@ from risley._units import (AnyMount, AnySensor, AnyTrajectory, Path, Rate, Sourc
                            keyword_defaults, options_of, suggesting, unknown_keyword)
 
 
+_NOT_ALWAYS = ("covariance", "own_covariance", "loading", "rotation_angle", "azimuth_residual",
+               "zenith_residual", "strip")
+
+
 class Points(_Shown):
     """Points with their covariance, as arrays of which each point has a row.
 
@@ -51,25 +55,25 @@ class Points(_Shown):
 
     xyz: Any
     time_ns: Any
-    covariance: Any = None
-    own_covariance: Any = None
-    loading: Any = None
+    covariance: Any
+    own_covariance: Any
+    loading: Any
     range: Any
     incidence_angle: Any
-    rotation_angle: Any = None
-    azimuth_residual: Any = None
-    zenith_residual: Any = None
+    rotation_angle: Any
+    azimuth_residual: Any
+    zenith_residual: Any
     intensity: Any
     return_number: Any
     number_of_returns: Any
     tag: Any
     emitter: Any
-    strip: Any = None
+    strip: Any
 
     def __init__(self, arrays: Mapping[str, Any], frame: str, wkt: str, axes: Sequence[str],
                  found: Optional[Answer] = None) -> None:
         self._arrays = dict(arrays)
-        self.__dict__.update(self._arrays)
+        self.__dict__.update({**dict.fromkeys(_NOT_ALWAYS), **self._arrays})
         self.frame, self.wkt, self.axes, self.found = frame, wkt, list(axes), found
 
     @property

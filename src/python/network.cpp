@@ -147,9 +147,9 @@ void bind_network(py::module_& module) {
                                "Give it as ``stop`` and call `set`; it cannot be used again.")
       .def(py::init<>())
       .def("set", &CancelFlag::set,
-           RISLEY_SIGNED("set($self)") "End what was given this, within a second.")
+           RISLEY_SIGNED("set(self)") "End what was given this, within a second.")
       .def("is_set", &CancelFlag::is_set,
-           RISLEY_SIGNED("is_set($self)") "Whether `set` was called.");
+           RISLEY_SIGNED("is_set(self)") "Whether `set` was called.");
   const auto options = py::arg("options");
   const auto note = py::arg("note");
   const auto stop = py::arg("stop").none(true);

@@ -115,13 +115,13 @@ void bind_mount(py::module_& module) {
           [](const std::string& text) { return trajectories::parse_mount(text, "the text"); },
           py::arg("text"), RISLEY_SIGNED("from_text(text)") "A mount from the text of its file (YAML).")
       .def("to_text", &trajectories::mount_text,
-           RISLEY_SIGNED("to_text($self)") "The text of its file (YAML), which `from_text` reads with every digit.")
+           RISLEY_SIGNED("to_text(self)") "The text of its file (YAML), which `from_text` reads with every digit.")
       .def(
           "write",
           [](const Mount& mount, const std::filesystem::path& path) {
             io::write_text_file(path.string(), trajectories::mount_text(mount));
           },
-          py::arg("path"), RISLEY_SIGNED("write($self, path)") "Writes its file.")
+          py::arg("path"), RISLEY_SIGNED("write(self, path)") "Writes its file.")
       .def_readonly("name", &Mount::name, "Name of the platform or the flight.")
       .def_property_readonly(
           "nominal", [](const Mount& mount) { return array_of(Eigen::MatrixXd(mount.nominal)); },
@@ -229,7 +229,7 @@ void bind_trajectories(py::module_& module) {
                 [&] { return trajectories::write_trajectory(path.string(), t, format); });
           },
           py::arg("path"), py::arg("format") = "",
-          RISLEY_SIGNED("write($self, path, format='')") "Writes it; the ending chooses the format unless `format` does.\n\nReturns what the "
+          RISLEY_SIGNED("write(self, path, format='')") "Writes it; the ending chooses the format unless `format` does.\n\nReturns what the "
           "format has no place for, in words.")
       .def("__repr__",
            [](const Trajectory& t) {
