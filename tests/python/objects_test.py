@@ -209,7 +209,7 @@ def test_unknown_keywords_have_a_suggestion(recording):
 def test_every_option_of_the_command_is_a_keyword():
     """Under its own name, without the unit that it ends in."""
     of_the_command = {"help", "json", "quiet", "verbose", "report", "no-report", "plan", "list", "resume", "table",
-                      "every-device", "coverage", "integration-s", "cell-deg", "beam-origin-map"}
+                      "every-device", "coverage", "integration-s", "cell-deg", "beam-origin-map", "share", "share-ranges"}
     for verb in ("estimate", "calibrate", "cloud", "simulate", "identify", "pattern", "observability", "compare",
                  "campaign", "info"):
         options = set(re.findall(r"^ +(?:-\w,)?--([a-z-]+)", help_of(verb), re.MULTILINE)) - of_the_command
@@ -218,6 +218,8 @@ def test_every_option_of_the_command_is_a_keyword():
             keywords |= set(inspect.signature(risley.plan).parameters)
         names = {re.sub("^no-|-(deg|hz|m|s|ppm)$", "", option).replace("-", "_") for option in options}
         of_a_run = {"threads", "seed", "resume", "table", "list"}  # every verb takes them
+        if verb == "compare":
+            of_a_run.add("output")  # a page
         assert names - of_a_run <= keywords, verb
 
 
