@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <memory>
 #include <new>
@@ -13,6 +15,7 @@
 
 #include <nlohmann/json.hpp>
 #include <pybind11/stl.h>
+#include <sys/mman.h>
 
 #include "risley/jobs/cloud_of_recording.hpp"
 #include "risley/json/results.hpp"
@@ -40,6 +43,7 @@ class GrowingMemory {
       if (grown == nullptr) throw std::bad_alloc();
       static_cast<void>(memory_.release());
       memory_.reset(static_cast<std::byte*>(grown));
+      ask_for_large_pages();
     }
     std::byte* end = memory_.get() + used_;
     used_ += more;
@@ -55,6 +59,15 @@ class GrowingMemory {
   }
 
  private:
+  /// Small pages take the system as long to give as points to compute; it may refuse.
+  void ask_for_large_pages() {
+    constexpr std::uintptr_t kPage = 4096, kLarge = std::uintptr_t{1} << 22;
+    if (capacity_ < kLarge) return;
+    const auto begin = (reinterpret_cast<std::uintptr_t>(memory_.get()) + kPage - 1) & ~(kPage - 1);
+    const auto end = reinterpret_cast<std::uintptr_t>(memory_.get()) + capacity_;
+    static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
+  }
+
   static constexpr std::size_t kLeast = 1;
   struct Free {
     void operator()(std::byte* memory) const { std::free(memory); }
