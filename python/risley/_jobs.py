@@ -8,8 +8,8 @@ import numpy as np
 
 from risley import _risley
 from risley._progress import Progress, telling
-from risley._results import (Answer, Calibration, Cloud, Estimate, FlightCalibration, Identification,
-                             Pattern, Plan, Scan, Simulation)
+from risley._results import (Answer, Calibration, Cloud, Estimate, FlightCalibration,
+                             Identification, Pattern, Plan, Scan, Simulation)
 from risley._units import (AnyMount, AnySensor, AnyTrajectory, Fixed, Path, Rate, Source, Truth,
                            YawPitchRoll, listed, options_of, suggesting)
 
@@ -78,10 +78,10 @@ def estimate(recording: Source, *, sensor: AnySensor = "", output: Path = "", me
 
 
 @suggesting
-def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: AnySensor = "", output: Path = "",
-              method: str = "adjustment", planes: Path = "", stations: Path = "",
-              station: Sequence[str] = (), trajectory: AnyTrajectory = "", trajectory_topic: str = "",
-              mount: AnyMount = "", accuracy: Path = "", trajectory_errors: Path = "",
+def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: AnySensor = "",
+              output: Path = "", method: str = "adjustment", planes: Path = "", stations: Path = "",
+              station: Sequence[str] = (), trajectory: AnyTrajectory = "",
+              trajectory_topic: str = "", mount: AnyMount = "", accuracy: Path = "", trajectory_errors: Path = "",
               control: Path = "", knot_spacing: Optional[float] = None,
               cell_size: Optional[float] = None, rate: Rate = None,
               noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
@@ -534,8 +534,8 @@ def coverage(sensor: AnySensor, *, after: Optional[Sequence[float]] = None,
 
 
 @suggesting
-def observability(recording: Source = "", *, sensor: AnySensor = "", duration: Optional[float] = None,
-                  rate: Rate = None, noise_angle: Optional[float] = None,
+def observability(recording: Source = "", *, sensor: AnySensor = "",
+                  duration: Optional[float] = None, rate: Rate = None, noise_angle: Optional[float] = None,
                   noise_angle_deg: Optional[float] = None, rounding: bool = True,
                   fix: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
                   extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from risley import _answers
 else:  # what attributes results have is known from their JSON alone
     class _answers:
-        Estimate = Calibration = FlightCalibration = Cloud = Simulation = Identification = Pattern = object
+        Estimate = Calibration = FlightCalibration = Cloud = object
+        Simulation = Identification = Pattern = object
 
 Found = Union[_risley.EstimatedRecording, _risley.CalibratedRecordings, _risley.CalibratedFlight]
 Planned = Union[_risley.PlannedCalibration, _risley.PlannedFlight]

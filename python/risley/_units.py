@@ -62,7 +62,7 @@ def unknown_keyword(function: str, name: str, known: Iterable[str]) -> str:
 
 
 def plain(name: str, value: Any) -> Any:
-    """What the libraries take for an option: a path as text, a result as what it stands for there."""
+    """What the libraries take for an option: a path as text, for a result what it stands for."""
     if hasattr(value, "_as_option"):
         value = value._as_option(name)
     return os.fspath(value) if isinstance(value, os.PathLike) else value

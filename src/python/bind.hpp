@@ -10,9 +10,6 @@ namespace risley::python {
 
 namespace py = pybind11;
 
-/// The begin of a method's documentation: what help() and inspect show as its signature.
-#define RISLEY_SIGNED(signature) signature "\n--\n\n"
-
 void bind_errors(py::module_& module);
 void bind_calls(py::module_& module);
 void bind_recordings(py::module_& module);

@@ -323,7 +323,7 @@ void bind_points(py::module_& module) {
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &PointReader::next)
       .def("close", &PointReader::close,
-           RISLEY_SIGNED("close(self)") "Closes the recording; there are no further points.")
+           "close(self)\n--\n\nCloses the recording; there are no further points.")
       .def_property_readonly("result", &PointReader::result,
                              "What is known of all points, behind the last of them.");
   module.def("points", &points, py::arg("options"), py::arg("threads"), py::arg("tell"));

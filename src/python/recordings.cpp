@@ -360,13 +360,13 @@ void bind_recordings(py::module_& module) {
           [](const py::object& self) {
             return py::module_::import("risley._recordings").attr("to_xarray")(self);
           },
-          RISLEY_SIGNED("to_xarray(self)") "All columns as an `xarray.Dataset` over ``row``.")
+          "to_xarray(self)\n--\n\nAll columns as an `xarray.Dataset` over ``row``.")
       .def(
           "to_pandas",
           [](const py::object& self) {
             return py::module_::import("risley._recordings").attr("to_pandas")(self);
           },
-          RISLEY_SIGNED("to_pandas(self)") "All columns as a `pandas.DataFrame`.")
+          "to_pandas(self)\n--\n\nAll columns as a `pandas.DataFrame`.")
       .def("__reduce__",
            [](const py::object& self) {
              return py::module_::import("risley._recordings").attr("reduced")(self);
@@ -396,7 +396,7 @@ void bind_recordings(py::module_& module) {
       .def("__enter__", [](py::object self) { return self; })
       .def("__exit__", [](ChunkReader& self, const py::args&) { self.close(); })
       .def("close", &ChunkReader::close,
-           RISLEY_SIGNED("close(self)") "Closes the file; there are no further pieces.")
+           "close(self)\n--\n\nCloses the file; there are no further pieces.")
       .def_property_readonly("header", &ChunkReader::header,
                              "What is known of the whole recording.")
       .def_property_readonly(

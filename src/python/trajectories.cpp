@@ -113,15 +113,16 @@ void bind_mount(py::module_& module) {
       .def_static(
           "from_text",
           [](const std::string& text) { return trajectories::parse_mount(text, "the text"); },
-          py::arg("text"), RISLEY_SIGNED("from_text(text)") "A mount from the text of its file (YAML).")
+          py::arg("text"), "from_text(text)\n--\n\nA mount from the text of its file (YAML).")
       .def("to_text", &trajectories::mount_text,
-           RISLEY_SIGNED("to_text(self)") "The text of its file (YAML), which `from_text` reads with every digit.")
+           "to_text(self)\n--\n\nThe text of its file (YAML), which `from_text` reads with every "
+           "digit.")
       .def(
           "write",
           [](const Mount& mount, const std::filesystem::path& path) {
             io::write_text_file(path.string(), trajectories::mount_text(mount));
           },
-          py::arg("path"), RISLEY_SIGNED("write(self, path)") "Writes its file.")
+          py::arg("path"), "write(self, path)\n--\n\nWrites its file.")
       .def_readonly("name", &Mount::name, "Name of the platform or the flight.")
       .def_property_readonly(
           "nominal", [](const Mount& mount) { return array_of(Eigen::MatrixXd(mount.nominal)); },
@@ -194,7 +195,8 @@ void bind_trajectories(py::module_& module) {
       .def_static(
           "from_arrays", &trajectory_from_arrays, py::arg("time_ns"), py::arg("position"),
           py::arg("attitude"),
-          RISLEY_SIGNED("from_arrays(time_ns, position, attitude)") "Poses on a map of their own: x east, y north, z up.\n\n"
+          "from_arrays(time_ns, position, attitude)\n--\n\nPoses on a map of their own: x east, y "
+          "north, z up.\n\n"
           "Parameters\n----------\ntime_ns : array_like of int, shape (rows,)\n    Ascending "
           "times, ns.\nposition : array_like, shape (rows, 3)\n    Of the reference point, "
           "m.\nattitude : array_like, shape (rows, 4)\n    Quaternions w, x, y, z from the "
@@ -229,7 +231,8 @@ void bind_trajectories(py::module_& module) {
                 [&] { return trajectories::write_trajectory(path.string(), t, format); });
           },
           py::arg("path"), py::arg("format") = "",
-          RISLEY_SIGNED("write(self, path, format='')") "Writes it; the ending chooses the format unless `format` does.\n\nReturns what the "
+          "write(self, path, format='')\n--\n\nWrites it; the ending chooses the format unless "
+          "`format` does.\n\nReturns what the "
           "format has no place for, in words.")
       .def("__repr__",
            [](const Trajectory& t) {
