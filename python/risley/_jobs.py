@@ -81,8 +81,8 @@ def estimate(recording: Source, *, sensor: AnySensor = "", output: Path = "", me
 def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: AnySensor = "",
               output: Path = "", method: str = "adjustment", planes: Path = "", stations: Path = "",
               station: Sequence[str] = (), trajectory: AnyTrajectory = "",
-              trajectory_topic: str = "", mount: AnyMount = "", accuracy: Path = "", trajectory_errors: Path = "",
-              control: Path = "", knot_spacing: Optional[float] = None,
+              trajectory_topic: str = "", mount: AnyMount = "", accuracy: Path = "",
+              trajectory_errors: Path = "", control: Path = "", knot_spacing: Optional[float] = None,
               cell_size: Optional[float] = None, rate: Rate = None,
               noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
               noise_range: Optional[float] = None, prior_sigma: Optional[float] = None,
@@ -535,8 +535,8 @@ def coverage(sensor: AnySensor, *, after: Optional[Sequence[float]] = None,
 
 @suggesting
 def observability(recording: Source = "", *, sensor: AnySensor = "",
-                  duration: Optional[float] = None, rate: Rate = None, noise_angle: Optional[float] = None,
-                  noise_angle_deg: Optional[float] = None, rounding: bool = True,
+                  duration: Optional[float] = None, rate: Rate = None,
+                  noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None, rounding: bool = True,
                   fix: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
                   extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
                   device: str = "", threads: int = 0, progress: Progress = None) -> Answer:

@@ -118,7 +118,7 @@ class Points(_Shown):
             for name, array in self._arrays.items()})
 
     def to_pandas(self) -> Any:
-        """A `pandas.DataFrame` of the coordinates and of the arrays of one number for each point."""
+        """A `pandas.DataFrame` of the coordinates and of all arrays of one number a point."""
         columns = {name: array for name, array in self._arrays.items() if array.ndim == 1}
         return needed("pandas", "to_pandas()").DataFrame(
             {**dict(zip("xyz", self.xyz.T)), **columns})

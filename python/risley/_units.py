@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Arguments of jobs: recordings, files, and angles in SI units or, under another name, in degrees."""
+"""Arguments of jobs: objects, files, and angles in SI units or, under another name, in degrees."""
 import difflib
 import functools
 import inspect
