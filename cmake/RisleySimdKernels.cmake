@@ -93,6 +93,7 @@ target_compile_definitions(risley_core PRIVATE ${RISLEY_HELD_SETS})
 
 risley_add_kernels(optics)
 risley_add_kernels(recordings)
+risley_add_kernels(sensors)
 risley_add_kernels(estimation)
 risley_add_kernels(calibration)
 risley_add_kernels(cloud)

@@ -34,33 +34,28 @@ folder.mkdir(parents=True, exist_ok=True)
 # %%
 recording = options.recording
 if not recording:
-    recording = folder / "unit.nc"
-    made = risley.simulate(recording, sensor="mid-40-table3", duration=1.0, seed=1)
-    print(f"{made.observations} shots simulated")
+    recording = risley.simulate(folder / "unit.nc", sensor="mid-40-table3", duration=1.0, seed=1)
+    print(f"{recording.observations} shots simulated")
 
 # %% [markdown]
-# The estimate. `sigma` is one standard deviation of everything that may be off; `given held` leaves out what the
-# parameters that no recording determines, such as the wedge angles, may be off by.
+# The estimate. The sigma is one standard deviation of everything that may be off, with what the parameters that no
+# recording determines, such as the wedge angles, may be off by.
 
 # %%
 result = risley.estimate(recording)
-print(f"{'parameter':27}{'value':>15}{'sigma':>11}{'given held':>12}  unit")
-for name, value, sigma, given_held, unit in zip(result.names, result.values, result.sigmas,
-                                                result.sigmas_given_held, result.units):
-    scale = np.degrees(1) if unit.startswith("rad") else 1
-    print(f"{name:27}{scale * value:15.5f}{scale * sigma:11.5f}{scale * given_held:12.6f}  "
-          f"{unit.replace('rad', 'deg')}")
-
-# %% [markdown]
-# The verdict says what was found and what to do next. The calibration can be given as `sensor` to every job.
-
-# %%
-print(result.verdict.words)
-print("what to do:", result.verdict.to_do)
+print(result)
 if not result.converged:
     sys.exit(f"the numbers cannot be used: {result.reason}")
+
+# %% [markdown]
+# The result can be given as `sensor` to every job, and as a file to the command. It knows where the prisms stood at
+# every shot, and how well.
+
+# %%
 result.sensor.write(folder / "calibration.yaml")
 print("written:", folder / "calibration.yaml")
+angles = result.rotation_angles()
+print(f"rotation angles of {len(angles.time_ns)} shots, sigma {np.degrees(np.median(angles.sigma)):.5f} degree")
 
 # %% [markdown]
 # What is left is noise and the rounding of the sensor's angles; anything else would show as a wider or lopsided hill.
@@ -68,8 +63,5 @@ print("written:", folder / "calibration.yaml")
 # %%
 if pyplot:
     figure, axes = pyplot.subplots(figsize=(5, 3), layout="constrained")
-    for name, residual in (("azimuth", result.azimuth_residual), ("zenith", result.zenith_residual)):
-        axes.hist(1000 * np.degrees(residual), bins=60, range=(-20, 20), histtype="step", label=name)
-    axes.set(xlabel="observed less estimated, 0.001 degree", ylabel="shots")
-    axes.legend()
+    result.plot(axes)
     figure.savefig(folder / "residuals.png", dpi=90)

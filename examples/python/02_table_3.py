@@ -32,10 +32,9 @@ folder = Path(options.folder or tempfile.mkdtemp(prefix="risley-"))
 folder.mkdir(parents=True, exist_ok=True)
 
 # %%
-recording = folder / "table-3.nc"
 plan = {"sensor": "mid-40-table3", "duration": 30.0, "rate": 1000.0, "noise_angle_deg": options.noise}
-risley.simulate(recording, seed=1, **plan)
-result = risley.estimate(recording, truth=f"{recording}.truth.yaml")
+recording = risley.simulate(folder / "table-3.nc", seed=1, **plan)
+result = risley.estimate(recording, truth=recording)
 if not result.converged:
     sys.exit(f"the numbers cannot be used: {result.reason}")
 

@@ -31,21 +31,18 @@ folder.mkdir(parents=True, exist_ok=True)
 
 # %%
 unit = {"sensor": "mid-40-table3", "scene": options.scene, "duration": 2.0}
-risley.simulate(folder / "bent.lvx", reported_nominal=True, seed=1, **unit)
-found = risley.calibrate(folder / "bent.lvx", truth=folder / "bent.lvx.truth.yaml", output=folder / "calibration")
-print("before:", found.verdict.code)
-print(found.verdict.words)
-print("what to do:", found.verdict.to_do)
+bent = risley.simulate(folder / "bent.lvx", reported_nominal=True, seed=1, **unit)
+found = risley.calibrate(bent, truth=bent, output=folder / "calibration")
+print("before:", found)
 
 # %% [markdown]
 # The same hall with the same unit after somebody has told it its calibration: now the walls confirm what it believes.
 
 # %%
 calibrated = {name: one["value"] for name, one in found.to_dict()["parameters"].items()}
-risley.simulate(folder / "told.lvx", reported=calibrated, seed=2, **unit)
-again = risley.calibrate(folder / "told.lvx", truth=folder / "told.lvx.truth.yaml")
-print("after:", again.verdict.code)
-print(again.verdict.words)
+told = risley.simulate(folder / "told.lvx", reported=calibrated, seed=2, **unit)
+again = risley.calibrate(told, truth=told)
+print("after:", again.summary())
 if found.verdict.code != "bent" or again.verdict.code != "as_believed":
     sys.exit("these are not the verdicts that a bent unit should get")
 

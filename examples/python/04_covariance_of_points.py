@@ -24,7 +24,7 @@ except ImportError:  # there are no pictures then
     pyplot = None
 
 here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
-parser = argparse.ArgumentParser(description="Reads the covariance of points from a cloud.")
+parser = argparse.ArgumentParser(description="Shows the covariance of points.")
 parser.add_argument("scene", nargs="?", default=here / "../../data/hall.yaml", help="walls (data/hall.yaml)")
 parser.add_argument("--folder", help="for the results; otherwise a temporary one")
 options = parser.parse_args([] if "ipykernel" in sys.modules else None)
@@ -36,43 +36,34 @@ folder.mkdir(parents=True, exist_ok=True)
 # deviation of each error of the calibration moves it by.
 
 # %%
-hall, calibration = folder / "hall.lvx", folder / "calibration"
-risley.simulate(hall, sensor="mid-40-table3", reported_nominal=True, scene=options.scene, duration=1.0, seed=1)
-risley.calibrate(hall, output=calibration)
-made = risley.cloud(hall, calibration / "calibration.yaml", folder / "hall.npy", common_factors=True)
-factors = made.to_dict()["common_factors"]
-print(f"{made.points} points, {len(factors)} common factors")
+hall = risley.simulate(folder / "hall.lvx", sensor="mid-40-table3", reported_nominal=True, scene=options.scene,
+                       duration=1.0, seed=1)
+points = risley.points(hall, risley.calibrate(hall), common_factors=True)
+print(f"{len(points)} points, {points.loading.shape[1]} common factors")
 
 # %% [markdown]
-# The file is a NumPy array with named fields. The total sigma of a point is the root of the sum of its variances.
+# The total sigma of a point is the root of the sum of its variances.
 
 # %%
-points = np.load(folder / "hall.npy")
-total = np.sqrt(points["VarianceX"] + points["VarianceY"] + points["VarianceZ"])
 for low, high in ((1, 5), (5, 10), (10, 20), (20, 35)):
-    some = total[(points["LidarRange"] >= low) & (points["LidarRange"] < high)]
+    some = points.sigma[(points.range >= low) & (points.range < high)]
     print(f"{low:2} to {high:2} m: total sigma {1000 * np.median(some):.1f} mm, {len(some)} points")
 
 # %% [markdown]
 # A point on the end wall and the next shot: their covariance is the sum of the products of their loadings.
 
 # %%
-first = int(np.argmax((points["X"] > 29.5) & (abs(points["Z"]) < 1)))
-a, b = points[first], points[first + 1]
-loadings = [np.array([[p[f"Loading{n}{axis}"] for n in range(1, len(factors) + 1)] for axis in "XYZ"], float)
-            for p in (a, b)]
-shared = loadings[0] @ loadings[1].T
-print(f"{1000 * np.linalg.norm([a[axis] - b[axis] for axis in 'XYZ']):.0f} mm apart")
+a = int(np.argmax((points.xyz[:, 0] > 29.5) & (abs(points.xyz[:, 2]) < 1)))
+b = a + 1
+shared = points.loading[a].T @ points.loading[b]
+sigma = [np.sqrt(points.covariance[i].diagonal()) for i in (a, b)]
+print(f"{1000 * np.linalg.norm(points.xyz[a] - points.xyz[b]):.0f} mm apart")
 for n, axis in enumerate("XYZ"):
-    correlation = shared[n, n] / (a[f"Std{axis}"] * b[f"Std{axis}"])
-    print(f"{axis}: sigma {1000 * a[f'Std{axis}']:.2f} mm, of it shared {1000 * np.sqrt(shared[n, n]):.3f} mm, "
-          f"correlation {correlation:.4f}")
+    print(f"{axis}: sigma {1000 * sigma[0][n]:.2f} mm, of it shared {1000 * np.sqrt(shared[n, n]):.3f} mm, "
+          f"correlation {shared[n, n] / (sigma[0][n] * sigma[1][n]):.4f}")
 
 # %%
 if pyplot:
-    some = points[::50]
     figure, axes = pyplot.subplots(figsize=(6, 3), layout="constrained")
-    dots = axes.scatter(some["X"], some["Y"], c=1000 * total[::50], s=2)
-    figure.colorbar(dots, label="total sigma, mm")
-    axes.set(xlabel="ahead, m", ylabel="left, m", aspect="equal")
+    points[::60].plot(axes)
     figure.savefig(folder / "cloud.png", dpi=80)

@@ -3,8 +3,8 @@
 # %% [markdown]
 # # A scan pattern for a simulator
 #
-# Where an Avia sends its shots, as pairs of azimuth and elevation for a simulator that has walls of its own, and how
-# much of the field of view they have met after a tenth of a second, half a second and a second.
+# Where an Avia sends its shots, as unit vectors for a simulator that has walls of its own and as a file, and how much
+# of the field of view they have met after a tenth of a second, half a second and a second.
 #
 #     python3 05_pattern_for_a_simulator.py [SENSOR] [--folder FOLDER]
 
@@ -31,12 +31,15 @@ folder = Path(options.folder or tempfile.mkdtemp(prefix="risley-"))
 folder.mkdir(parents=True, exist_ok=True)
 
 # %% [markdown]
-# `livox-csv`, `helios-xml`, `json` and `usda` are further formats.
+# The rays of a second, as torch or jax take them, too; `livox-csv`, `npy`, `helios-xml`, `json` and `usda` are formats
+# of files.
 
 # %%
-made = risley.pattern(options.sensor, "npy", folder / "pattern.npy", duration=1.0)
-azimuth, elevation = np.degrees(np.load(folder / "pattern.npy")).T
-print(f"{made.rows} shots, azimuth {azimuth.min():.2f} to {azimuth.max():.2f} degree, "
+scan = risley.pattern(options.sensor, duration=1.0, dtype="float32")
+risley.pattern(options.sensor, "livox-csv", folder / "pattern.csv", duration=1.0)
+x, y, z = scan.directions.T
+azimuth, elevation = np.degrees(np.arctan2(y, x)), np.degrees(np.arcsin(z))
+print(f"{len(scan)} shots, azimuth {azimuth.min():.2f} to {azimuth.max():.2f} degree, "
       f"elevation {elevation.min():.2f} to {elevation.max():.2f} degree")
 
 # %% [markdown]
@@ -51,9 +54,6 @@ for one in risley.coverage(options.sensor, after=[0.1, 0.5, 1.0])["after"]:
 if pyplot:
     figure, axes = pyplot.subplots(1, 2, figsize=(7, 3.6), sharey=True, layout="constrained")
     for one, seconds in zip(axes, (0.02, 0.1)):
-        shots = int(seconds * len(azimuth))
-        one.plot(azimuth[:shots], elevation[:shots], ",")
-        one.set(title=f"{seconds:g} s", xlabel="azimuth, degree", aspect="equal")
-        one.invert_xaxis()  # left is left
-    axes[0].set_ylabel("elevation, degree")
+        risley.pattern(options.sensor, duration=seconds).plot(one)
+        one.set(title=f"{seconds:g} s")
     figure.savefig(folder / "pattern.png", dpi=90)

@@ -15,22 +15,25 @@ from risley._many import (ManyResults, calibrate_many, cloud_many, convert_many,
 from risley._network import emulate, find_sensors, record
 from risley._optics import (Directions, Inverse, Linearisation, Rays, invert, linearise, observe,
                             rays)
+from risley._points import Points, point_chunks, points
 from risley._recordings import from_arrays, read, read_chunks, write
-from risley._results import (Calibration, Cloud, Estimate, FlightCalibration, Identification,
-                             Pattern, Plan, Simulation, Solution, Verdict, Warning)
+from risley._results import (Answer, Calibration, Cloud, Estimate, FlightCalibration,
+                             Identification, Pattern, Plan, RotationAngles, Scan, Simulation,
+                             Solution, Verdict, Warning)
 from risley._risley import (Cancelled, ChunkReader, Device, EstimationError, FileError,
-                            MissingFileError, NetworkError, PrismTrain, Recording,
-                            RecordingHeader, Sensor, Stop, __version__)
-from risley._sensors import load_sensor, presets
+                            MissingFileError, Mount, NetworkError, PrismTrain, Recording,
+                            RecordingHeader, Sensor, Stop, Trajectory, __version__)
+from risley._sensors import load_mount, load_sensor, load_trajectory, presets
 
 __all__ = [
-    "Calibration", "Cancelled", "ChunkReader", "Cloud", "Device", "Directions", "Estimate",
-    "EstimationError", "FileError", "FlightCalibration", "Identification", "Inverse",
-    "Linearisation", "ManyResults", "MissingFileError", "NetworkError", "Pattern", "Plan",
-    "PrismTrain", "Rays", "Recording", "RecordingHeader", "Sensor", "Simulation", "Solution",
-    "Stop", "Verdict", "Warning", "__version__", "calibrate", "calibrate_many", "campaign", "cloud",
-    "cloud_many", "compare", "convert_many", "coverage", "emulate", "estimate",
-    "estimate_many", "find_sensors", "from_arrays", "identify", "info", "info_many", "invert",
-    "linearise", "load_sensor", "observability", "observe", "pattern", "plan", "presets",
-    "rays", "read", "read_chunks", "record", "simulate", "write",
+    "Answer", "Calibration", "Cancelled", "ChunkReader", "Cloud", "Device", "Directions",
+    "Estimate", "EstimationError", "FileError", "FlightCalibration", "Identification", "Inverse",
+    "Linearisation", "ManyResults", "MissingFileError", "Mount", "NetworkError", "Pattern", "Plan",
+    "Points", "PrismTrain", "Rays", "Recording", "RecordingHeader", "RotationAngles", "Scan",
+    "Sensor", "Simulation", "Solution", "Stop", "Trajectory", "Verdict", "Warning", "__version__",
+    "calibrate", "calibrate_many", "campaign", "cloud", "cloud_many", "compare", "convert_many",
+    "coverage", "emulate", "estimate", "estimate_many", "find_sensors", "from_arrays", "identify",
+    "info", "info_many", "invert", "linearise", "load_mount", "load_sensor", "load_trajectory",
+    "observability", "observe", "pattern", "plan", "point_chunks", "points", "presets", "rays",
+    "read", "read_chunks", "record", "simulate", "write",
 ]

@@ -2,19 +2,24 @@
 # SPDX-License-Identifier: MIT
 """Jobs on recordings and files: each does what a verb of the command does."""
 import os
-from typing import Any, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union, overload
+
+import numpy as np
 
 from risley import _risley
 from risley._progress import Progress, telling
-from risley._results import (Calibration, Cloud, Estimate, FlightCalibration, Identification,
-                             Pattern, Plan, Simulation)
-from risley._units import Fixed, Path, Rate, Source, YawPitchRoll, options_of, paths
+from risley._results import (Answer, Calibration, Cloud, Estimate, FlightCalibration,
+                             Identification, Pattern, Plan, Scan, Simulation)
+from risley._units import (AnyMount, AnySensor, AnyTrajectory, Fixed, Path, Rate, Source, Truth,
+                           YawPitchRoll, listed, options_of, suggesting)
 
 
-def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method: str = "map",
+@suggesting
+def estimate(recording: Source, *, sensor: AnySensor = "", output: Path = "", method: str = "map",
              rate: Rate = None, noise_angle: Optional[float] = None,
              noise_angle_deg: Optional[float] = None, fix: Fixed = (), free: Iterable[str] = (),
-             mirror: Optional[bool] = None, truth: Path = "", states: str = "knots",
+             mirror: Optional[bool] = None, process_noise: Union[float, str] = "auto",
+             process_noise_deg: Optional[float] = None, truth: Truth = "", states: str = "knots",
              shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
              extrinsics_deg: YawPitchRoll = None, device: str = "", threads: int = 0,
              progress: Progress = None) -> Estimate:
@@ -22,10 +27,11 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
 
     Parameters
     ----------
-    recording : str, path or Recording
+    recording : str, path, Recording or Simulation
         A recording of one sensor: a file, or in memory.
-    sensor : str or path, optional
-        Name of a preset, or a preset or calibration file; otherwise found from the recording.
+    sensor : str, path, Sensor or result, optional
+        Name of a preset, a preset or calibration file or its folder, or what a job found; otherwise
+        found from the recording.
     output : str or path, optional
         Folder for calibration.yaml, states.nc, report.json and report.html.
     method : {'map', 'ekf'}
@@ -41,7 +47,10 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
         Further parameters to estimate.
     mirror : bool, optional
         Whether the elevation has the opposite sign; by default found from the recording.
-    truth : str or path, optional
+    process_noise, process_noise_deg : float or {'auto', 'paper', 'none'}
+        Random walk of the rotors' speeds, rad/s or deg/s per root of a second; that of the paper;
+        none, which is constant acceleration; by default found by maximum likelihood.
+    truth : str, path or Simulation, optional
         ``OUT.truth.yaml`` of the simulation that made the recording, to compare the estimate with.
     states : {'knots', 'all', 'none'}
         Rotor states to write into ``output``.
@@ -68,11 +77,13 @@ def estimate(recording: Source, *, sensor: Path = "", output: Path = "", method:
         return Estimate(_risley.estimate(options, threads, tell))
 
 
-def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "", output: Path = "",
-              method: str = "adjustment", planes: Path = "", stations: Path = "",
-              station: Sequence[str] = (), trajectory: Path = "", trajectory_topic: str = "",
-              mount: Path = "", accuracy: Path = "", trajectory_errors: Path = "",
-              control: Path = "", knot_spacing: Optional[float] = None,
+@suggesting
+def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: AnySensor = "",
+              output: Path = "", method: str = "adjustment", planes: Path = "", stations: Path = "",
+              station: Sequence[str] = (), trajectory: AnyTrajectory = "",
+              trajectory_topic: str = "", mount: AnyMount = "", accuracy: Path = "",
+              trajectory_errors: Path = "", control: Path = "",
+              knot_spacing: Optional[float] = None,
               cell_size: Optional[float] = None, rate: Rate = None,
               noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
               noise_range: Optional[float] = None, prior_sigma: Optional[float] = None,
@@ -81,7 +92,7 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
               beam_origin: bool = True, same_walls: Optional[bool] = None,
               walls: str = "uneven", patch_thickness: Optional[float] = None,
               fix: Fixed = (), free: Iterable[str] = (), mirror: Optional[bool] = None,
-              truth: Union[Path, Sequence[Path]] = (), force: bool = False,
+              truth: Union[Truth, Sequence[Truth]] = (), force: bool = False,
               states: str = "knots", shot_rate: Optional[float] = None,
               extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
               device: str = "", seed: int = 0, threads: int = 0,
@@ -92,8 +103,8 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     ----------
     recordings : str, path, Recording or a sequence of them
         Recordings of one sensor, with ranges: files, or in memory.
-    sensor : str or path, optional
-        Name of a preset, or a preset or calibration file; otherwise found from the recordings.
+    sensor : str, path, Sensor or result, optional
+        As in `risley.estimate`.
     output : str or path, optional
         Folder for calibration.yaml, states, report.json and report.html; for a flight also for
         mount.yaml and trajectory.csv.
@@ -105,8 +116,10 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
         Known rotations of the sensor (YAML): one station per recording, in the same order.
     station : sequence of str
         Names of the stations in that file to use, in the order of the recordings.
-    trajectory, mount : str or path
-        For a flight: where the platform was, and how the sensor sits on it.
+    trajectory : str, path, Trajectory, FlightCalibration or Simulation
+        For a flight: where the platform was.
+    mount : str, path, Mount or FlightCalibration
+        For a flight: how the sensor sits on the platform.
     trajectory_topic : str
         Topic to use if the trajectory is a ROS bag with several topics of poses.
     accuracy, trajectory_errors : str or path, optional
@@ -162,9 +175,9 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: Path = "",
     FileError, ValueError
         For damaged files, and for options that make no sense.
     """
-    options = options_of({**locals(), "truth": paths(truth)})
+    options = options_of({**locals(), "truth": listed("truth", truth)})
     with telling(progress) as tell:
-        if os.fspath(trajectory):
+        if trajectory != "":
             _refuse({"planes": planes, "stations": stations, "station": station},
                     "is not for a calibration with trajectory")
             return FlightCalibration(_risley.calibrate_flight(options, threads, tell))
@@ -180,8 +193,9 @@ def _refuse(options: Mapping[str, Any], why: str) -> None:
             raise ValueError(f"{name} {why}")
 
 
-def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] = None,
-         mount: Path = "", trajectory_errors: Path = "", scene: Path = "",
+@suggesting
+def plan(scene_or_flight: Path, *, sensor: AnySensor = "", duration: Optional[float] = None,
+         mount: AnyMount = "", trajectory_errors: Path = "", scene: Path = "",
          knot_spacing: Optional[float] = None, cell_size: Optional[float] = None,
          empty_circle: Optional[float] = None, rate: Optional[float] = None,
          noise_range: Optional[float] = None, prior_sigma: Optional[float] = None,
@@ -195,8 +209,8 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
     ----------
     scene_or_flight : str or path
         A scene of walls with stations, or a flight with strips (YAML).
-    sensor : str or path, optional
-        Name of a preset, or a preset or calibration file; by default a Mid-40.
+    sensor : str, path, Sensor or result, optional
+        As in `risley.estimate`; by default a Mid-40.
     duration : float, optional
         Length of each recording of walls, s; by default 10.
     mount, trajectory_errors : str or path
@@ -236,12 +250,13 @@ def plan(scene_or_flight: Path, *, sensor: Path = "", duration: Optional[float] 
         return Plan(_risley.plan(options, tell))
 
 
-def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "",
+@suggesting
+def cloud(recording: Source, calibration: AnySensor, output: Path, *, format: str = "",
           directions: str = "smoothed", beam_origin: bool = True, beam_divergence: bool = True,
           covariance: bool = True, common_factors: bool = False, rate: Rate = None,
           noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
-          las_scale: Optional[float] = None, time: str = "gps", trajectory: Path = "",
-          trajectory_topic: str = "", mount: Path = "", accuracy: Path = "",
+          las_scale: Optional[float] = None, time: str = "gps", trajectory: AnyTrajectory = "",
+          trajectory_topic: str = "", mount: AnyMount = "", accuracy: Path = "",
           trajectory_errors: Path = "", crs: str = "", datum: str = "", distribution: bool = False,
           shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
           extrinsics_deg: YawPitchRoll = None, device: str = "", threads: int = 0,
@@ -252,9 +267,9 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
     ----------
     recording : str, path or Recording
         A recording of one sensor, with ranges: a file, or in memory.
-    calibration : str or path
-        ``calibration.yaml`` of an estimate or a calibration, the folder that holds it, or the name
-        of a preset.
+    calibration : str, path, Sensor or result
+        ``calibration.yaml`` of an estimate or a calibration, the folder that holds it, the name of
+        a preset, or what a job found.
     output : str or path
         The file; its ending chooses the format unless `format` does.
     format : str, optional
@@ -300,15 +315,16 @@ def cloud(recording: Source, calibration: Path, output: Path, *, format: str = "
         return Cloud(_risley.cloud(options, threads, tell))
 
 
-def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float] = None,
+@suggesting
+def simulate(output: Path, *, sensor: AnySensor = "mid-40", duration: Optional[float] = None,
              rate: Optional[float] = None, noise_angle: Optional[float] = None,
              noise_angle_deg: Optional[float] = None, noise_range: Optional[float] = None,
              quantize: bool = True, beam_origin: bool = True, rotor: str = "constant",
              set: Mapping[str, float] = {}, reported: Mapping[str, float] = {},
              reported_nominal: bool = False, start_angles: Optional[Sequence[float]] = None,
              start_angles_deg: Optional[Sequence[float]] = None, scene: Path = "",
-             station: str = "", trajectory: Path = "", trajectory_topic: str = "",
-             flight: Path = "", mount: Path = "", trajectory_errors: Path = "",
+             station: str = "", trajectory: AnyTrajectory = "", trajectory_topic: str = "",
+             flight: Path = "", mount: AnyMount = "", trajectory_errors: Path = "",
              trajectory_format: str = "csv", start: Optional[float] = None,
              clock_drift: Optional[float] = None, seed: int = 0, threads: int = 0,
              progress: Progress = None) -> Simulation:
@@ -318,8 +334,8 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
     ----------
     output : str or path
         The recording; its ending chooses the format. The truth is written beside it.
-    sensor : str or path, default 'mid-40'
-        Name of a preset, or a preset or calibration file.
+    sensor : str, path, Sensor or result, default 'mid-40'
+        The true sensor, as in `risley.estimate`.
     duration : float, optional
         Length, s; by default 1, or until the end of the trajectory.
     rate : float, optional
@@ -379,6 +395,7 @@ def simulate(output: Path, *, sensor: Path = "mid-40", duration: Optional[float]
         return Simulation(_risley.simulate(options, threads, tell))
 
 
+@suggesting
 def identify(recording: Source, *, output: Path = "", force: bool = False, most_prisms: int = 3,
              fastest: Optional[float] = None, shot_rate: Optional[float] = None,
              extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None, device: str = "",
@@ -416,27 +433,46 @@ def identify(recording: Source, *, output: Path = "", force: bool = False, most_
         return Identification(*_risley.identify(options, threads, tell))
 
 
-def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
+@overload
+def pattern(sensor: AnySensor, *, start: float = 0.0, duration: float = 1.0,
+            dtype: Any = "float64", rate: Optional[float] = None, every: int = 1,
+            firing: Optional[str] = None, start_angles: Optional[Sequence[float]] = None,
+            start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
+            progress: Progress = None) -> Scan: ...
+@overload
+def pattern(sensor: AnySensor, format: str, output: Path, *, duration: float = 1.0,
             rate: Optional[float] = None, every: int = 1, firing: Optional[str] = None,
             start_angles: Optional[Sequence[float]] = None,
             start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
-            progress: Progress = None) -> Pattern:
-    """Write the scan of a sensor for simulators.
+            progress: Progress = None) -> Pattern: ...
+@suggesting
+def pattern(sensor: AnySensor, format: str = "", output: Path = "", *, start: float = 0.0,
+            duration: float = 1.0, dtype: Any = "float64", rate: Optional[float] = None,
+            every: int = 1, firing: Optional[str] = None,
+            start_angles: Optional[Sequence[float]] = None,
+            start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
+            progress: Progress = None) -> Union[Scan, Pattern]:
+    """Compute where a sensor sends its shots, or write that for simulators.
 
     Parameters
     ----------
-    sensor : str or path
-        Name of a preset, or a preset or calibration file.
-    format : str
+    sensor : str, path, Sensor or result
+        As in `risley.estimate`.
+    format : str, optional
         ``livox-csv``, ``helios-xml``, ``npy`` and others, as ``risley pattern --help`` lists them.
-    output : str or path
-        The file.
+    output : str or path, optional
+        The file; without one the directions are returned.
+    start : float, default 0
+        Where the scan that is returned begins, s after the rotors' start.
     duration : float, default 1
         Length of the scan, s.
+    dtype : {'float64', 'float32'} or what numpy takes for them
+        Precision of the directions that are returned. Single precision is right to 2e-6 rad, and
+        several times as fast.
     rate : float, optional
         Shots per second, Hz; by default the sensor's.
     every : int, default 1
-        Write one of so many shots.
+        Keep one of so many shots.
     firing : {'in-turn', 'together'}, optional
         When the emitters fire if there are several; by default as in the preset.
     start_angles, start_angles_deg : sequence of float, optional
@@ -448,30 +484,39 @@ def pattern(sensor: Path, format: str, output: Path, *, duration: float = 1.0,
 
     Returns
     -------
-    Pattern
+    Scan or Pattern
+        Arrays, or what was written.
 
     Raises
     ------
     FileError, ValueError
         For files that cannot be written, and for options that make no sense.
     """
+    dtype = np.dtype(dtype).name
     options = options_of(locals())
     with telling(progress) as tell:
+        if not output:
+            if format:
+                raise ValueError(f"format = {format!r} goes with output")
+            return Scan(options, _risley.pattern_directions(options, threads, tell))
+        if start or dtype != "float64":
+            raise ValueError("start and dtype are for a scan that is returned, without output")
         return Pattern(_risley.pattern(options, threads, tell))
 
 
-def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
+@suggesting
+def coverage(sensor: AnySensor, *, after: Optional[Sequence[float]] = None,
              cell: Optional[float] = None, cell_deg: Optional[float] = None,
              rate: Optional[float] = None, every: int = 1, firing: Optional[str] = None,
              start_angles: Optional[Sequence[float]] = None,
              start_angles_deg: Optional[Sequence[float]] = None, threads: int = 0,
-             progress: Progress = None) -> Dict[str, Any]:
+             progress: Progress = None) -> Answer:
     """Compute how the scan of a sensor fills its field of view.
 
     Parameters
     ----------
-    sensor : str or path
-        Name of a preset, or a preset or calibration file.
+    sensor : str, path, Sensor or result
+        As in `risley.estimate`.
     after : sequence of float, optional
         Times since the start of the scan, s.
     cell, cell_deg : float, optional
@@ -481,20 +526,22 @@ def coverage(sensor: Path, *, after: Optional[Sequence[float]] = None,
 
     Returns
     -------
-    dict
-        As ``coverage`` in ``risley pattern --coverage --json``.
+    Answer
+        A dictionary as ``coverage`` in ``risley pattern --coverage --json``.
     """
     options = options_of(locals())
     with telling(progress) as tell:
-        return dict(_risley.coverage(options, threads, tell))
+        return Answer("coverage", _risley.coverage(options, threads, tell))
 
 
-def observability(recording: Source = "", *, sensor: Path = "", duration: Optional[float] = None,
-                  rate: Rate = None, noise_angle: Optional[float] = None,
+@suggesting
+def observability(recording: Source = "", *, sensor: AnySensor = "",
+                  duration: Optional[float] = None, rate: Rate = None,
+                  noise_angle: Optional[float] = None,
                   noise_angle_deg: Optional[float] = None, rounding: bool = True,
                   fix: Fixed = (), free: Iterable[str] = (), shot_rate: Optional[float] = None,
                   extrinsics: YawPitchRoll = None, extrinsics_deg: YawPitchRoll = None,
-                  device: str = "", threads: int = 0, progress: Progress = None) -> Dict[str, Any]:
+                  device: str = "", threads: int = 0, progress: Progress = None) -> Answer:
     """Compute Cramér-Rao bounds of all parameters for a recording or a plan.
 
     Parameters
@@ -514,23 +561,24 @@ def observability(recording: Source = "", *, sensor: Path = "", duration: Option
 
     Returns
     -------
-    dict
-        As in ``risley observability --json``.
+    Answer
+        A dictionary as in ``risley observability --json``.
     """
     options = options_of(locals())
     with telling(progress) as tell:
-        return dict(_risley.observability(options, threads, tell))
+        return Answer("observability", _risley.observability(options, threads, tell))
 
 
-def compare(results: Sequence[Path], *, false_alarm: float = 0.01, anywhere: bool = False,
-            unlike: bool = False, progress: Progress = None) -> Dict[str, Any]:
+@suggesting
+def compare(results: Sequence[AnySensor], *, false_alarm: float = 0.01, anywhere: bool = False,
+            unlike: bool = False, progress: Progress = None) -> Answer:
     """Find out whether a unit has changed, and which units of a fleet are unlike the others.
 
     Parameters
     ----------
-    results : sequence of str or path
-        Folders that `estimate` or `calibrate` wrote, or calibration files, in order of time;
-        also tables of such results, whose rows are followed. At least two results.
+    results : sequence of str, path, Sensor or result
+        What `estimate` or `calibrate` found, their folders, or calibration files, in order of
+        time; also tables of such results, whose rows are followed. At least two results.
     false_alarm : float, default 0.01
         Probability that chance is taken for a change, or a unit for an outlier, at most.
     anywhere : bool, default False
@@ -543,8 +591,8 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01, anywhere: boo
 
     Returns
     -------
-    dict
-        As ``risley compare --json``.
+    Answer
+        A dictionary as ``risley compare --json``.
 
     Raises
     ------
@@ -552,13 +600,15 @@ def compare(results: Sequence[Path], *, false_alarm: float = 0.01, anywhere: boo
         For damaged files and tables without any result, and for results of which no two are of one
         kind of sensor.
     """
+    options = options_of(locals())
     with telling(progress) as tell:
-        return dict(_risley.compare(paths(results), false_alarm, anywhere, unlike, tell))
+        return Answer("compare", _risley.compare(options, tell))
 
 
+@suggesting
 def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = None,
              merge: bool = False, table: Path = "", seed: int = 0, threads: int = 0,
-             progress: Progress = None) -> Dict[str, Any]:
+             progress: Progress = None) -> Answer:
     """Simulate and estimate, or calibrate, many times over, as a plan says.
 
     Parameters
@@ -582,8 +632,8 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
 
     Returns
     -------
-    dict
-        As ``risley campaign --json``. ``missing`` holds the cells without a result.
+    Answer
+        A dictionary as ``risley campaign --json``. ``missing`` holds the cells without a result.
 
     Raises
     ------
@@ -599,13 +649,14 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
     if chunk is not None:
         options["chunk"], options["chunks"] = chunk
     with telling(progress) as tell:
-        return dict(_risley.campaign(options, threads, tell))
+        return Answer("campaign", _risley.campaign(options, threads, tell))
 
 
+@suggesting
 def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
          shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
          extrinsics_deg: YawPitchRoll = None, device: str = "",
-         progress: Progress = None) -> Dict[str, Any]:
+         progress: Progress = None) -> Answer:
     """Describe what a recording or a trajectory holds, and check its times.
 
     Parameters
@@ -621,9 +672,9 @@ def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
 
     Returns
     -------
-    dict
-        As in ``risley info --json``. Damage is reported under ``error``.
+    Answer
+        A dictionary as in ``risley info --json``. Damage is reported under ``error``.
     """
     options = options_of({**locals(), "recording": file})
     with telling(progress) as tell:
-        return dict(_risley.info(options, tell))
+        return Answer("info", _risley.info(options, tell))

@@ -1,14 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Jobs on many recordings in one call, as the command does them for folders, patterns and lists."""
-import inspect
 import os
 from typing import Any, Callable, Dict, Iterator, List, Sequence, Union
 
 from risley import _risley
 from risley._jobs import calibrate, cloud, estimate, info
 from risley._progress import Progress, telling
-from risley._units import Path, options_of, paths
+from risley._results import needed
+from risley._units import (AnySensor, Path, keyword_defaults, listed, options_of,
+                           unknown_keyword)
 
 
 class ManyResults(Sequence[Dict[str, Any]]):
@@ -39,22 +40,30 @@ class ManyResults(Sequence[Dict[str, Any]]):
         return f"<ManyResults: {self.done} done, {self.skipped} skipped, {self.failed} failed>"
 
     def to_pandas(self) -> Any:
-        """`rows` as a data frame. pandas has to be installed."""
-        import pandas  # pylint: disable=import-outside-toplevel
+        """`rows` as a `pandas.DataFrame`."""
+        return needed("pandas", "to_pandas()").DataFrame(self.rows)
 
-        return pandas.DataFrame(self.rows)
+    def to_xarray(self) -> Any:
+        """`rows` as an `xarray.Dataset` over ``row``."""
+        columns = {name: ("row", [row[name] for row in self.rows])
+                   for name in (self.rows[0] if self.rows else {})}
+        return needed("xarray", "to_xarray()").Dataset(columns)
+
+    def __str__(self) -> str:
+        return "\n".join([repr(self)] + [
+            f"{one['input']}: {one['message'] or one.get('verdict', {}).get('code', 'done')}"
+            for one in self])
 
 
 def _many(verb: str, job: Callable[..., Any], wanted: Dict[str, Any], options: Dict[str, Any],
           **more: Any) -> ManyResults:
-    of_each = {name: parameter.default
-               for name, parameter in inspect.signature(job).parameters.items()
-               if parameter.kind is parameter.KEYWORD_ONLY and name not in wanted}
+    of_each = {name: default for name, default in keyword_defaults(job).items()
+               if name not in wanted}
     for name in options:
         if name not in of_each:
-            raise TypeError(f"{name} is no option of {verb} for many inputs")
+            raise TypeError(unknown_keyword(f"{verb}_many", name, of_each))
     values = options_of({**of_each, **options, **more, "output": os.fspath(wanted["output"])})
-    many = {"inputs": paths(wanted["inputs"]), "list": os.fspath(wanted["list"]),
+    many = {"inputs": listed("inputs", wanted["inputs"]), "list": os.fspath(wanted["list"]),
             "table": os.fspath(wanted["table"]), "resume": wanted["resume"]}
     with telling(wanted["progress"]) as tell:
         return ManyResults(_risley.run_many(verb, values, many, wanted["threads"], tell))
@@ -120,7 +129,7 @@ def calibrate_many(inputs: Union[Path, Sequence[Path]] = (), *, list: Path = "",
     return _many("calibrate", calibrate, locals(), options, recordings="each")
 
 
-def cloud_many(inputs: Union[Path, Sequence[Path]], calibration: Path, output: Path, *,
+def cloud_many(inputs: Union[Path, Sequence[Path]], calibration: AnySensor, output: Path, *,
                list: Path = "", table: Path = "", resume: bool = False, threads: int = 0,
                progress: Progress = None, **options: Any) -> ManyResults:
     """Turn each of many recordings into points with covariance.
@@ -140,7 +149,7 @@ def cloud_many(inputs: Union[Path, Sequence[Path]], calibration: Path, output: P
     -------
     ManyResults
     """
-    return _many("cloud", cloud, locals(), options, calibration=os.fspath(calibration))
+    return _many("cloud", cloud, locals(), options, calibration=calibration)
 
 
 def info_many(inputs: Union[Path, Sequence[Path]] = (), *, list: Path = "", table: Path = "",

@@ -7,7 +7,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._risley import Stop
-from risley._units import Path, options_of
+from risley._units import AnySensor, Path, options_of, suggesting
 
 _logger = logging.getLogger("risley")
 
@@ -16,6 +16,7 @@ def _note(words: str, is_wrong: bool) -> None:
     _logger.log(logging.WARNING if is_wrong else logging.INFO, "%s", words)
 
 
+@suggesting
 def find_sensors(interface: str = "", *, find: float = 2.5,
                  progress: Progress = None) -> List[Dict[str, Any]]:
     """Find the first-generation Livox sensors on an interface. Nothing is sent to them.
@@ -44,10 +45,11 @@ def find_sensors(interface: str = "", *, find: float = 2.5,
     return list(found["sensors"])
 
 
+@suggesting
 def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Stop] = None,
            interface: str = "", serial: Sequence[str] = (), find: float = 2.5,
            passive: bool = False, data_port: int = 56001, coordinates: str = "spherical",
-           return_mode: str = "as-is", imu: bool = True, optics: Path = "",
+           return_mode: str = "as-is", imu: bool = True, optics: AnySensor = "",
            progress: Progress = None) -> Dict[str, Any]:
     """Record first-generation Livox sensors from the network.
 
@@ -79,9 +81,9 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
         Returns of a shot that they are to send.
     imu : bool, default True
         Record inertial samples where the sensor has them.
-    optics : str or path, optional
+    optics : str, path, Sensor or result, optional
         Watch the optics: 'own' tells when they change while they are recorded, a preset or
-        calibration file also when they are not those. An alarm is a warning of the logger and
+        calibration also when they are not those. An alarm is a warning of the logger and
         stands in the result.
     progress : bool or callable, optional
         As in `risley.read`.
@@ -103,8 +105,9 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
         return dict(_risley.record(options, _note, stop, tell))
 
 
+@suggesting
 def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[Stop] = None,
-            serial: str = "", sensor: Path = "mid-40", scene: Path = "", station: str = "",
+            serial: str = "", sensor: AnySensor = "mid-40", scene: Path = "", station: str = "",
             recording: Path = "", speed: float = 1.0, noise_angle: Optional[float] = None,
             noise_angle_deg: Optional[float] = None, noise_range: Optional[float] = None,
             quantize: bool = True, beam_origin: bool = True, rotor: str = "constant",

@@ -4,6 +4,7 @@
 from typing import Any, NamedTuple, Optional, Sequence, Tuple, Union
 
 from risley import _risley
+from risley._units import suggesting
 
 Optics = Union[_risley.PrismTrain, _risley.Sensor]
 
@@ -83,6 +84,7 @@ def _train(optics: Optics) -> _risley.PrismTrain:
     return optics.train if isinstance(optics, _risley.Sensor) else optics
 
 
+@suggesting
 def observe(optics: Optics, angles: Any, *, beam: Any = None,
             out: Optional[Tuple[Any, Any]] = None) -> Directions:
     """Directions of shots.
@@ -120,6 +122,7 @@ def observe(optics: Optics, angles: Any, *, beam: Any = None,
     return Directions(*_risley.observe(_train(optics), angles, beam, azimuth_out, zenith_out))
 
 
+@suggesting
 def rays(optics: Optics, angles: Any, *, beam: Any = None,
          prism_thickness: Optional[Sequence[float]] = None,
          prism_spacing: Optional[Sequence[float]] = None) -> Rays:
@@ -151,6 +154,7 @@ def rays(optics: Optics, angles: Any, *, beam: Any = None,
                               list(prism_spacing or [])))
 
 
+@suggesting
 def linearise(optics: Optics, angles: Any, *, beam: Any = None) -> Linearisation:
     """Directions of shots and their derivatives by parameters and rotation angles.
 
@@ -171,6 +175,7 @@ def linearise(optics: Optics, angles: Any, *, beam: Any = None) -> Linearisation
     return Linearisation(*_risley.linearise(_train(optics), angles, beam))
 
 
+@suggesting
 def invert(optics: Optics, azimuth: Any, zenith: Any, *, beam: Any = 0,
            fixed_angles: Sequence[float] = ()) -> Inverse:
     """Rotation angles of the last two prisms that send beams in given directions.

@@ -2,15 +2,49 @@
 # SPDX-License-Identifier: MIT
 """Recordings from files and from arrays."""
 import os
-from typing import Any, Optional
+import pathlib
+import tempfile
+from typing import Any, Optional, Tuple, Union
 
 from risley import _risley
 from risley._progress import Progress, telling
-from risley._units import Path, YawPitchRoll, pose
+from risley._results import needed
+from risley._units import Path, YawPitchRoll, pose, suggesting
 
 _UNKNOWN_TYPE = 255
+_COLUMNS = ("time_ns", "azimuth", "zenith", "range", "azimuth_resolution", "zenith_resolution",
+            "range_resolution", "intensity", "return_number", "tag", "beam", "device", "valid")
 
 
+def to_xarray(recording: _risley.Recording) -> Any:
+    """All columns over ``row``."""
+    return needed("xarray", "to_xarray()").Dataset(
+        {name: ("row", getattr(recording, name)) for name in _COLUMNS})
+
+
+def to_pandas(recording: _risley.Recording) -> Any:
+    """All columns."""
+    return needed("pandas", "to_pandas()").DataFrame(
+        {name: getattr(recording, name) for name in _COLUMNS})
+
+
+def reduced(recording: _risley.Recording) -> Tuple[Any, ...]:
+    """For pickle: the lossless format has all that is known of a recording."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder) / "recording.nc"
+        _risley.write_recording(recording, str(file), "")
+        return restored, (file.read_bytes(),)
+
+
+def restored(content: bytes) -> _risley.Recording:
+    """The inverse of `reduced`."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder) / "recording.nc"
+        file.write_bytes(content)
+        return _risley.read(str(file), None, None, "", None)
+
+
+@suggesting
 def read(path: Path, *, shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
          extrinsics_deg: YawPitchRoll = None, device: str = "",
          progress: Progress = None) -> _risley.Recording:
@@ -48,6 +82,7 @@ def read(path: Path, *, shot_rate: Optional[float] = None, extrinsics: YawPitchR
                             tell)
 
 
+@suggesting
 def read_chunks(path: Path, rows: int = 65536, *, shot_rate: Optional[float] = None,
                 extrinsics: YawPitchRoll = None,
                 extrinsics_deg: YawPitchRoll = None, device: str = "") -> _risley.ChunkReader:
@@ -74,8 +109,9 @@ def read_chunks(path: Path, rows: int = 65536, *, shot_rate: Optional[float] = N
                                device)
 
 
+@suggesting
 def from_arrays(*, azimuth: Any, zenith: Any, time_ns: Any = None, range: Any = None,
-                serial: str = "", device_type: int = _UNKNOWN_TYPE,
+                serial: str = "", sensor: Union[str, _risley.Sensor] = "",
                 **columns: Any) -> _risley.Recording:
     """Make a recording from columns of any origin.
 
@@ -89,10 +125,10 @@ def from_arrays(*, azimuth: Any, zenith: Any, time_ns: Any = None, range: Any = 
         Ranges, m; 0 or less if the shot had no return.
     serial : str, optional
         Serial number of the sensor.
-    device_type : int, default 255
-        Livox number of its type; 255 if unknown.
+    sensor : str or Sensor, optional
+        What made it: the name of a preset such as "avia", or a sensor. By default jobs find out.
     **columns : array_like, shape (rows,) or ()
-        Further columns of `Recording`: ``intensity``, ``return_number``, ``tag``, ``beam``,
+        Further columns of `Recording`: ``intensity``, ``return_number``, ``tag``, ``emitter``,
         ``valid``, ``azimuth_resolution``, ``zenith_resolution``, ``range_resolution``. Rows are
         valid if their direction is finite and their range is not 0 or less, unless ``valid`` says
         otherwise.
@@ -110,10 +146,16 @@ def from_arrays(*, azimuth: Any, zenith: Any, time_ns: Any = None, range: Any = 
     TypeError
         For columns that do not hold numbers, and for unknown columns.
     """
+    if isinstance(sensor, str) and sensor:
+        sensor = _risley.load_sensor(sensor)
+    device_type = sensor.device_type if isinstance(sensor, _risley.Sensor) else _UNKNOWN_TYPE
+    if "emitter" in columns:
+        columns["beam"] = columns.pop("emitter")
     return _risley.recording_from_arrays(time_ns, azimuth, zenith, range, columns, serial,
                                          device_type)
 
 
+@suggesting
 def write(recording: _risley.Recording, path: Path, *, format: str = "") -> None:
     """Write a recording.
 

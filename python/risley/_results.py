@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: MIT
 """Results of jobs as plain data: columns, dictionaries, a sensor. All of it can be pickled."""
 import html
+import importlib
 import os
-from typing import TYPE_CHECKING, Any, Dict, List, NamedTuple, Optional, Tuple, Union
+from typing import (TYPE_CHECKING, Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple,
+                    Union)
 
 from risley import _risley
+from risley import _plots
 from risley._progress import Progress, telling
 from risley._units import Path
 
@@ -13,7 +16,8 @@ if TYPE_CHECKING:
     from risley import _answers
 else:  # what attributes results have is known from their JSON alone
     class _answers:
-        Estimate = Calibration = FlightCalibration = Cloud = Simulation = Identification = Pattern = object
+        Estimate = Calibration = FlightCalibration = Cloud = object
+        Simulation = Identification = Pattern = object
 
 Found = Union[_risley.EstimatedRecording, _risley.CalibratedRecordings, _risley.CalibratedFlight]
 Planned = Union[_risley.PlannedCalibration, _risley.PlannedFlight]
@@ -62,6 +66,14 @@ class Warning(NamedTuple):
         return self.message
 
 
+def needed(package: str, function: str) -> Any:
+    """A package that only some functions need. @raises ImportError that names both"""
+    try:
+        return importlib.import_module(package)
+    except ImportError as error:
+        raise ImportError(f"{function} needs {package}, which is not installed") from error
+
+
 def warnings_of(found: List[Dict[str, Any]]) -> List[Warning]:
     """Warnings as results have them."""
     return [Warning(**one) for one in found]
@@ -76,14 +88,63 @@ class Fields(Dict[str, Any]):
         return self[name]
 
 
-def _with_attributes(value: Any) -> Any:
+def _with_attributes(value: Any, as_told: bool = False) -> Any:
     if isinstance(value, dict):
-        return Fields({key: warnings_of(one) if key == "warnings" else _with_attributes(one)
-                       for key, one in value.items()})
-    return [_with_attributes(one) for one in value] if isinstance(value, list) else value
+        return Fields({key: warnings_of(one) if key == "warnings" and not as_told
+                       else _with_attributes(one, as_told) for key, one in value.items()})
+    if isinstance(value, list):
+        return [_with_attributes(one, as_told) for one in value]
+    return value
 
 
-class _Answer:
+def lines_of(found: Mapping[str, Any], head: str = "") -> List[Tuple[str, str]]:
+    """Names and values of what a dictionary holds, for people; of lists the length."""
+    lines: List[Tuple[str, str]] = []
+    for key, value in found.items():
+        if key in ("format_version", "version", "warnings"):
+            continue
+        if isinstance(value, dict):
+            lines += lines_of(value, f"{head}{key}.")
+        elif isinstance(value, list) and any(isinstance(one, (dict, list)) for one in value):
+            lines.append((head + key, f"{len(value)} entries"))
+        elif isinstance(value, list):
+            lines.append((head + key, ", ".join(map(str, value))))
+        elif value is not None:
+            lines.append((head + key, f"{value:.6g}" if isinstance(value, float) else str(value)))
+    return lines
+
+
+def table_text(lines: Sequence[Tuple[str, str]]) -> str:
+    """Names and values in two columns."""
+    width = max((len(name) for name, _ in lines), default=0)
+    return "\n".join(f"{name:{width}}  {value}" for name, value in lines)
+
+
+def table_html(lines: Sequence[Tuple[str, str]]) -> str:
+    """The same for a notebook."""
+    rows = "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
+                   for name, value in lines)
+    return f"<table>{rows}</table>"
+
+
+class _Shown:
+    """What all results show of themselves."""
+
+    def _lines(self) -> List[Tuple[str, str]]:
+        raise NotImplementedError
+
+    def summary(self) -> str:
+        """What came of it, in a few lines."""
+        return table_text(self._lines()[:8])
+
+    def __str__(self) -> str:
+        return table_text(self._lines())
+
+    def _repr_html_(self) -> str:
+        return table_html(self._lines())
+
+
+class _Answer(_Shown):
     """Result of a job. The keys of the command's ``--json`` are its attributes, in the same units:
     ``found.pointing_error.total_deg.value``; angles are in degrees there, as the names say.
     """
@@ -98,6 +159,15 @@ class _Answer:
 
     def __dir__(self) -> List[str]:
         return [*super().__dir__(), *self._dict]
+
+    def _lines(self) -> List[Tuple[str, str]]:
+        return lines_of(self._dict)
+
+    def __repr__(self) -> str:
+        what = self._dict.get("verdict", {}).get("code") or ", ".join(
+            f"{value} {key}" for key, value in self._dict.items()
+            if key in ("points", "observations", "rows"))
+        return f"<risley.{type(self).__name__}: {what}>"
 
     def to_dict(self) -> Dict[str, Any]:
         """The same as the command prints with ``--json``, without ``command`` and ``inputs``.
@@ -131,6 +201,11 @@ class _Columns(_Answer):
     def _columns(self) -> Dict[str, Any]:
         return {"sigma": self.sigmas}
 
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame` of all columns with the names as index."""
+        return needed("pandas", "to_pandas()").DataFrame({**self._columns(), "unit": self.units},
+                                                         index=self.names)
+
     def to_xarray(self) -> Any:
         """An `xarray.Dataset` of all columns over ``name`` and the covariance over ``free``.
 
@@ -139,7 +214,7 @@ class _Columns(_Answer):
         ImportError
             If xarray is not installed.
         """
-        import xarray
+        xarray = needed("xarray", "to_xarray()")
         data: Dict[str, Any] = {name: ("name", column) for name, column in self._columns().items()}
         data["covariance"] = (("free", "free_too"), self.covariance)
         return xarray.Dataset(
@@ -161,7 +236,7 @@ class Solution(_Columns):
         self.verdict = Verdict(**self._dict["verdict"])
         #: The sensor as it was found, with its covariance.
         self.sensor = found.sensor
-        self._html = found.html
+        self._html, self._text = found.html, found.text
         self._found: Optional[Found] = found
         self._report = ""
 
@@ -196,12 +271,66 @@ class Solution(_Columns):
         self._report_text(None)  # what the page needs is gone with the C++ object
         return {**self.__dict__, "_found": None}
 
+    def _as_option(self, name: str) -> Any:
+        return self.sensor
+
+    def summary(self) -> str:
+        """The verdict, what to do, and what to know before the result is used."""
+        return "\n".join([self.verdict.words, f"what to do: {self.verdict.to_do}",
+                          *map(str, self.warnings)])
+
     def _repr_html_(self) -> str:
         return self._html
+
+    def __str__(self) -> str:
+        return self._text
 
     def __repr__(self) -> str:
         return (f"<risley.{type(self).__name__} {self.sensor.name}: {len(self.names)} values, "
                 f"{self.verdict.code}>")
+
+    def plot(self, axes: Any = None) -> Any:
+        """Every value with its sigma, less that of the sensor type, in sigmas.
+
+        Parameters
+        ----------
+        axes : matplotlib axes, optional
+            Where to draw; by default a new figure.
+
+        Returns
+        -------
+        matplotlib axes
+        """
+        return _plots.sigmas(self, axes)
+
+
+class RotationAngles(NamedTuple):
+    """Rotation angles of the prisms.
+
+    Attributes
+    ----------
+    time_ns : ndarray of int, shape (n,)
+        Times on the recording's clock, ns.
+    angle : ndarray, shape (n, prisms)
+        Rotation angles in beam order, not wrapped, rad.
+    covariance : ndarray, shape (n, prisms, prisms)
+        Their covariance, rad^2.
+    speed : ndarray, shape (n, prisms)
+        Speeds, rad/s.
+    outlier : ndarray, shape (n,), or None
+        1 where the shot was left out; None at times that were asked for.
+    """
+
+    time_ns: Any
+    angle: Any
+    covariance: Any
+    speed: Any
+    outlier: Any
+
+    @property
+    def sigma(self) -> Any:
+        """One standard deviation of every angle, rad; shape (n, prisms)."""
+        return self.covariance.diagonal(axis1=1, axis2=2) ** 0.5
 
 
 class Estimate(Solution, _answers.Estimate):
@@ -210,6 +339,37 @@ class Estimate(Solution, _answers.Estimate):
     def __init__(self, found: _risley.EstimatedRecording) -> None:
         super().__init__(found)
         self._residuals: Optional[Tuple[Any, Any]] = None
+        self._motion: Optional[_risley.RotorMotion] = None
+
+    def rotation_angles(self, time_ns: Any = None) -> RotationAngles:
+        """Rotation angles of the prisms with their covariance.
+
+        Parameters
+        ----------
+        time_ns : array_like of int, shape (n,), optional
+            Times on the recording's clock, ns; by default those of the shots that were used.
+
+        Returns
+        -------
+        RotationAngles
+            NaN at times from which no such shot is within 2 ms.
+        """
+        motion = self._rotor_motion()
+        if time_ns is None:
+            time_ns, found, outlier = motion.shot_time_ns, motion.at_shots(), motion.outlier
+        else:
+            found, outlier = motion.at(time_ns), None
+        return RotationAngles(time_ns, *found, outlier)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Histograms of the residuals, as `Solution.plot`."""
+        return _plots.residuals(self, axes)
+
+    def _rotor_motion(self) -> _risley.RotorMotion:
+        if self._motion is None:
+            assert isinstance(self._found, _risley.EstimatedRecording)
+            self._motion = self._found.motion
+        return self._motion
 
     def _both_residuals(self) -> Tuple[Any, Any]:
         if self._residuals is None:  # nobody asked before: they are as many as shots
@@ -228,6 +388,7 @@ class Estimate(Solution, _answers.Estimate):
         return self._both_residuals()[1]
 
     def __getstate__(self) -> Dict[str, Any]:
+        self._rotor_motion()
         self._both_residuals()  # gone with the C++ object, as what the page needs
         return super().__getstate__()
 
@@ -237,7 +398,23 @@ class Calibration(Solution, _answers.Calibration):
 
 
 class FlightCalibration(Solution, _answers.FlightCalibration):
-    """What `risley.calibrate` found in flight: boresight, lever arm, clock, ranges, parameters."""
+    """What `risley.calibrate` found in flight: boresight, lever arm, clock, ranges, parameters.
+
+    Attributes
+    ----------
+    mount : Mount
+        How the sensor sits on the platform, as found.
+    corrected_trajectory : Trajectory
+        Where the platform was, as found.
+    """
+
+    def __init__(self, found: _risley.CalibratedFlight) -> None:
+        super().__init__(found)
+        self.mount, self.corrected_trajectory = found.mount, found.trajectory
+
+    def _as_option(self, name: str) -> Any:
+        return {"mount": self.mount,
+                "trajectory": self.corrected_trajectory}.get(name, self.sensor)
 
 
 class Plan(_Columns):
@@ -246,11 +423,12 @@ class Plan(_Columns):
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned.to_dict(), planned.table)
 
-    def _repr_html_(self) -> str:
-        rows = "".join(f"<tr><td>{html.escape(name)}</td><td>{sigma:.2g}</td><td>{unit}</td></tr>"
-                       for name, sigma, unit in zip(self.names, self.sigmas, self.units))
-        return ("<table><tr><th>parameter</th><th>&plusmn; sigma</th><th>unit</th></tr>"
-                f"{rows}</table>")
+    def _lines(self) -> List[Tuple[str, str]]:
+        return [(name, f"+- {sigma:.2g} {unit}")
+                for name, sigma, unit in zip(self.names, self.sigmas, self.units)]
+
+    def __repr__(self) -> str:
+        return f"<risley.Plan: {len(self.names)} sigmas>"
 
 
 class Cloud(_Answer, _answers.Cloud):
@@ -258,7 +436,14 @@ class Cloud(_Answer, _answers.Cloud):
 
 
 class Simulation(_Answer, _answers.Simulation):
-    """What `risley.simulate` wrote."""
+    """What `risley.simulate` wrote. Stands for its recording, truth or trajectory wherever one is
+    wanted."""
+
+    def _as_option(self, name: str) -> Any:
+        endings = {"truth": ".truth.yaml"}
+        if name == "trajectory":
+            return self._dict["trajectory"]
+        return self._dict["files"][0] + endings.get(name, "")
 
 
 class Identification(_Answer, _answers.Identification):
@@ -274,6 +459,9 @@ class Identification(_Answer, _answers.Identification):
         super().__init__(found)
         self.sensor = sensor
 
+    def _as_option(self, name: str) -> Any:
+        return self.sensor
+
     @property
     def verdict(self) -> Verdict:
         """Stable code, what was found, and what follows from it."""
@@ -282,3 +470,70 @@ class Identification(_Answer, _answers.Identification):
 
 class Pattern(_Answer, _answers.Pattern):
     """What `risley.pattern` wrote."""
+
+
+class Scan(_Shown):
+    """Where a sensor sends its shots, from `risley.pattern`.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (n, 3)
+        Unit vectors in the sensor's frame; NaN where no beam gets through.
+    """
+
+    def __init__(self, options: Dict[str, Any], directions: Any) -> None:
+        self._options = options
+        self._times: Optional[Tuple[Any, Any]] = None
+        self.directions = directions
+
+    def _both_times(self) -> Tuple[Any, Any]:
+        if self._times is None:
+            self._times = _risley.pattern_times(self._options)
+        return self._times
+
+    @property
+    def time(self) -> Any:
+        """Times of the shots, s; ndarray of shape (n,)."""
+        return self._both_times()[0]
+
+    @property
+    def emitter(self) -> Any:
+        """Emitters of the shots, counted from 0; ndarray of shape (n,)."""
+        return self._both_times()[1]
+
+    def __len__(self) -> int:
+        return len(self.directions)
+
+    def _lines(self) -> List[Tuple[str, str]]:
+        sensor = self._options["sensor"]
+        return [("sensor", getattr(sensor, "name", sensor)), ("shots", str(len(self))),
+                ("seconds", f"{self.time[-1] - self.time[0]:.6g}"),
+                ("dtype", str(self.directions.dtype))]
+
+    def __repr__(self) -> str:
+        return f"<risley.Scan: {len(self)} directions, {self.directions.dtype}>"
+
+    def plot(self, axes: Any = None) -> Any:
+        """Azimuth and elevation of the shots, as `Solution.plot`."""
+        return _plots.scan(self, axes)
+
+
+class Answer(Fields, _Shown):
+    """What a job found, as a dictionary whose keys are attributes, too."""
+
+    def __init__(self, verb: str, found: Mapping[str, Any]) -> None:
+        super().__init__(_with_attributes(dict(found), as_told=True))
+        self.__dict__["_verb"] = verb
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        return Answer, (self._verb, dict(self))
+
+    def __repr__(self) -> str:
+        return f"<risley.{type(self).__name__} of {self._verb}: {', '.join(self)}>"
+
+    def _lines(self) -> List[Tuple[str, str]]:
+        return lines_of(self)
+
+    def plot(self, axes: Any = None) -> Any:
+        """Changes of a comparison or bounds of an observability, as `Solution.plot`."""
+        return _plots.answer(self._verb, self, axes)

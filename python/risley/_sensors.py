@@ -1,13 +1,15 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Sensors by name and from files."""
+"""Sensors by name, and sensors, mounts and trajectories from files."""
 import os
 from typing import List
 
 from risley import _risley
-from risley._units import Path
+from risley._progress import Progress, telling
+from risley._units import Path, suggesting
 
 
+@suggesting
 def presets() -> List[str]:
     """Names of the built-in sensors.
 
@@ -19,6 +21,7 @@ def presets() -> List[str]:
     return _risley.preset_names()
 
 
+@suggesting
 def load_sensor(name_or_path: Path) -> _risley.Sensor:
     """Load a built-in sensor by name, or a sensor from a preset or calibration file.
 
@@ -39,3 +42,51 @@ def load_sensor(name_or_path: Path) -> _risley.Sensor:
         For a file that does not follow the schema; the message names the line.
     """
     return _risley.load_sensor(os.fspath(name_or_path))
+
+
+@suggesting
+def load_mount(path: Path) -> _risley.Mount:
+    """Load how a sensor sits on a moving platform.
+
+    Parameters
+    ----------
+    path : str or path
+        A file (YAML).
+
+    Returns
+    -------
+    Mount
+
+    Raises
+    ------
+    FileError
+        For a file that is missing or none; the message names the line.
+    """
+    return _risley.load_mount(os.fspath(path))
+
+
+@suggesting
+def load_trajectory(path: Path, *, topic: str = "",
+                    progress: Progress = None) -> _risley.Trajectory:
+    """Load the poses of a moving platform.
+
+    Parameters
+    ----------
+    path : str or path
+        A file of any known format, or a folder of ROS 2.
+    topic : str, optional
+        Topic of the poses, if a ROS bag has several.
+    progress : bool or callable, optional
+        As in `risley.read`.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    FileError, ValueError
+        For a file that is missing, damaged or none, and for a topic without poses.
+    """
+    with telling(progress) as tell:
+        return _risley.load_trajectory(os.fspath(path), topic, tell)

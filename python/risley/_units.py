@@ -1,28 +1,78 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Arguments of jobs: recordings, files, and angles in SI units or, under another name, in degrees."""
+"""Arguments of jobs: objects, files, and angles in SI units or, under another name, in degrees."""
+import difflib
+import functools
+import inspect
 import os
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import (TYPE_CHECKING, Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence,
+                    Tuple, TypeVar, Union)
 
 from risley import _risley
 
+if TYPE_CHECKING:
+    from risley._results import FlightCalibration, Identification, Simulation, Solution
+
 Path = Union[str, "os.PathLike[str]"]
-Source = Union[Path, _risley.Recording]
+Source = Union[Path, _risley.Recording, "Simulation"]
+#: A preset by name, a file or folder with a calibration, or what a job found.
+AnySensor = Union[Path, _risley.Sensor, "Solution", "Identification"]
+AnyMount = Union[Path, _risley.Mount, "FlightCalibration"]
+AnyTrajectory = Union[Path, _risley.Trajectory, "FlightCalibration", "Simulation"]
+Truth = Union[Path, "Simulation"]
 YawPitchRoll = Optional[Tuple[float, float, float]]
 Fixed = Union[Mapping[str, Optional[float]], Iterable[str]]
 Rate = Union[None, float, str]
 
 
-def source(recording: Source) -> Union[str, _risley.Recording]:
-    """A recording by its path, or one in memory."""
-    return recording if isinstance(recording, _risley.Recording) else os.fspath(recording)
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+#: What may be given by its path or as what it is.
+_IN_MEMORY = (_risley.Recording, _risley.Sensor, _risley.Mount, _risley.Trajectory)
 
 
-def sources(recordings: Union[Source, Sequence[Source]]) -> List[Union[str, _risley.Recording]]:
-    """One recording or several, as a list."""
-    if isinstance(recordings, (str, os.PathLike, _risley.Recording)):
-        return [source(recordings)]
-    return [source(recording) for recording in recordings]
+def keyword_defaults(function: Callable[..., Any]) -> Dict[str, Any]:
+    """What the keywords of a function are unless they are given."""
+    return {name: parameter.default
+            for name, parameter in inspect.signature(function).parameters.items()
+            if parameter.kind is parameter.KEYWORD_ONLY}
+
+
+def suggesting(function: Function) -> Function:
+    """The same function; its TypeError about an unknown keyword names the nearest one."""
+    parameters = inspect.signature(function).parameters
+    known = list(parameters)
+    if any(one.kind is one.VAR_KEYWORD for one in parameters.values()):
+        return function  # which says so itself
+
+    @functools.wraps(function)
+    def call(*args: Any, **keywords: Any) -> Any:
+        for name in keywords:
+            if name not in known:
+                raise TypeError(unknown_keyword(function.__name__, name, known))
+        return function(*args, **keywords)
+
+    return call  # type: ignore[return-value]
+
+
+def unknown_keyword(function: str, name: str, known: Iterable[str]) -> str:
+    """What to say about a keyword that a function does not have."""
+    near = difflib.get_close_matches(name, known, 1, 0.5)
+    return f"{function}() has no keyword {name}" + (f"; did you mean {near[0]}?" if near else "")
+
+
+def plain(name: str, value: Any) -> Any:
+    """What the libraries take for an option: a path as text, for a result what it stands for."""
+    if hasattr(value, "_as_option"):
+        value = value._as_option(name)
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
+
+
+def listed(name: str, given: Any) -> List[Any]:
+    """One thing or several, as a list of what the libraries take."""
+    if isinstance(given, (str, os.PathLike, *_IN_MEMORY)) or hasattr(given, "_as_option"):
+        given = [given]
+    return [plain(name, one) for one in given]
 
 
 def angle(name: str, radians: Optional[float], degrees: Optional[float]) -> Optional[float]:
@@ -54,34 +104,29 @@ def pose(radians: YawPitchRoll, degrees: YawPitchRoll) -> YawPitchRoll:
     return given[0], given[1], given[2]
 
 
-def paths(given: Union[Path, Sequence[Path]]) -> List[str]:
-    """One path or several, as a list."""
-    if isinstance(given, (str, os.PathLike)):
-        return [os.fspath(given)]
-    return [os.fspath(path) for path in given]
-
-
 def options_of(values: Mapping[str, Any]) -> Dict[str, Any]:
     """Keyword arguments of a job as the libraries take them: angles in radians, paths as texts."""
     options: Dict[str, Any] = {}
     for name, value in values.items():
         if name in ("progress", "stop", "threads") or name.removesuffix("_deg") in options:
             continue
+        value = plain(name, value)
         if name == "extrinsics":
             value = pose(value, values["extrinsics_deg"])
         elif name == "start_angles":
             value = angles(name, value, values["start_angles_deg"])
+        elif name == "process_noise" and isinstance(value, str):
+            degrees = values["process_noise_deg"]
+            value = angle(name, None if value == "auto" else 0.0, degrees) or value
         elif f"{name}_deg" in values:
             value = angle(name, value, values[f"{name}_deg"])
-        elif name == "recordings":
-            value = sources(value)
-        elif isinstance(value, os.PathLike):
-            value = os.fspath(value)
+        elif name in ("recordings", "truths", "results"):
+            value = listed(name, value)
         elif isinstance(value, Mapping):
             value = list(value.items())
         elif name == "fix":
             value = [(parameter, None) for parameter in value]
-        elif isinstance(value, Iterable) and not isinstance(value, (str, _risley.Recording)):
+        elif isinstance(value, Iterable) and not isinstance(value, (str, *_IN_MEMORY)):
             value = list(value)
         options[name] = value
     return options

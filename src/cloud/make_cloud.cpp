@@ -70,36 +70,42 @@ struct Piece {
   std::optional<std::string> failure;     ///< why there are none
 };
 
-class CloudMaker {
+}  // namespace
+
+class CloudMaker::Work {
  public:
-  CloudMaker(recordings::Reader& reader, const sensors::Sensor& calibration,
-             const std::string& path, const CloudOptions& options, const Progress& progress)
+  Work(recordings::Reader& reader, const sensors::Sensor& calibration, CloudSink sink,
+       const CloudOptions& options, const Progress& progress)
       : reader_(reader),
         calibration_(calibration),
-        path_(path),
+        sink_(std::move(sink)),
         options_(options),
         progress_(progress),
-        rotors_(needs_rotation_angles(calibration, options.pointing)) {}
-
-  CloudSummary run() {
+        rotors_(needs_rotation_angles(calibration, options.pointing)) {
     check_sensor();
     summary_.slips = reader_.header().slips;
-    summary_.format = find_cloud_format(path_, options_.writer.format).name;
-    piece_ = first_piece();
-    while (piece_) {
-      // While the points of one piece are made and written, the next is read and its rotors
-      // tracked.
-      std::unique_ptr<Piece> next;
-      parallel::TaskGroup ahead;
-      if (piece_->more) ahead.run([&] { next = piece_after(*piece_); });
-      emit();
-      ahead.wait();
-      spare_ = std::move(piece_->rows);
-      piece_ = std::move(next);
-    }
-    finish();
-    return std::move(summary_);
   }
+
+  bool next() {
+    if (finished_) return false;
+    if (!writer_) piece_ = first_piece();
+    if (!piece_) {
+      finish();
+      finished_ = true;
+      return false;
+    }
+    // While the points of one piece are made and written, the next is read and its rotors tracked.
+    std::unique_ptr<Piece> next;
+    parallel::TaskGroup ahead;
+    if (piece_->more) ahead.run([&] { next = piece_after(*piece_); });
+    emit();
+    ahead.wait();
+    spare_ = std::move(piece_->rows);
+    piece_ = std::move(next);
+    return true;
+  }
+
+  const CloudSummary& summary() const { return summary_; }
 
  private:
   void check_sensor() const {
@@ -254,6 +260,7 @@ class CloudMaker {
     header_.prisms = calibration_.prisms();
     header_.has_rotation_angles = rotors_;
     header_.has_covariance = options_.pointing.covariance;
+    header_.has_own_covariance = options_.own_covariance && header_.has_covariance;
     if (options_.loadings && header_.has_covariance) header_.factors = summary_.factors;
     if (georeference_) {
       georeference_->announce(header_);
@@ -263,7 +270,7 @@ class CloudMaker {
     summary_.frame = header_.frame.text;
     if (options_.sample) sampler_.emplace(header_.frame, *options_.sample);
     if (options_.provenance) header_.provenance = options_.provenance();
-    writer_ = create_cloud(path_, header_, options_.writer);
+    writer_ = sink_(header_);
   }
 
   /// Turns the piece into points.
@@ -533,7 +540,7 @@ class CloudMaker {
 
   recordings::Reader& reader_;
   const sensors::Sensor& calibration_;
-  const std::string& path_;
+  CloudSink sink_;
   const CloudOptions& options_;
   const Progress& progress_;
   CloudSummary summary_;
@@ -551,21 +558,38 @@ class CloudMaker {
   std::vector<RowBlock> blocks_;
   std::unique_ptr<Piece> piece_;  ///< that is being written
   Observations spare_;            ///< memory of the one before, for the one after
-  bool repointing_known_ = false;
+  bool repointing_known_ = false, finished_ = false;
 };
 
-}  // namespace
-
-CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calibration,
-                        const std::string& path, const CloudOptions& options,
-                        const Progress& progress) {
+CloudMaker::CloudMaker(recordings::Reader& reader, const sensors::Sensor& calibration,
+                       CloudSink sink, const CloudOptions& options, const Progress& progress) {
   if (options.distribution && !options.platform) {
     throw InvalidArgument(
         "how points lie on the ground is of a sensor that moves: a trajectory is missing");
   }
   if (options.rate) require_above("rate", *options.rate, 0, "Hz");
   if (options.angle_noise) require_above("angle noise", *options.angle_noise, 0, "rad");
-  return CloudMaker(reader, calibration, path, options, progress).run();
+  work_ = std::make_unique<Work>(reader, calibration, std::move(sink), options, progress);
+}
+CloudMaker::~CloudMaker() = default;
+
+bool CloudMaker::next() { return work_->next(); }
+
+const CloudSummary& CloudMaker::summary() const { return work_->summary(); }
+
+CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calibration,
+                        const std::string& path, const CloudOptions& options,
+                        const Progress& progress) {
+  const std::string format = find_cloud_format(path, options.writer.format).name;
+  const auto sink = [&](const CloudHeader& header) {
+    return create_cloud(path, header, options.writer);
+  };
+  CloudMaker maker(reader, calibration, sink, options, progress);
+  while (maker.next()) {
+  }
+  CloudSummary summary = maker.summary();
+  summary.format = format;
+  return summary;
 }
 
 }  // namespace risley::cloud

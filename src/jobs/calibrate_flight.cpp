@@ -52,7 +52,7 @@ cloud::MovingPlatform platform_of(const CalibrateFlightOptions& options, const P
         fmt::format("{} states no accuracies: give {}, which says how wrong the trajectory may be "
                     "and for how long. Without it, strips that do not fit may be the fault of "
                     "either the sensor or the trajectory",
-                    options.platform.trajectory, name_of(kSetting.trajectory_errors)));
+                    options.platform.trajectory.name(), name_of(kSetting.trajectory_errors)));
   }
   return platform;
 }
@@ -174,7 +174,7 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
   result.mount = platform.mount;
   result.errors = *platform.errors;
   for (const Warning& warning : platform.trajectory.warnings) {
-    result.warnings.push_back(of_file(options.platform.trajectory, warning));
+    result.warnings.push_back(of_file(options.platform.trajectory.name(), warning));
   }
   std::vector<scenes::KnownGround> control = control_of(options.control, platform.trajectory);
   result.strips = trajectories::flown_strips(trajectories::Interpolation(platform.trajectory));
@@ -207,7 +207,7 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
     throw EstimationError(fmt::format(
         "{} has {} strips (straight flight for ten seconds or more); at least 2 that overlap are "
         "needed, and crossing ones are best",
-        options.platform.trajectory, result.strips.size()));
+        options.platform.trajectory.name(), result.strips.size()));
   }
   // By the recordings' clock: what the offset really is will be found.
   std::vector<trajectories::FlownStrip> strips = result.strips;

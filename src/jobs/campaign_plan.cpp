@@ -23,6 +23,7 @@
 #include "risley/hashes/sha256.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/io/yaml_map.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/simulation_settings.hpp"
 #include "risley/recordings/writer.hpp"
 #include "risley/sensors/preset.hpp"
@@ -199,7 +200,7 @@ class PlanReader {
                     "quantize", "beam_origin", "rotor", "set", "reported", "scene", "station",
                     "stations", "format"});
     SimulationOptions options;
-    options.sensor = sensor(map, options.sensor);
+    options.sensor = sensor(map, kUsualSensor);
     options.duration = number(map, "duration_s", kMostDuration, "s");
     options.rate = number(map, "rate_hz", kMostRate, "Hz");
     options.angle_noise = number(map, "noise_angle_deg", kMostAngle_deg, "deg", kRadiansPerDegree);
@@ -210,7 +211,7 @@ class PlanReader {
       options.rotor =
           simulation::rotor_kind_from(choice(map, "rotor", simulation::rotor_kind_names()));
     }
-    const TrainShape shape = sensors::load_sensor(options.sensor).shape();
+    const TrainShape shape = load_result(options.sensor).shape();
     if (const auto* set = map.find("set")) options.set = values(set->value, "simulate.set", shape);
     if (const auto* reported = map.find("reported")) {
       if (reported->value.scalar == "nominal") {
@@ -250,7 +251,7 @@ class PlanReader {
   void take_common(const YamlMap& map, const SimulationOptions& simulation, Job& job) {
     job.sensor = sensor(map, "");
     const sensors::Sensor believed =
-        sensors::load_sensor(job.sensor.empty() ? simulation.sensor : job.sensor);
+        load_result(job.sensor.empty() ? simulation.sensor : job.sensor);
     const TrainShape shape = believed.shape();
     if (const auto* fix = map.find("fix")) {
       const std::string field = map.field("fix");

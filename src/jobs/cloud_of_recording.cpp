@@ -46,14 +46,18 @@ void require_same_type(const recordings::Source& recording, const CloudOfRecordi
     throw EstimationError(
         fmt::format("{} is a recording of a {}, and {} describes another kind of sensor ({})",
                     options.recording.name(), recordings::device_type_name(device.type),
-                    options.calibration, calibration.name));
+                    options.calibration.name(), calibration.name));
   }
 }
 
-}  // namespace
+/// What points are made of.
+struct Ingredients {
+  recordings::Source recording;  ///< held open
+  sensors::Sensor calibration;
+  cloud::CloudOptions settings;
+};
 
-RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
-                                  const Progress& progress) {
+Ingredients gather(const CloudOfRecordingOptions& options, const Progress& progress) {
   cloud::CloudOptions settings = options.cloud;
   if (settings.rate) require_positive(kSetting.rate, *settings.rate);
   if (settings.angle_noise) require_positive(kSetting.noise_angle, *settings.angle_noise);
@@ -63,42 +67,87 @@ RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
                                       name_of(kSetting.common_factors),
                                       name_of(kSetting.covariance)));
   }
-  const sensors::Sensor calibration = load_result(options.calibration);
-  cloud::find_cloud_format(options.output, settings.writer.format);  // before anything is read
+  sensors::Sensor calibration = load_result(options.calibration);
   recordings::Source recording = options.recording.held_open();
   require_same_type(recording, options, calibration, progress);
-  std::vector<recordings::Source> inputs{recording};
   if (moves(options.platform)) {
     if (!options.platform.crs.empty()) {  // before anything is read
       const std::string& datum = options.platform.datum;
       const cloud::MapProjection known(options.platform.crs, datum.empty() ? "EPSG:4979" : datum);
     }
     settings.platform = load_platform(options.platform, progress);
-    for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
   }
+  return {std::move(recording), std::move(calibration), std::move(settings)};
+}
+
+PreparedRecording prepare(Ingredients& of, const recordings::ReadOptions& reading,
+                          const Progress& progress) {
+  PreparedRecording input =
+      prepare_recording(std::exchange(of.recording, {}), reading,
+                        {.sensor_frame = true, .sensor = of.calibration}, progress);
+  input.close_questions();
+  return input;
+}
+
+RecordingCloud result_of(const CloudOfRecordingOptions& options, const sensors::Sensor& calibration,
+                         const PreparedRecording& input, cloud::CloudSummary summary) {
+  std::vector<Warning> warnings = input.all_warnings();
+  append(warnings, summary.warnings);
+  summary.warnings = std::move(warnings);
+  return {options.recording.name(), options.output, options.calibration.name(),
+          calibration.reference, std::move(summary)};
+}
+
+}  // namespace
+
+struct PointsOfRecording::State {
+  CloudOfRecordingOptions options;
+  Ingredients of;
+  PreparedRecording input;
+  cloud::CloudMaker maker;
+
+  State(const CloudOfRecordingOptions& wanted, cloud::CloudSink sink, const Progress& progress)
+      : options(wanted),
+        of(gather(options, progress)),
+        input(prepare(of, options.reading, progress)),
+        maker(*input.reader, of.calibration, std::move(sink), of.settings, progress) {}
+};
+
+PointsOfRecording::PointsOfRecording(const CloudOfRecordingOptions& options, cloud::CloudSink sink,
+                                     const Progress& progress)
+    : state_(std::make_unique<State>(options, std::move(sink), progress)) {}
+PointsOfRecording::~PointsOfRecording() = default;
+
+bool PointsOfRecording::next() { return state_->maker.next(); }
+
+RecordingCloud PointsOfRecording::result() const {
+  const State& s = *state_;
+  return result_of(s.options, s.of.calibration, s.input, s.maker.summary());
+}
+
+RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
+                                  const Progress& progress) {
+  cloud::find_cloud_format(options.output, options.cloud.writer.format);  // before anything is read
+  Ingredients of = gather(options, progress);
+  std::vector<recordings::Source> inputs{of.recording};
+  for (const std::string& path : paths_of(options.platform)) inputs.push_back(path);
   InputHashes hashes(inputs, progress);
   inputs.clear();
-  settings.provenance = [&] {
+  of.settings.provenance = [&] {
     Provenance provenance = hashes.with_inputs(options.provenance);
-    provenance.emplace_back("calibration", options.calibration);
-    const std::string file = calibration_in(options.calibration).value_or(options.calibration);
+    provenance.emplace_back("calibration", options.calibration.name());
+    const std::string path = options.calibration.path();
+    const std::string file = calibration_in(path).value_or(path);
     if (std::filesystem::is_regular_file(file)) {
       provenance.emplace_back("calibration_sha256", hashes::sha256_of_file(file));
     }
     return provenance;
   };
-  if (!settings.writer.date) settings.writer.date = day_of(options.recording);
-  PreparedRecording input =
-      prepare_recording(std::exchange(recording, {}), options.reading,
-                        {.sensor_frame = true, .sensor = calibration}, progress);
-  input.close_questions();
-  RecordingCloud result{
-      options.recording.name(), options.output, options.calibration, calibration.reference,
-      cloud::make_cloud(*input.reader, calibration, options.output, settings, progress)};
-  std::vector<Warning> warnings = input.all_warnings();
-  append(warnings, result.summary.warnings);
-  result.summary.warnings = std::move(warnings);
-  return result;
+  if (!of.settings.writer.date) of.settings.writer.date = day_of(options.recording);
+  const PreparedRecording input = prepare(of, options.reading, progress);
+  return result_of(
+      options, of.calibration, input,
+      cloud::make_cloud(*input.reader, of.calibration, options.output, of.settings, progress));
 }
 
 }  // namespace risley::jobs

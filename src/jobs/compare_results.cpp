@@ -234,7 +234,9 @@ calibration::PointingError directions_apart(const Sensor& a, const Sensor& b,
   return bundle.pointing_error(a.train, known.matrix);
 }
 
-Sensor load_result(const std::string& path) {
+Sensor load_result(const GivenSensor& given) {
+  if (given.value()) return *given.value();
+  const std::string& path = given.name();
   namespace fs = std::filesystem;
   std::error_code ignored;
   if (!fs::is_directory(path, ignored)) {
@@ -260,7 +262,7 @@ std::string one_unit_words(const ResultComparison& comparison) {
   return unknown ? "not known" : "no";
 }
 
-ResultComparison compare_results(const std::string& a, const std::string& b) {
+ResultComparison compare_results(const GivenSensor& a, const GivenSensor& b) {
   return compare_results(load_result(a), load_result(b));
 }
 

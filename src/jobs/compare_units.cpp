@@ -130,14 +130,15 @@ void load_table(const std::string& table, bool anywhere, LoadedResults& loaded,
 LoadedResults load(const CompareUnitsOptions& options, std::vector<LeftOut>& left_out,
                    const Progress& progress) {
   LoadedResults loaded;
-  for (const std::string& path : options.results) {
+  for (const GivenSensor& result : options.results) {
     progress.check();
     std::error_code ignored;
-    if (!fs::is_directory(path, ignored) && tables::is_table(path)) {
+    const std::string path = result.path();
+    if (!path.empty() && !fs::is_directory(path, ignored) && tables::is_table(path)) {
       loaded.any_table = true;
       load_table(path, options.anywhere, loaded, left_out, progress);
     } else {
-      loaded.add(path, load_result(path));
+      loaded.add(result.name(), load_result(result));
     }
   }
   return loaded;

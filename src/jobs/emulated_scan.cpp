@@ -49,7 +49,7 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   if (!grid) {
     throw InvalidArgument(fmt::format(
         "{} = {}: the device type {} is none that can be emulated, allowed {}",
-        name_of(kSetting.sensor), options.sensor, type, recordings::livox_types_text()));
+        name_of(kSetting.sensor), options.sensor.name(), type, recordings::livox_types_text()));
   }
   settings.rate = 1e9 * grid->interval_denominator / grid->interval_numerator_ns;
   if (!settings.scene) settings.scene = scenes::parse_scene(kRoom, "the built-in room");

@@ -11,17 +11,28 @@
 namespace risley::jobs {
 
 bool moves(const PlatformFiles& files) {
-  return !paths_of(files).empty() || !files.topic.empty() || !files.crs.empty() ||
+  return !files.trajectory.empty() || !files.mount.empty() || !files.accuracy.empty() ||
+         !files.errors.empty() || !files.topic.empty() || !files.crs.empty() ||
          !files.datum.empty();
 }
 
 std::vector<std::string> paths_of(const PlatformFiles& files) {
   std::vector<std::string> paths;
-  for (const std::string* path :
-       {&files.trajectory, &files.mount, &files.accuracy, &files.errors}) {
-    if (!path->empty()) paths.push_back(*path);
+  for (const std::string& path :
+       {files.trajectory.path(), files.mount.path(), files.accuracy, files.errors}) {
+    if (!path.empty()) paths.push_back(path);
   }
   return paths;
+}
+
+trajectories::Mount mount_of(const GivenMount& given) {
+  return given.value() ? *given.value() : trajectories::load_mount(given.name());
+}
+
+trajectories::Trajectory trajectory_of(const GivenTrajectory& given, const std::string& topic,
+                                       const Progress& progress) {
+  return given.value() ? *given.value()
+                       : trajectories::load_trajectory(given.name(), progress, topic);
 }
 
 cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& progress) {
@@ -37,8 +48,8 @@ cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& 
                     name_of(kSetting.mount)));
   }
   cloud::MovingPlatform platform;
-  platform.mount = trajectories::load_mount(files.mount);
-  platform.trajectory = trajectories::load_trajectory(files.trajectory, progress, files.topic);
+  platform.mount = mount_of(files.mount);
+  platform.trajectory = trajectory_of(files.trajectory, files.topic, progress);
   if (!files.accuracy.empty()) {
     trajectories::add_accuracies(platform.trajectory,
                                  trajectories::load_accuracies(files.accuracy, progress),

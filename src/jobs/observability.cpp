@@ -49,8 +49,8 @@ JudgedObservability judge_observability(const ObservabilityOptions& options,
   progress.check();
   JudgedObservability result;
   if (options.recording.empty()) {
-    const estimation::EstimateOptions settings =
-        settings_of(options, load_result(options.sensor.empty() ? kUsualSensor : options.sensor));
+    const estimation::EstimateOptions settings = settings_of(
+        options, load_result(options.sensor.empty() ? GivenSensor(kUsualSensor) : options.sensor));
     result.shape = settings.sensor.shape();
     result.observability = of_plan(options, settings, progress.silent());
   } else {

@@ -34,7 +34,7 @@ struct Followed {
 
 class OpticsWatch::Work {
  public:
-  Work(const std::vector<WatchedSensor>& sensors, const std::string& reference) {
+  Work(const std::vector<WatchedSensor>& sensors, const GivenSensor& reference) {
     const std::optional<sensors::Sensor> given = given_sensor(reference);
     for (const WatchedSensor& watched : sensors) {
       OpticsHealth& health = health_.emplace_back();
@@ -44,7 +44,7 @@ class OpticsWatch::Work {
         if (given->device_type != watched.device_type) {
           throw InvalidArgument(fmt::format(
               "{}: it is a {}, and the sensor {} on the network is a {}; name another reference",
-              reference,
+              reference.name(),
               recordings::device_type_name(static_cast<std::uint8_t>(given->device_type)),
               watched.serial, recordings::device_type_name(watched.device_type)));
         }
@@ -194,7 +194,7 @@ class OpticsWatch::Work {
   std::thread thread_;
 };
 
-OpticsWatch::OpticsWatch(const std::vector<WatchedSensor>& sensors, const std::string& reference)
+OpticsWatch::OpticsWatch(const std::vector<WatchedSensor>& sensors, const GivenSensor& reference)
     : work_(std::make_unique<Work>(sensors, reference)) {}
 OpticsWatch::~OpticsWatch() = default;
 

@@ -15,7 +15,7 @@ constexpr double kMostDrawn = 25'000;
 
 }  // namespace
 
-PatternDetails pattern_details(const std::string& sensor, const sensors::ScanPatternOptions& scan,
+PatternDetails pattern_details(const GivenSensor& sensor, const sensors::ScanPatternOptions& scan,
                                const sensors::CoverageOptions& coverage, const Progress& progress) {
   PatternDetails result;
   result.sensor = load_result(sensor);

@@ -19,7 +19,7 @@ PlannedCalibration plan_calibration(const PlanCalibrationOptions& options,
   require_not_negative(kSetting.range_offset_sigma, options.range_offset_sigma);
   calibration::CalibrationPlan plan;
   plan.scene = options.scene;
-  plan.sensor = load_result(options.sensor.empty() ? kUsualSensor : options.sensor);
+  plan.sensor = load_result(options.sensor.empty() ? GivenSensor(kUsualSensor) : options.sensor);
   plan.fixed = hold(options.fixed, plan.sensor);
   plan.additional = options.additional;
   plan.duration = options.duration;

@@ -12,6 +12,7 @@
 #include "risley/core/setting.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/compare_results.hpp"
+#include "risley/jobs/moving_platform.hpp"
 #include "risley/scenes/scene.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -77,7 +78,7 @@ void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) 
                     "be, and for how long",
                     name_of(kSetting.trajectory_errors)));
   }
-  options.mount = trajectories::load_mount(files.mount);
+  options.mount = mount_of(files.mount);
   options.errors = trajectories::load_error_model(files.errors);
   if (files.scene.empty()) return;
   const scenes::Scene scene = scenes::load_scene(files.scene);
@@ -103,7 +104,7 @@ PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress
     }
   }
   PlannedFlightResult result;
-  result.sensor = load_result(options.sensor.empty() ? kUsualSensor : options.sensor);
+  result.sensor = load_result(options.sensor.empty() ? GivenSensor(kUsualSensor) : options.sensor);
   calibration::FlightForecastOptions wanted;
   if (options.rate) wanted.rate = *options.rate;
   calibration::FlightCalibrationOptions& own = wanted.calibration;

@@ -568,9 +568,9 @@ std::optional<Sensor> preset_of_type(int device_type) {
   return sensors::load_sensor(name);
 }
 
-std::optional<Sensor> given_sensor(const std::string& name_or_path) {
-  if (name_or_path.empty()) return std::nullopt;
-  return load_result(name_or_path);
+std::optional<Sensor> given_sensor(const GivenSensor& given) {
+  if (given.empty()) return std::nullopt;
+  return load_result(given);
 }
 
 SensorChoice choose_sensor(const recordings::Source& source, const recordings::ReadOptions& reading,

@@ -12,6 +12,7 @@
 #include "risley/core/require.hpp"
 #include "risley/core/setting.hpp"
 #include "risley/jobs/compare_results.hpp"
+#include "risley/jobs/moving_platform.hpp"
 #include "risley/sensors/preset.hpp"
 #include "risley/sensors/range_values.hpp"
 #include "risley/trajectories/trajectory_file.hpp"
@@ -91,9 +92,9 @@ std::optional<simulation::Platform> platform_from(const SimulationOptions& optio
     if (!terrain || !terrain->parts().origin) platform.map_origin = plan.origin;
   } else {
     platform.trajectory = std::make_shared<trajectories::Trajectory>(
-        trajectories::load_trajectory(options.trajectory, {}, options.topic));
+        trajectory_of(options.trajectory, options.topic));
   }
-  platform.mount = trajectories::load_mount(options.mount);
+  platform.mount = mount_of(options.mount);
   platform.clock_drift = options.clock_drift.value_or(0.0);
   if (options.start) {
     require_between(kSetting.start, *options.start, 0, 1e9);

@@ -31,8 +31,12 @@ py::array_t<T> view_of(const std::vector<T>& column, const std::shared_ptr<const
 /// An array that owns what was a vector.
 template <class T>
 py::array_t<T> array_of(std::vector<T> values) {
-  const auto owner = std::make_shared<const std::vector<T>>(std::move(values));
-  return view_of(*owner, owner);
+  auto owner = std::make_unique<std::vector<T>>(std::move(values));
+  const auto size = static_cast<py::ssize_t>(owner->size());
+  T* const data = owner->data();
+  const py::capsule base(owner.release(),
+                         [](void* held) { delete static_cast<std::vector<T>*>(held); });
+  return py::array_t<T>(size, data, base);
 }
 
 /// A matrix [rows, columns], or a vector, as an array of its own.

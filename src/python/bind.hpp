@@ -15,6 +15,9 @@ void bind_calls(py::module_& module);
 void bind_recordings(py::module_& module);
 void bind_optics(py::module_& module);
 void bind_sensors(py::module_& module);
+void bind_trajectories(py::module_& module);
+void bind_rotors(py::module_& module);
+void bind_points(py::module_& module);
 void bind_jobs(py::module_& module);
 void bind_network(py::module_& module);
 

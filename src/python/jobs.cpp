@@ -18,6 +18,7 @@
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/campaign.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/compare_units.hpp"
 #include "risley/jobs/identify_recording.hpp"
 #include "risley/jobs/inspect_recording.hpp"
@@ -38,6 +39,7 @@
 #include "python/names.hpp"
 #include "python/options.hpp"
 #include "python/results.hpp"
+#include "python/rotors.hpp"
 
 namespace risley::python {
 namespace {
@@ -102,6 +104,7 @@ py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const 
                              [](const Found& found) { return solution_of(found).sensor; });
   type.def_property_readonly("table", &table_with_covariance<Found>);
   type.def_property_readonly("html", [](const Found& found) { return html_of(json::of(found)); });
+  type.def_property_readonly("text", [](const Found& found) { return text_of(json::of(found)); });
   type.def("to_dict", [](const Found& found) { return dict_of(json::of(found)); });
   type.def(
       "report_text",
@@ -134,14 +137,18 @@ py::object told_by(const py::object& tell, int threads, const Job& job) {
   return dict_of(json::of(*found_by(tell, threads, job)));
 }
 
-/// Shots per second to use: a number, or 'full' for all.
-void take_rate(const Options& options, std::optional<double>& rate) {
-  if (options.is<py::str>("rate")) {
-    options.choice("rate", {"full"});
-    rate.reset();
-    return;
+/// 'auto', 'paper', 'none', or the random walk of the speeds, (rad/s) / sqrt(s).
+std::optional<estimation::RotorProcess> rotor_process(const Options& options) {
+  estimation::RotorProcess process = estimation::kPaperProcess;
+  if (options.is<py::str>("process_noise")) {
+    const std::size_t word = options.choice("process_noise", {"auto", "paper", "none"});
+    if (word == 0) return std::nullopt;
+    return word == 1 ? process : estimation::kConstantAcceleration;
   }
-  options.take("rate", rate);
+  if (!options.has("process_noise")) return std::nullopt;
+  options.take("process_noise", process.acceleration);
+  require_positive(kSetting.process_noise, process.acceleration);
+  return process;
 }
 
 jobs::EstimateRecordingOptions estimate_options(const Options& options) {
@@ -156,6 +163,7 @@ jobs::EstimateRecordingOptions estimate_options(const Options& options) {
   options.take("noise_angle", job.angle_noise);
   job.fixed = held_parameters(options);
   job.additional = parameter_names(options, "free");
+  job.rotor_process = rotor_process(options);
   options.take("mirror", job.mirrored);
   options.take("truth", job.truth);
   job.files = result_files(options, "estimate");
@@ -292,33 +300,6 @@ void bind_planned(py::module_& module, const char* name) {
       .def("to_dict", [](const Planned& planned) { return dict_of(json::of(planned)); });
 }
 
-jobs::CloudOfRecordingOptions cloud_options(const Options& options) {
-  jobs::CloudOfRecordingOptions job;
-  job.recording = recording_source(options, "recording");
-  job.reading = read_options(options);
-  options.take("calibration", job.calibration);
-  options.take("output", job.output);
-  job.platform = platform_files(options);
-  cloud::CloudOptions& settings = job.cloud;
-  settings.pointing.reported_directions =
-      options.choice("directions", {"smoothed", "reported"}) == 1;
-  options.take("beam_origin", settings.pointing.beam_origin);
-  options.take("beam_divergence", settings.pointing.beam_divergence);
-  options.take("covariance", settings.pointing.covariance);
-  options.take("common_factors", settings.loadings);
-  settings.rate = cloud::kTrackingRate;
-  take_rate(options, settings.rate);
-  options.take("noise_angle", settings.angle_noise);
-  options.take("las_scale", settings.writer.las_scale);
-  options.take("format", settings.writer.format);
-  settings.writer.gps_time = options.choice("time", {"gps", "recording"}) == 0;
-  bool distribution = false;
-  options.take("distribution", distribution);
-  if (distribution) settings.distribution.emplace();
-  job.provenance = provenance_of("cloud");
-  return job;
-}
-
 py::object cloud(const py::dict& values, int threads, const py::object& tell) {
   return told_by(tell, threads, [job = cloud_options(Options(values))](const Progress& progress) {
     return jobs::cloud_of_recording(job, progress);
@@ -392,9 +373,54 @@ py::object pattern(const py::dict& values, int threads, const py::object& tell) 
                  [&](const Progress& progress) { return jobs::write_pattern(job, progress); });
 }
 
+/// Directions of a scan [rows, 3] in the precision that is asked for.
+template <class Number>
+py::array directions(const sensors::Sensor& sensor, const jobs::PatternRows& rows,
+                     const sensors::ScanPatternOptions& scan, int threads, const py::object& tell) {
+  py::array_t<Number> array({static_cast<py::ssize_t>(rows.count), py::ssize_t{3}});
+  const std::span<Number> out(array.mutable_data(), 3 * rows.count);
+  run_job(tell, threads, [&](const Progress& progress) {
+    jobs::pattern_directions(sensor, rows.first, out, scan, progress);
+  });
+  return array;
+}
+
+struct Scan {
+  sensors::Sensor sensor;
+  sensors::ScanPatternOptions options;
+  jobs::PatternRows rows;
+
+  explicit Scan(const Options& given) : options(scan_options(given)) {
+    jobs::GivenSensor chosen;
+    double start = 0, duration = 1;
+    given.take("sensor", chosen);
+    given.take("start", start);
+    given.take("duration", duration);
+    sensor = unlocked([&] { return jobs::load_result(chosen); });
+    rows = jobs::pattern_rows(sensor, start, duration, options);
+  }
+};
+
+py::array pattern_directions(const py::dict& values, int threads, const py::object& tell) {
+  const Options options(values);
+  const Scan scan(options);
+  return options.choice("dtype", {"float64", "float32"}) == 0
+             ? directions<double>(scan.sensor, scan.rows, scan.options, threads, tell)
+             : directions<float>(scan.sensor, scan.rows, scan.options, threads, tell);
+}
+
+/// Times, s, and emitters of the same rows.
+py::tuple pattern_times(const py::dict& values) {
+  const Scan scan{Options(values)};
+  sensors::ScanPattern found = unlocked([&] {
+    return sensors::scan_times(scan.sensor, scan.rows.first, scan.rows.count, scan.options);
+  });
+  return py::make_tuple(array_of(std::move(found.time)), array_of(std::move(found.emitter)));
+}
+
 py::object coverage(const py::dict& values, int threads, const py::object& tell) {
   const Options options(values);
-  std::string sensor;
+  jobs::GivenSensor sensor;
   options.take("sensor", sensor);
   sensors::CoverageOptions settings;
   options.take("after", settings.after);
@@ -423,11 +449,15 @@ py::object observability(const py::dict& values, int threads, const py::object& 
   });
 }
 
-py::object compare(const std::vector<std::string>& results, double false_alarm, bool anywhere,
-                   bool unlike, const py::object& tell) {
-  return told_by(tell, 0, [&](const Progress& progress) {
-    return jobs::compare_units({results, false_alarm, anywhere, unlike}, progress);
-  });
+py::object compare(const py::dict& values, const py::object& tell) {
+  const Options options(values);
+  jobs::CompareUnitsOptions job;
+  options.take("results", job.results);
+  options.take("false_alarm", job.false_alarm);
+  options.take("anywhere", job.anywhere);
+  options.take("unlike", job.unlike);
+  return told_by(tell, 0,
+                 [&](const Progress& progress) { return jobs::compare_units(job, progress); });
 }
 
 py::object campaign(const py::dict& values, int threads, const py::object& tell) {
@@ -495,7 +525,8 @@ std::vector<std::pair<std::string, std::vector<std::string>>> settings_of(const 
   std::vector<std::pair<std::string, std::vector<std::string>>> settings;
   for (const auto& [name, value] : values) {
     if (py::str(name).equal(py::str("output"))) continue;
-    settings.push_back({py::str(name), {py::str(value)}});
+    const bool in_memory = py::hasattr(value, "to_text");  // whose repr does not tell its content
+    settings.push_back({py::str(name), {py::str(in_memory ? value.attr("to_text")() : value)}});
   }
   return settings;
 }
@@ -551,13 +582,23 @@ void bind_jobs(py::module_& module) {
       .def_property_readonly("covariance",
                              [](const ValueTable& table) { return array_of(table.covariance); });
   bind_found<EstimatedRecording>(module, "EstimatedRecording")
-      .def_property_readonly("residuals", [](const EstimatedRecording& found) {
-        estimation::ShotResiduals residuals = residuals_of_shots(found.estimate);
-        return py::make_tuple(array_of(std::move(residuals.azimuth)),
-                              array_of(std::move(residuals.zenith)));
+      .def_property_readonly("residuals",
+                             [](const EstimatedRecording& found) {
+                               estimation::ShotResiduals residuals =
+                                   residuals_of_shots(found.estimate);
+                               return py::make_tuple(array_of(std::move(residuals.azimuth)),
+                                                     array_of(std::move(residuals.zenith)));
+                             })
+      .def_property_readonly("motion", [](const EstimatedRecording& found) {
+        return unlocked([&] { return motion_of(found.estimate); });
       });
   bind_found<CalibratedRecordings>(module, "CalibratedRecordings");
-  bind_found<CalibratedFlight>(module, "CalibratedFlight");
+  bind_found<CalibratedFlight>(module, "CalibratedFlight")
+      .def_property_readonly("mount",
+                             [](const CalibratedFlight& found) { return found.calibration.mount; })
+      .def_property_readonly("trajectory", [](const CalibratedFlight& found) {
+        return std::make_shared<trajectories::Trajectory>(found.calibration.trajectory);
+      });
   bind_planned<jobs::PlannedCalibration>(module, "PlannedCalibration");
   bind_planned<jobs::PlannedFlightResult>(module, "PlannedFlight");
   module.def("write_page", &write_page, py::arg("report"), py::arg("path"));
@@ -573,10 +614,11 @@ void bind_jobs(py::module_& module) {
   module.def("simulate", &simulate, options, threads, tell);
   module.def("identify", &identify, options, threads, tell);
   module.def("pattern", &pattern, options, threads, tell);
+  module.def("pattern_directions", &pattern_directions, options, threads, tell);
+  module.def("pattern_times", &pattern_times, options);
   module.def("coverage", &coverage, options, threads, tell);
   module.def("observability", &observability, options, threads, tell);
-  module.def("compare", &compare, py::arg("results"), py::arg("false_alarm"), py::arg("anywhere"),
-             py::arg("unlike"), tell);
+  module.def("compare", &compare, options, tell);
   module.def("campaign", &campaign, options, threads, tell);
   module.def("info", &info, options, tell);
   module.def("run_many", &run_many, py::arg("verb"), options, py::arg("many"), threads, tell);

@@ -11,7 +11,7 @@ PYBIND11_MODULE(_risley, module) {
   using namespace risley::python;
   risley::write_settings_as(risley::SettingStyle::keyword);
   py::options options;
-  options.disable_function_signatures();  // the stubs have them
+  options.disable_function_signatures();  // docs begin with them: "name(self, ...)\n--\n\n"
   module.doc() = "The libraries of risley; use the package risley, which documents them.";
   module.attr("__version__") = RISLEY_VERSION;
   module.def("radians", &risley::radians_from_degrees, py::arg("degrees"),
@@ -24,6 +24,9 @@ PYBIND11_MODULE(_risley, module) {
   bind_recordings(module);
   bind_optics(module);
   bind_sensors(module);
+  bind_trajectories(module);
+  bind_rotors(module);
+  bind_points(module);
   bind_jobs(module);
   bind_network(module);
 }

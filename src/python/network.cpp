@@ -56,10 +56,10 @@ jobs::RecordOptions record_options(const Options& options) {
   }
   options.take("imu", job.imu);
   options.take("output", job.output);
-  std::string optics;
+  jobs::GivenSensor optics;
   options.take("optics", optics);
   job.watch_optics = !optics.empty();
-  if (optics != "own") job.optics_reference = optics;
+  if (optics.path() != "own") job.optics_reference = optics;
   return job;
 }
 
@@ -146,8 +146,8 @@ void bind_network(py::module_& module) {
                                "Ends a recording or a virtual sensor from another thread.\n\n"
                                "Give it as ``stop`` and call `set`; it cannot be used again.")
       .def(py::init<>())
-      .def("set", &CancelFlag::set, "End what was given this, within a second.")
-      .def("is_set", &CancelFlag::is_set, "Whether `set` was called.");
+      .def("set", &CancelFlag::set, "set(self)\n--\n\nEnd what was given this, within a second.")
+      .def("is_set", &CancelFlag::is_set, "is_set(self)\n--\n\nWhether `set` was called.");
   const auto options = py::arg("options");
   const auto note = py::arg("note");
   const auto stop = py::arg("stop").none(true);

@@ -238,7 +238,7 @@ void bind_optics(py::module_& module) {
              train.set(parameter.info->name, value * parameter.si_per_unit);
            })
       .def("without_errors", &PrismTrain::without_errors,
-           "The same glass and wedges with every error 0.")
+           "without_errors(self)\n--\n\nThe same glass and wedges with every error 0.")
       .def("__copy__", [](const PrismTrain& train) { return train; })
       .def("__deepcopy__", [](const PrismTrain& train, const py::dict&) { return train; })
       .def("__eq__",

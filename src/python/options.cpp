@@ -43,9 +43,9 @@ std::size_t Options::choice(const char* name, const std::vector<std::string>& al
   return static_cast<std::size_t>(found - allowed.begin());
 }
 
-py::type_error Options::wrong_type(const char* name) const {
+py::type_error Options::wrong_type(const char* name, const py::handle& value) {
   return py::type_error(fmt::format("{} = {} has a type that is not accepted here", name,
-                                    py::repr(values_[name]).cast<std::string>()));
+                                    py::repr(value).cast<std::string>()));
 }
 
 recordings::Source recording_source(const Options& options, const char* name) {
@@ -161,6 +161,42 @@ jobs::ResultFiles result_files(const Options& options, const char* job) {
   options.take("seed", seed);
   files.provenance.emplace_back("seed", std::to_string(seed));
   return files;
+}
+
+void take_rate(const Options& options, std::optional<double>& rate) {
+  if (options.is<py::str>("rate")) {
+    options.choice("rate", {"full"});
+    rate.reset();
+    return;
+  }
+  options.take("rate", rate);
+}
+
+jobs::CloudOfRecordingOptions cloud_options(const Options& options) {
+  jobs::CloudOfRecordingOptions job;
+  job.recording = recording_source(options, "recording");
+  job.reading = read_options(options);
+  options.take("calibration", job.calibration);
+  options.take("output", job.output);
+  job.platform = platform_files(options);
+  cloud::CloudOptions& settings = job.cloud;
+  settings.pointing.reported_directions =
+      options.choice("directions", {"smoothed", "reported"}) == 1;
+  options.take("beam_origin", settings.pointing.beam_origin);
+  options.take("beam_divergence", settings.pointing.beam_divergence);
+  options.take("covariance", settings.pointing.covariance);
+  options.take("common_factors", settings.loadings);
+  settings.rate = cloud::kTrackingRate;
+  take_rate(options, settings.rate);
+  options.take("noise_angle", settings.angle_noise);
+  options.take("las_scale", settings.writer.las_scale);
+  options.take("format", settings.writer.format);
+  settings.writer.gps_time = options.choice("time", {"gps", "recording"}) == 0;
+  bool distribution = false;
+  options.take("distribution", distribution);
+  if (distribution) settings.distribution.emplace();
+  job.provenance = provenance_of("cloud");
+  return job;
 }
 
 }  // namespace risley::python

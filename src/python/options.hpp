@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -12,11 +13,14 @@
 #include <pybind11/stl.h>
 
 #include "risley/core/error.hpp"
+#include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/given.hpp"
 #include "risley/jobs/moving_platform.hpp"
 #include "risley/jobs/result_files.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/jobs/simulation_settings.hpp"
 #include "risley/recordings/reader.hpp"
+#include "risley/trajectories/trajectory.hpp"
 
 #include "python/bind.hpp"
 
@@ -46,7 +50,21 @@ class Options {
     try {
       to = values_[name].cast<T>();
     } catch (const py::cast_error&) {
-      throw wrong_type(name);
+      throw wrong_type(name, values_[name]);
+    }
+  }
+  /// What is in memory, or a path.
+  template <class T>
+  void take(const char* name, jobs::Given<T>& to) const {
+    if (!has(name)) return;
+    to = given<T>(values_[name], name);
+  }
+  /// Several of them.
+  template <class T>
+  void take(const char* name, std::vector<jobs::Given<T>>& to) const {
+    if (!has(name)) return;
+    for (const py::handle one : values_[name]) {
+      to.push_back(given<T>(one, fmt::format("result {}", to.size() + 1).c_str()));
     }
   }
   template <class T>
@@ -59,7 +77,15 @@ class Options {
                      std::size_t usual = 0) const;
 
  private:
-  py::type_error wrong_type(const char* name) const;
+  template <class T>
+  jobs::Given<T> given(const py::handle& value, const char* name) const {
+    if (py::isinstance<T>(value)) {
+      return {std::make_shared<const T>(value.cast<const T&>()), fmt::format("{} in memory", name)};
+    }
+    if (py::isinstance<py::str>(value)) return value.cast<std::string>();
+    throw wrong_type(name, value);
+  }
+  static py::type_error wrong_type(const char* name, const py::handle& value);
 
   py::dict values_;
 };
@@ -81,6 +107,10 @@ jobs::PlatformFiles platform_files(const Options& options);
 /// What `simulate` and `emulate` share: sensor, set, reported, reported_nominal, noise_angle,
 /// noise_range, quantize, beam_origin, rotor, start_angles, scene, station, seed.
 jobs::SimulationOptions simulation_options(const Options& options, int threads);
+/// rate: shots per second to use, Hz, or 'full' for all.
+void take_rate(const Options& options, std::optional<double>& rate);
+/// What `cloud` and `points` share: all but where the points go.
+jobs::CloudOfRecordingOptions cloud_options(const Options& options);
 /// output: the folder of results; states: knots, all or none.
 jobs::ResultFiles result_files(const Options& options, const char* job);
 /// What a file says of the program that made it.

@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 #include <pybind11/stl.h>
 
+#include "risley/core/direction.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/json/results.hpp"
@@ -241,6 +242,44 @@ SharedRecording recording_from_arrays(const py::object& time_ns, const py::objec
   return recording;
 }
 
+/// Some rows as a recording of their own. @param key  as numpy takes it of an array of all rows
+SharedRecording some_rows(const SharedRecording& recording, const py::object& key) {
+  const Observations& all = recording->data.observations;
+  const py::module_ numpy = py::module_::import("numpy");
+  const py::object chosen = numpy.attr("arange")(all.size()).attr("__getitem__")(key);
+  const Times rows = times_from(numpy.attr("atleast_1d")(chosen), "rows");
+  if (rows.ndim() != 1) throw py::index_error("rows of a recording have one index");
+  return unlocked([&] {
+    auto part = std::make_shared<Recording>();
+    part->header = recording->header;
+    part->header.packet_shots = 0;  // packets were not cut
+    part->header.slips.clear();
+    part->warnings = recording->warnings;
+    const std::vector<std::size_t> places(rows.data(), rows.data() + rows.size());
+    part->data.observations.append(all, places);
+    return part;
+  });
+}
+
+/// Points in the sensor's frame [rows, 3], m; NaN where there is no return.
+py::array_t<double> xyz_of(const Recording& recording) {
+  const Observations& rows = recording.data.observations;
+  py::array_t<double> xyz({static_cast<py::ssize_t>(rows.size()), py::ssize_t{3}});
+  double* to = xyz.mutable_data();
+  unlocked([&] {
+    for (std::size_t i = 0; i < rows.size(); ++i, to += 3) {
+      const bool found = rows.valid[i] != 0 && rows.range[i] > 0;
+      const double range = found ? rows.range[i] : std::numeric_limits<double>::quiet_NaN();
+      const Vector3<double> direction =
+          direction_from_angles<double>({rows.azimuth[i], rows.zenith[i]});
+      to[0] = range * direction.x;
+      to[1] = range * direction.y;
+      to[2] = range * direction.z;
+    }
+  });
+  return xyz;
+}
+
 /// A property with the column of that name.
 void bind_column(py::class_<Recording, SharedRecording>& type,
                  const recordings::ObservationColumn& entry) {
@@ -312,6 +351,26 @@ void bind_recordings(py::module_& module) {
       "NaN.\n"
       "`read` and `read_chunks` make recordings of files, `from_arrays` of numbers.");
   type.def("__len__", [](const Recording& recording) { return recording.data.observations.size(); })
+      .def("__getitem__", &some_rows, py::arg("key"))
+      .def_property_readonly("xyz", &xyz_of,
+                             "Points in the sensor's frame, m, NaN where there is no return; shape "
+                             "(rows, 3). A new array of float64.")
+      .def(
+          "to_xarray",
+          [](const py::object& self) {
+            return py::module_::import("risley._recordings").attr("to_xarray")(self);
+          },
+          "to_xarray(self)\n--\n\nAll columns as an `xarray.Dataset` over ``row``.")
+      .def(
+          "to_pandas",
+          [](const py::object& self) {
+            return py::module_::import("risley._recordings").attr("to_pandas")(self);
+          },
+          "to_pandas(self)\n--\n\nAll columns as a `pandas.DataFrame`.")
+      .def("__reduce__",
+           [](const py::object& self) {
+             return py::module_::import("risley._recordings").attr("reduced")(self);
+           })
       .def_readonly("header", &Recording::header, "What is known of the whole recording.")
       .def_property_readonly(
           "warnings", [](const Recording& recording) { return warnings_of(recording.warnings); },
@@ -321,6 +380,7 @@ void bind_recordings(py::module_& module) {
                            recording.data.observations.size());
       });
   for (const auto& entry : recordings::kObservationColumns) bind_column(type, entry);
+  type.attr("emitter") = type.attr("beam");
 
   py::class_<ChunkReader>(module, "ChunkReader",
                           "Iterator over the pieces of a recording; see `read_chunks`.")
@@ -335,7 +395,8 @@ void bind_recordings(py::module_& module) {
       .def("__next__", &ChunkReader::next)
       .def("__enter__", [](py::object self) { return self; })
       .def("__exit__", [](ChunkReader& self, const py::args&) { self.close(); })
-      .def("close", &ChunkReader::close, "Closes the file; there are no further pieces.")
+      .def("close", &ChunkReader::close,
+           "close(self)\n--\n\nCloses the file; there are no further pieces.")
       .def_property_readonly("header", &ChunkReader::header,
                              "What is known of the whole recording.")
       .def_property_readonly(

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "python/results.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -20,6 +22,22 @@ namespace {
 
 double number_of(const Json& object, const char* key) {
   return object.contains(key) && object[key].is_number() ? object[key].get<double>() : std::nan("");
+}
+
+/// Name, value, sigma, sigma given what is held, and unit, in the units of files.
+using Row = std::array<std::string, 5>;
+
+std::vector<Row> rows_of(const ValueTable& table) {
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < table.names.size(); ++i) {
+    const FileUnit unit = file_unit(table.units[i]);
+    const double value = table.values[i] / unit.si_per_unit;
+    const NumberText text = number_text(value, table.sigmas_given_held[i] / unit.si_per_unit);
+    rows.push_back({table.file_names[i], text.value,
+                    number_text(value, table.sigmas[i] / unit.si_per_unit).sigma, text.sigma,
+                    unit.name});
+  }
+  return rows;
 }
 
 }  // namespace
@@ -52,20 +70,39 @@ ValueTable table_of(const Json& result) {
 
 std::string html_of(const Json& result) {
   const Json& verdict = result.at("verdict");
-  const ValueTable table = table_of(result);
   std::string html = fmt::format(
       "<p><b>{}</b>: {}</p><table><tr><th>parameter</th><th>value</th><th>&plusmn; sigma</th>"
       "<th>unit</th></tr>",
       verdict.at("code").get<std::string>(),
       report::escape_html(verdict.at("words").get<std::string>()));
-  for (std::size_t i = 0; i < table.names.size(); ++i) {
-    const FileUnit unit = file_unit(table.units[i]);
-    const NumberText text =
-        number_text(table.values[i] / unit.si_per_unit, table.sigmas[i] / unit.si_per_unit);
-    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-                        table.file_names[i], text.value, text.sigma, unit.name);
+  for (const Row& row : rows_of(table_of(result))) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>", row[0], row[1],
+                        row[2], row[4]);
   }
   return html + "</table>";
+}
+
+std::string text_of(const Json& result) {
+  const Json& verdict = result.at("verdict");
+  const ValueTable table = table_of(result);
+  const bool any_held = table.sigmas != table.sigmas_given_held;
+  std::vector<Row> rows = rows_of(table);
+  rows.insert(rows.begin(), {"parameter", "value", "+- sigma", "given held", "unit"});
+  std::array<std::size_t, 5> width{};
+  for (const Row& row : rows) {
+    for (std::size_t i = 0; i < width.size(); ++i) width[i] = std::max(width[i], row[i].size());
+  }
+  std::string text = fmt::format("{}\nwhat to do: {}\n", verdict.at("words").get<std::string>(),
+                                 verdict.at("to_do").get<std::string>());
+  for (const Row& row : rows) {
+    std::string line = fmt::format("{:<{}}", row[0], width[0]);
+    for (std::size_t i = 1; i < width.size(); ++i) {
+      if (i != 3 || any_held) line += fmt::format("  {:>{}}", row[i], width[i]);
+    }
+    text += "\n" + line;
+    if (&row == &rows.front()) text += "\n" + std::string(line.size(), '-');
+  }
+  return text;
 }
 
 }  // namespace risley::python

@@ -28,5 +28,7 @@ ValueTable table_of(const json::Json& result);
 
 /// The verdict and a table of what was found, in the units of files.
 std::string html_of(const json::Json& result);
+/// The same as text, as the command prints them.
+std::string text_of(const json::Json& result);
 
 }  // namespace risley::python

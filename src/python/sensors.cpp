@@ -80,16 +80,19 @@ void bind_sensors(py::module_& module) {
           "from_text",
           [](const std::string& text) { return sensors::parse_preset(text, "the text"); },
           py::arg("text"),
-          "A sensor from the text of a preset (YAML).\n\n"
+          "from_text(text)\n--\n\nA sensor from the text of a preset (YAML).\n\n"
           "Raises\n------\nFileError\n    With the line, where the text breaks the schema.")
       .def("to_text", &sensors::preset_text,
-           "The text of its preset (YAML), which `from_text` reads with every digit.")
+           "to_text(self)\n--\n\nThe text of its preset (YAML), which `from_text` reads with every "
+           "digit.")
       .def("write", &write_sensor, py::arg("path"),
-           "Writes its preset, which every command and `load_sensor` take.\n\n"
+           "write(self, path)\n--\n\nWrites its preset, which every command and `load_sensor` "
+           "take.\n\n"
            "Raises\n------\nFileError\n    When the file cannot be written.")
       .def_readwrite("name", &Sensor::name, "Name of the preset.")
       .def_readonly("manufacturer", &Sensor::manufacturer, "Who makes it.")
       .def_readonly("model", &Sensor::model, "Commercial name.")
+      .def_readonly("device_type", &Sensor::device_type, "Livox number of its type.")
       .def_readwrite("serial", &Sensor::serial, "Serial number; empty for a type.")
       .def_property_readonly(
           "train", [](const Sensor& sensor) { return sensor.train; }, "A copy of its optics.")
@@ -100,14 +103,17 @@ void bind_sensors(py::module_& module) {
       .def_readonly("combination", &Sensor::combination,
                     "Number of its speed combination, from 1; None if it has only one.")
       .def("with_combination", &sensors::with_combination, py::arg("combination"),
-           "The same sensor in another speed combination.\n\n"
+           "with_combination(self, combination)\n--\n\nThe same sensor in another speed "
+           "combination.\n\n"
            "Raises\n------\nValueError\n    When there is none of that number.")
       .def_property_readonly("parameters", &values_of,
                              "All parameters and speeds by name, SI units.")
       .def("sigma", &sigma_of, py::arg("name"),
-           "One standard deviation of a parameter, in the unit of the name; None if it is "
+           "sigma(self, name)\n--\n\nOne standard deviation of a parameter, in the unit of the "
+           "name; None if it is "
            "not known.")
-      .def("source", &source_of, py::arg("name"), "Who says how large a parameter is.")
+      .def("source", &source_of, py::arg("name"),
+           "source(self, name)\n--\n\nWho says how large a parameter is.")
       .def_property_readonly(
           "reference", [](const Sensor& sensor) { return sensors::to_string(sensor.reference); },
           "What it was calibrated against: none, directions or planes.")

@@ -18,3 +18,9 @@ def help_of(verb):
     """All options of a verb."""
     return subprocess.run([os.environ["RISLEY_COMMAND"], verb, "--help"],
                           capture_output=True, text=True, check=True).stdout
+
+
+def command_text(*words):
+    """What a verb prints for people."""
+    return subprocess.run([os.environ["RISLEY_COMMAND"], *map(str, words)],
+                          capture_output=True, text=True, check=True).stdout

@@ -263,7 +263,7 @@ def test_recordings_in_memory_give_what_their_files_give(hall, truth, estimate, 
     assert rows[0] == rows[1]
     scan = risley.from_arrays(time_ns=recording.time_ns, azimuth=recording.azimuth,
                               zenith=recording.zenith, range=recording.range,
-                              valid=recording.valid, device_type=1)
+                              valid=recording.valid, sensor="mid-40")
     assert risley.identify(scan, most_prisms=2).verdict.code == "identified"
     with pytest.raises(ValueError, match="recording 2 in memory is given twice"):
         risley.calibrate([recording, recording])
@@ -367,7 +367,7 @@ def test_every_setting_has_one_name():
                 for name in inspect.signature(getattr(risley, public)).parameters}
     of_python = {"bend_s" if flag == "bend-s" else re.sub("-(deg|hz|ms|m|ppm|s)$", "", flag).replace("-", "_")
                  for flag in flags}
-    assert of_python - keywords == {"from", "process_noise", "sensor_type"}
+    assert of_python - keywords == {"from", "sensor_type"}
 
 
 def test_a_wrong_type_is_named(hall):

@@ -16,4 +16,4 @@ def scan(seconds=1.0, rate=20000.0, noise=1e-4):
     return risley.from_arrays(time_ns=np.round(1e9 * time).astype(np.int64),
                               azimuth=azimuth + noise * random.standard_normal(len(time)),
                               zenith=zenith + noise * random.standard_normal(len(time)),
-                              device_type=1)
+                              sensor="mid-40")

@@ -13,8 +13,9 @@ import risley
 
 PACKAGE = pathlib.Path(risley.__file__).parent
 # pybind11 gives its classes a metaclass, and those without a constructor one that refuses.
-ALLOWED = r"risley\._risley\.(CalibratedFlight|CalibratedRecordings|ChunkReader|Device|EstimatedRecording|PlannedCalibration"
-ALLOWED += r"|PlannedFlight|PrismTrain|Recording|RecordingHeader|Sensor|Stop|ValueTable)(\.__init__)?"
+ALLOWED = r"risley\._risley\.(CalibratedFlight|CalibratedRecordings|ChunkReader|Device|EstimatedRecording|Mount|PlannedCalibration"
+ALLOWED += r"|PlannedFlight|PointReader|PrismTrain|Recording|RecordingHeader|RotorMotion|Sensor|Stop|Trajectory|ValueTable)"
+ALLOWED += r"(\.__init__)?"
 
 
 def run(*words, folder):
@@ -72,3 +73,5 @@ def test_every_method_and_property_is_documented():
                 assert name in cls.__doc__, f"{class_name}.{name}"
             else:
                 assert inspect.getdoc(member), f"{class_name}.{name}"
+            if callable(member):  # help() shows the signature, which is not pybind's
+                assert "args" not in inspect.signature(member).parameters, f"{class_name}.{name}"

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <ostream>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +18,7 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/angle.hpp"
+#include "risley/core/direction.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/sensors/preset.hpp"
 
@@ -193,6 +195,30 @@ TEST(ScanPattern, IsTheBeamOfEveryShotsTime) {
     const ScanPattern thin = scan_pattern(sensor, 10, 3, seventh);
     EXPECT_EQ(thin.time.front(), whole.time[76]);
     EXPECT_EQ(thin.zenith.front(), whole.zenith[76]);
+  }
+}
+
+TEST(ScanPattern, GivesTheSameDirectionsAsUnitVectorsInBothPrecisions) {
+  for (const std::string& name : builtin_preset_names()) {
+    SCOPED_TRACE(name);
+    const Sensor sensor = load_sensor(name);
+    ScanPatternOptions options;
+    options.every = 5;
+    constexpr std::size_t kRows = 1003;  // neither blocks nor groups of lanes
+    const ScanPattern angles = scan_pattern(sensor, 100'000, kRows, options);
+    std::vector<double> exact(3 * kRows);
+    std::vector<float> single(3 * kRows);
+    scan_directions(sensor, 100'000, std::span<double>(exact), options);
+    scan_directions(sensor, 100'000, std::span<float>(single), options);
+    for (std::size_t i = 0; i < kRows; ++i) {
+      const Vector3<double> direction =
+          direction_from_angles<double>({angles.azimuth[i], angles.zenith[i]});
+      const double expected[] = {direction.x, direction.y, direction.z};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_NEAR(exact[3 * i + axis], expected[axis], 1e-14);
+        EXPECT_NEAR(single[3 * i + axis], expected[axis], 2e-6);
+      }
+    }
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -32,7 +33,8 @@ struct CloudOptions {
   std::optional<double> rate = kTrackingRate;  ///< of RotorTracker; empty: all directions
   std::optional<double> angle_noise;           ///< rad; empty: the calibration's
   bool loadings = false;                       ///< points carry the loadings of the common factors
-  std::optional<MovingPlatform> platform;      ///< of a sensor that moves
+  bool own_covariance = false;  ///< points carry it; those of a sensor that moves always do
+  std::optional<MovingPlatform> platform;  ///< of a sensor that moves
   /// Count how the first returns of a sensor that moves lie on the ground.
   std::optional<PointDistributionOptions> distribution;
   /// Draw a sample of at most so many points.
@@ -53,7 +55,7 @@ struct CloudSummary {
   std::uint64_t without_rotation_angle = 0;
   /// Returns at times that the trajectory of a moving sensor does not cover.
   std::uint64_t without_pose = 0;
-  std::string format;                            ///< name of the CloudFormat written
+  std::string format;                            ///< name of the CloudFormat of a file
   std::vector<std::string> factors;              ///< names of the common factors
   std::string frame;                             ///< of the points, in words
   std::vector<trajectories::FlownStrip> strips;  ///< of a flight, in the trajectory's time
@@ -70,12 +72,41 @@ struct CloudSummary {
   std::optional<FileError> damage;
 };
 
-/// Turns a recording into points, piece by piece: memory does not grow with the recording, and the
-/// file does not depend on the number of threads. Nothing appears at `path` unless all went well.
-/// @throws InvalidArgument for a recording of several sensors or a calibration of another one, a
-///         rate or angle noise that is not above 0, and as create_cloud();
-///         EstimationError for a recording that does not stand in its sensor's frame, where
-///         rotation angles are needed, and when the rotors' motion cannot be found; FileError
+/// Takes the points of a recording, once it is known what they have: a file, as create_cloud()
+/// makes one, or memory.
+using CloudSink = std::function<std::unique_ptr<CloudWriter>(const CloudHeader& header)>;
+
+/// Turns a recording into points, piece by piece: memory does not grow with the recording, and
+/// points do not depend on the number of threads.
+class CloudMaker {
+ public:
+  /// All but the sink must outlive this.
+  /// @throws InvalidArgument for a recording of several sensors or a calibration of another one,
+  /// and
+  ///         for a rate or angle noise that is not above 0
+  CloudMaker(recordings::Reader& reader, const sensors::Sensor& calibration, CloudSink sink,
+             const CloudOptions& options, const Progress& progress);
+  ~CloudMaker();
+  CloudMaker(const CloudMaker&) = delete;
+  CloudMaker& operator=(const CloudMaker&) = delete;
+
+  /// Gives the points of the next piece, some 260 000 observations, to the sink.
+  /// @return false where there was none; the sink is closed then
+  /// @throws EstimationError for a recording that does not stand in its sensor's frame, where
+  ///         rotation angles are needed, and when the rotors' motion cannot be found; FileError;
+  ///         what the sink throws
+  bool next();
+
+  /// What came of it; whole once next() has returned false.
+  const CloudSummary& summary() const;
+
+ private:
+  class Work;
+  std::unique_ptr<Work> work_;
+};
+
+/// All points of a recording into a file. Nothing appears at `path` unless all went well.
+/// @throws as CloudMaker and create_cloud()
 CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calibration,
                         const std::string& path, const CloudOptions& options,
                         const Progress& progress = {});

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "risley/cloud/make_cloud.hpp"
@@ -17,7 +18,7 @@ namespace risley::jobs {
 struct CloudOfRecordingOptions {
   recordings::Source recording;     ///< of one sensor, with ranges
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
-  std::string calibration;          ///< preset by name, or a preset or calibration file
+  GivenSensor calibration;          ///< as load_result()
   std::string output;               ///< path; its ending chooses the format unless one is named
   PlatformFiles platform;           ///< of a sensor that moved
   cloud::CloudOptions cloud;        ///< without a platform and provenance
@@ -29,6 +30,28 @@ struct RecordingCloud {
   std::string recording, output, calibration;  ///< as the options have them
   sensors::CalibrationReference calibrated_against = sensors::CalibrationReference::none;
   cloud::CloudSummary summary;
+};
+
+/// Points of a recording, piece by piece, for a sink of the caller's.
+class PointsOfRecording {
+ public:
+  /// @param options   output, provenance and the format of a file do not count
+  /// @param progress  must outlive this
+  /// @throws EstimationError, InvalidArgument, FileError, Cancelled
+  PointsOfRecording(const CloudOfRecordingOptions& options, cloud::CloudSink sink,
+                    const Progress& progress);
+  ~PointsOfRecording();
+  PointsOfRecording(const PointsOfRecording&) = delete;
+  PointsOfRecording& operator=(const PointsOfRecording&) = delete;
+
+  /// As cloud::CloudMaker::next().
+  bool next();
+  /// What came of it; whole once next() has returned false.
+  RecordingCloud result() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 /// Turns a recording into points with covariance; the output appears when it is whole.

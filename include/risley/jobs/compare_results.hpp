@@ -7,6 +7,7 @@
 
 #include "risley/algebra/named_covariance.hpp"
 #include "risley/calibration/datum.hpp"
+#include "risley/jobs/given.hpp"
 #include "risley/sensors/sensor.hpp"
 
 namespace risley::jobs {
@@ -86,8 +87,9 @@ algebra::NamedCovariance covariance_given_held(const sensors::Sensor& sensor);
 calibration::PointingError directions_apart(const sensors::Sensor& a, const sensors::Sensor& b,
                                             const algebra::NamedCovariance& difference);
 
-/// A result: the calibration.yaml of a folder, such a file, or a preset. @throws FileError
-sensors::Sensor load_result(const std::string& path);
+/// A result: one in memory, the calibration.yaml of a folder, such a file, or a preset.
+/// @throws FileError
+sensors::Sensor load_result(const GivenSensor& given);
 
 /// @throws InvalidArgument for sensors with other numbers of prisms or emitters, and where one of
 ///         them has an index for all prisms and the other one for each
@@ -96,6 +98,6 @@ ResultComparison compare_results(const sensors::Sensor& a, const sensors::Sensor
 
 /// The same of files. @param a, b  as load_result()
 /// @throws FileError; InvalidArgument
-ResultComparison compare_results(const std::string& a, const std::string& b);
+ResultComparison compare_results(const GivenSensor& a, const GivenSensor& b);
 
 }  // namespace risley::jobs

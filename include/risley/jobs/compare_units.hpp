@@ -16,7 +16,7 @@ namespace risley::jobs {
 struct CompareUnitsOptions {
   /// As load_result(), in order of time; also tables of results (tables::is_table()), of which each
   /// row without a failure stands for the result in its `output`.
-  std::vector<std::string> results;
+  std::vector<GivenSensor> results;
   /// Probability that at least one pair of results is called changed where nothing changed, and
   /// that at least one unit is called an outlier where none is one, each.
   double false_alarm = 0.01;

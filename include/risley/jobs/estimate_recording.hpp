@@ -28,7 +28,7 @@ struct EstimatedRecording;
 struct EstimateRecordingOptions {
   recordings::Source recording;     ///< of one sensor
   recordings::ReadOptions reading;  ///< see open_in_sensor_frame()
-  std::string sensor;               ///< as given_sensor()
+  GivenSensor sensor;               ///< as given_sensor()
   estimation::Method method = estimation::Method::map;
   std::optional<double> rate;         ///< shots per second to use; empty: all. See usual_rate()
   std::optional<double> angle_noise;  ///< as estimation::EstimateOptions

@@ -18,7 +18,7 @@ namespace risley::jobs {
 struct ObservabilityOptions {
   recordings::Source recording;       ///< empty: a plan is judged
   recordings::ReadOptions reading;    ///< of the recording
-  std::string sensor;                 ///< as given_sensor(); a plan takes kUsualSensor
+  GivenSensor sensor;                 ///< as given_sensor(); a plan takes kUsualSensor
   double duration = 30;               ///< of the plan, s
   std::optional<double> rate;         ///< shots per second; of a plan the sensor's, otherwise all
   std::optional<double> angle_noise;  ///< before rounding, rad; of a plan the sensor's

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "risley/estimation/running_estimate.hpp"
+#include "risley/jobs/given.hpp"
 #include "risley/recordings/livox/packet.hpp"
 
 namespace risley::jobs {
@@ -42,7 +43,7 @@ class OpticsWatch {
   ///                   sensor starts from the preset of its type and is compared with its own
   ///                   beginning only.
   /// @throws FileError, InvalidArgument
-  OpticsWatch(const std::vector<WatchedSensor>& sensors, const std::string& reference);
+  OpticsWatch(const std::vector<WatchedSensor>& sensors, const GivenSensor& reference);
   ~OpticsWatch();  ///< forgets what still waits
   OpticsWatch(const OpticsWatch&) = delete;
   OpticsWatch& operator=(const OpticsWatch&) = delete;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "risley/core/progress.hpp"
+#include "risley/jobs/given.hpp"
 #include "risley/sensors/pattern_coverage.hpp"
 #include "risley/sensors/scan_pattern.hpp"
 #include "risley/sensors/sensor.hpp"
@@ -22,8 +23,8 @@ struct PatternDetails {
 };
 
 /// @param sensor  as sensors::load_sensor()
-/// @throws as sensors::load_sensor() and sensors::pattern_coverage()
-PatternDetails pattern_details(const std::string& sensor, const sensors::ScanPatternOptions& scan,
+/// @throws as load_result() and sensors::pattern_coverage()
+PatternDetails pattern_details(const GivenSensor& sensor, const sensors::ScanPatternOptions& scan,
                                const sensors::CoverageOptions& coverage,
                                const Progress& progress = {});
 

@@ -16,7 +16,7 @@ namespace risley::jobs {
 /// The calibration to plan. SI units.
 struct PlanCalibrationOptions {
   scenes::Scene scene;  ///< walls, and the stations to scan them from
-  std::string sensor;   ///< preset by name or file; empty: kUsualSensor
+  GivenSensor sensor;   ///< as load_result(); empty: kUsualSensor
   HeldParameters fixed;
   std::vector<std::string> additional;  ///< further parameters to free
   /// As calibration::CalibrationPlan has them.

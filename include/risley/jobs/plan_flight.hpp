@@ -25,7 +25,7 @@ struct PlanFlightOptions {
   trajectories::Mount mount;        ///< its sigmas are what is known before
   trajectories::ErrorModel errors;  ///< of the trajectory that will come of it; states all sigmas
   std::optional<scenes::TerrainParts> terrain;  ///< empty: level ground at a height of 0
-  std::string sensor;                           ///< preset by name or file; empty: kUsualSensor
+  GivenSensor sensor;                           ///< as load_result(); empty: kUsualSensor
   HeldParameters fixed;
   std::vector<std::string> additional;  ///< further parameters to free
   /// As calibration::FlightForecastOptions and calibration::FlightCalibrationOptions have them.
@@ -37,10 +37,12 @@ struct PlanFlightOptions {
   cloud::PointDistributionOptions distribution;
 };
 
-/// What a plan is made of. Paths.
+/// What a plan is made of; paths, where they are texts.
 struct FlightPlanFiles {
-  std::string plan, mount, errors;  ///< none may be empty
-  std::string scene;                ///< with a terrain; empty: level ground
+  std::string plan;
+  GivenMount mount;
+  std::string errors;  ///< none so far may be empty
+  std::string scene;   ///< with a terrain; empty: level ground
 };
 
 /// Whether a file is the plan of a flight, and not a scene of walls. @throws FileError

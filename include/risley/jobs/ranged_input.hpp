@@ -18,7 +18,7 @@ namespace risley::jobs {
 struct RangedInputOptions {
   std::vector<recordings::Source> recordings;  ///< of one sensor, each with ranges
   recordings::ReadOptions reading;             ///< see open_in_sensor_frame()
-  std::string sensor;                          ///< as given_sensor()
+  GivenSensor sensor;                          ///< as given_sensor()
   std::optional<double> rate;                  ///< shots per second to use; empty: all
   std::optional<double> angle_noise;           ///< as estimation::EstimateOptions
   std::optional<bool> mirrored;                ///< the elevation's sign is turned; empty: find out

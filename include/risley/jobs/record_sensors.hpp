@@ -30,7 +30,7 @@ struct RecordOptions {
   /// Path; ends in .lvx, or in .nc for what is converted at the end.
   std::string output;
   bool watch_optics = false;     ///< see OpticsWatch
-  std::string optics_reference;  ///< as OpticsWatch's
+  GivenSensor optics_reference;  ///< as OpticsWatch's
 };
 
 /// A sensor on the interface.

@@ -30,7 +30,7 @@ struct ReadRecording {
 struct EstimationInputOptions {
   recordings::Source recording;            ///< of one sensor, with times
   recordings::ReadOptions reading;         ///< see prepare_recording() where it holds no extrinsics
-  std::string sensor;                      ///< as given_sensor()
+  GivenSensor sensor;                      ///< as given_sensor()
   estimation::SelectionOptions selection;  ///< ranges of whole steps are kept all the same
 };
 

@@ -10,6 +10,7 @@
 #include "risley/core/progress.hpp"
 #include "risley/core/warning.hpp"
 #include "risley/estimation/sensor_recognition.hpp"
+#include "risley/jobs/given.hpp"
 #include "risley/recordings/reader.hpp"
 #include "risley/sensors/sensor.hpp"
 
@@ -105,8 +106,8 @@ estimation::AngleSeries first_second(const recordings::Source& source,
 /// @param device_type  as recordings::Device::type
 std::optional<sensors::Sensor> preset_of_type(int device_type);
 
-/// A sensor by name or path; empty for an empty text. @throws as sensors::load_sensor
-std::optional<sensors::Sensor> given_sensor(const std::string& name_or_path);
+/// The sensor that was given; empty where none was. @throws as load_result()
+std::optional<sensors::Sensor> given_sensor(const GivenSensor& given);
 
 /// Parameters to hold: by name, at a value if there is one (SI units), at the sensor's otherwise.
 using HeldParameters = std::vector<std::pair<std::string, std::optional<double>>>;

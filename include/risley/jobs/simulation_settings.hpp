@@ -19,7 +19,7 @@ using ParameterValues = std::vector<std::pair<std::string, double>>;
 /// What to simulate, as files and names have it. SI units; an empty optional takes the sensor's own
 /// value.
 struct SimulationOptions {
-  std::string sensor = kUsualSensor;  ///< as sensors::load_sensor()
+  GivenSensor sensor = kUsualSensor;  ///< as load_result()
   ParameterValues set;                ///< of the true sensor
   bool reported_nominal = false;      ///< the sensor believes that it has no errors
   ParameterValues reported;           ///< what it believes besides, where that is not the truth
@@ -32,11 +32,11 @@ struct SimulationOptions {
   std::vector<double> start_angles;  ///< of the rotors at time zero, rad; empty: random
   std::string scene;                 ///< path of planes or terrain; empty: no ranges
   std::string station;               ///< of the scene
-  // Of a sensor that moves. Paths.
-  std::string trajectory;  ///< along which it truly moves
-  std::string topic;       ///< of its poses, of a bag that has several
-  std::string flight;      ///< a plan that makes the trajectory instead
-  std::string mount;
+  // Of a sensor that moves. Paths, where they are texts.
+  GivenTrajectory trajectory;  ///< along which it truly moves
+  std::string topic;           ///< of its poses, of a bag that has several
+  std::string flight;          ///< a plan that makes the trajectory instead
+  GivenMount mount;
   std::string trajectory_errors;           ///< of the trajectory that is written for users
   std::string trajectory_ending = ".csv";  ///< which chooses its format
   std::optional<double> start;        ///< of the recording after the trajectory's first record, s

@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <iosfwd>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "risley/core/progress.hpp"
+#include "risley/jobs/given.hpp"
 #include "risley/sensors/helios_scanner.hpp"
 #include "risley/sensors/scan_pattern.hpp"
 
@@ -25,7 +27,7 @@ const std::vector<PatternFormat>& pattern_formats();
 
 /// What to write where.
 struct WritePatternOptions {
-  std::string sensor;     ///< as sensors::load_sensor()
+  GivenSensor sensor;     ///< as load_result()
   std::string format;     ///< a name of pattern_formats()
   std::string output;     ///< path
   double duration = 1.0;  ///< s, of the scan
@@ -44,6 +46,22 @@ struct WrittenPattern {
   std::vector<std::string> not_carried;
   std::optional<sensors::HeliosScanner> helios;  ///< where the format is that of HELIOS++
 };
+
+/// Which shots of a scan a time begins and ends with.
+struct PatternRows {
+  std::uint64_t first = 0;
+  std::size_t count = 0;
+};
+/// @param start, duration  s
+/// @throws InvalidArgument for numbers out of range
+PatternRows pattern_rows(const sensors::Sensor& sensor, double start, double duration,
+                         const sensors::ScanPatternOptions& scan);
+
+/// sensors::scan_directions() of many rows, on several threads. @throws as that; Cancelled
+template <class Number>
+void pattern_directions(const sensors::Sensor& sensor, std::uint64_t first_row,
+                        std::span<Number> out, const sensors::ScanPatternOptions& scan,
+                        const Progress& progress = {});
 
 /// Writes the scan pattern of a sensor for a simulator; the output appears when it is whole.
 /// @throws InvalidArgument for an unknown sensor or format and for numbers out of range; FileError;

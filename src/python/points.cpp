@@ -1,0 +1,332 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <pybind11/stl.h>
+#include <sys/mman.h>
+
+#include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/json/results.hpp"
+
+#include "python/arrays.hpp"
+#include "python/call.hpp"
+#include "python/json.hpp"
+#include "python/names.hpp"
+#include "python/options.hpp"
+
+namespace risley::python {
+namespace {
+
+using cloud::CloudHeader;
+using cloud::PointColumn;
+using cloud::Points;
+
+/// Memory that grows at its end: of much of it the system moves the pages and copies nothing.
+class GrowingMemory {
+ public:
+  std::byte* end_of(std::size_t more) {
+    if (used_ + more > capacity_) {
+      capacity_ = std::max(used_ + more, 2 * capacity_);
+      void* grown = std::realloc(memory_.get(), capacity_);
+      if (grown == nullptr) throw std::bad_alloc();
+      static_cast<void>(memory_.release());
+      memory_.reset(static_cast<std::byte*>(grown));
+      ask_for_large_pages();
+    }
+    std::byte* end = memory_.get() + used_;
+    used_ += more;
+    return end;
+  }
+  /// Gives it away, without what is not used.
+  std::byte* release() {
+    auto* memory = static_cast<std::byte*>(std::realloc(memory_.get(), std::max(used_, kLeast)));
+    if (memory == nullptr) throw std::bad_alloc();
+    static_cast<void>(memory_.release());
+    used_ = capacity_ = 0;
+    return memory;
+  }
+
+ private:
+  /// Small pages take the system as long to give as points to compute; it may refuse.
+  void ask_for_large_pages() {
+    constexpr std::uintptr_t kPage = 4096, kLarge = std::uintptr_t{1} << 22;
+    if (capacity_ < kLarge) return;
+    const auto begin = (reinterpret_cast<std::uintptr_t>(memory_.get()) + kPage - 1) & ~(kPage - 1);
+    const auto end = reinterpret_cast<std::uintptr_t>(memory_.get()) + capacity_;
+    static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
+  }
+
+  static constexpr std::size_t kLeast = 1;
+  struct Free {
+    void operator()(std::byte* memory) const { std::free(memory); }
+  };
+  std::unique_ptr<std::byte, Free> memory_;
+  std::size_t used_ = 0, capacity_ = 0;
+};
+
+/// An array in the making: so many numbers for each point.
+struct PointArray {
+  std::string name;
+  py::ssize_t number_size = 0;
+  char kind = 'f';
+  std::vector<py::ssize_t> shape;  ///< of one point
+  GrowingMemory memory;
+};
+
+/// "covariance" of "covariance_{}_m2", "incidence_angle" of "incidence_angle_deg".
+std::string array_name(const PointColumn& entry) {
+  if (entry.axis == 'X') return "xyz";
+  if (entry.variable == "beam") return "emitter";
+  std::string name(entry.variable.substr(0, entry.variable.find("_{}")));
+  return name == "time_ns" ? name : si_name(name);
+}
+
+constexpr std::size_t kSquare[] = {cloud::kXX, cloud::kXY, cloud::kXZ, cloud::kXY, cloud::kYY,
+                                   cloud::kYZ, cloud::kXZ, cloud::kYZ, cloud::kZZ};
+
+/// Columns of points as arrays of which each point has a row: x, y and z together, and covariances
+/// as whole matrices.
+class PointArrays {
+ public:
+  void append(const Points& points) {
+    if (points.size() == 0) return;  // which does not tell columns that are not there
+    std::size_t place = 0;
+    for_each_entry_of_points(points, [&](const PointColumn& entry, const auto& numbers,
+                                         const std::vector<py::ssize_t>& shape) {
+      using Number = std::remove_cvref_t<decltype(*numbers.front())>;
+      if (place == arrays_.size()) {
+        constexpr char kKind = std::is_floating_point_v<Number> ? 'f'
+                               : std::is_signed_v<Number>       ? 'i'
+                                                                : 'u';
+        arrays_.push_back({array_name(entry), sizeof(Number), kKind, shape, {}});
+      }
+      add(numbers, points.size(), arrays_[place++].memory);
+    });
+    rows_ += points.size();
+  }
+
+  std::size_t rows() const { return rows_; }
+
+  /// Gives them to Python, to be begun again.
+  py::dict release() {
+    py::dict result;
+    for (PointArray& array : arrays_) {
+      std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(rows_)};
+      shape.insert(shape.end(), array.shape.begin(), array.shape.end());
+      std::byte* memory = array.memory.release();
+      const py::capsule owner(memory, [](void* held) { std::free(held); });
+      const py::dtype type(std::string{array.kind} + std::to_string(array.number_size));
+      result[py::str(array.name)] = py::array(type, shape, memory, owner);
+    }
+    arrays_.clear();
+    rows_ = 0;
+    return result;
+  }
+
+ private:
+  /// Calls visit(entry, pointers to columns, shape of one point) for every array that there is.
+  template <class Visit>
+  static void for_each_entry_of_points(const Points& points, const Visit& visit) {
+    [&]<std::size_t... I>(std::index_sequence<I...>) { (visit_entry<I>(points, visit), ...); }
+    (std::make_index_sequence<cloud::kPointColumns.size()>());
+  }
+
+  template <std::size_t I, class Visit>
+  static void visit_entry(const Points& points, const Visit& visit) {
+    constexpr PointColumn kEntry = cloud::kPointColumns[I];
+    if constexpr (kEntry.is(PointColumn::kDerived) || kEntry.axis == 'Y' || kEntry.axis == 'Z') {
+      return;
+    } else {
+      const auto& column = points.*std::get<kEntry.place.index()>(kEntry.place);
+      using Column = std::remove_cvref_t<decltype(column)>;
+      if constexpr (kEntry.axis == 'X') {
+        visit(kEntry, std::vector{points.x.data(), points.y.data(), points.z.data()}, {3});
+      } else if constexpr (std::is_same_v<
+                               Column, std::array<PointColumn::Numbers, cloud::kCovarianceTerms>>) {
+        if (column[0].size() != points.size()) return;
+        std::vector<const double*> terms;
+        for (const std::size_t term : kSquare) terms.push_back(column[term].data());
+        visit(kEntry, terms, {3, 3});
+      } else if constexpr (std::is_same_v<Column, std::vector<PointColumn::Numbers>>) {
+        if (column.empty()) return;
+        std::vector<const double*> numbers;
+        for (const auto& one : column) numbers.push_back(one.data());
+        visit(kEntry, numbers, {static_cast<py::ssize_t>(column.size())});
+      } else if constexpr (std::is_same_v<Column,
+                                          std::vector<std::array<PointColumn::Numbers, 3>>>) {
+        if (column.empty()) return;
+        std::vector<const double*> numbers;
+        for (const auto& one : column) {
+          for (const auto& axis : one) numbers.push_back(axis.data());
+        }
+        visit(kEntry, numbers, {static_cast<py::ssize_t>(column.size()), 3});
+      } else {
+        if (column.size() != points.size()) return;
+        visit(kEntry, std::vector{column.data()}, {});
+      }
+    }
+  }
+
+  template <class Number>
+  static void add(const std::vector<const Number*>& columns, std::size_t rows,
+                  GrowingMemory& memory) {
+    const std::size_t width = columns.size();
+    auto* to = reinterpret_cast<Number*>(memory.end_of(rows * width * sizeof(Number)));
+    for (std::size_t i = 0; i < width; ++i) {
+      const Number* from = columns[i];
+      for (std::size_t row = 0; row < rows; ++row) to[row * width + i] = from[row];
+    }
+  }
+
+  std::vector<PointArray> arrays_;
+  std::size_t rows_ = 0;
+};
+
+/// A sink that keeps points in memory, with what the cloud's header says of them.
+class PointKeeper {
+ public:
+  cloud::CloudSink sink() {
+    return [this](const CloudHeader& header) -> std::unique_ptr<cloud::CloudWriter> {
+      header_ = header;
+      return std::make_unique<Writer>(*this);
+    };
+  }
+  std::size_t rows() const { return arrays_.rows(); }
+  /// (arrays by name, frame, WKT of a map, names of axes)
+  py::tuple release() {
+    return py::make_tuple(arrays_.release(), header_.frame.text, header_.frame.wkt,
+                          header_.frame.axes);
+  }
+
+ private:
+  class Writer final : public cloud::CloudWriter {
+   public:
+    explicit Writer(PointKeeper& keeper) : keeper_(keeper) {}
+    void write(const Points& points) override { keeper_.arrays_.append(points); }
+    void close() override {}
+
+   private:
+    PointKeeper& keeper_;
+  };
+
+  PointArrays arrays_;
+  CloudHeader header_;
+};
+
+/// What a job says of points that are in no file.
+py::object told_of(const jobs::RecordingCloud& made) {
+  json::Json told = json::of(made);
+  told.erase("format");
+  told.erase("output");
+  return dict_of(told);
+}
+
+jobs::CloudOfRecordingOptions point_options(const Options& options) {
+  jobs::CloudOfRecordingOptions job = cloud_options(options);
+  job.cloud.own_covariance = job.cloud.pointing.covariance;
+  return job;
+}
+
+/// @return arrays and header, and what the job says
+py::tuple points(const py::dict& values, int threads, const py::object& tell) {
+  const jobs::CloudOfRecordingOptions job = point_options(Options(values));
+  PointKeeper keeper;
+  jobs::RecordingCloud made;
+  run_job(tell, threads, [&](const Progress& progress) {
+    jobs::PointsOfRecording whole(job, keeper.sink(), progress);
+    while (whole.next()) {
+    }
+    made = whole.result();
+  });
+  return py::make_tuple(keeper.release(), told_of(made));
+}
+
+/// Points of a recording, piece by piece.
+class PointReader {
+ public:
+  PointReader(const py::dict& values, std::size_t rows, int threads)
+      : rows_(rows), threads_(threads) {
+    const jobs::CloudOfRecordingOptions job = point_options(Options(values));
+    run([&](const Progress& progress) {
+      progress_ = progress.silent();
+      made_ = std::make_unique<jobs::PointsOfRecording>(job, keeper_.sink(), progress_);
+    });
+  }
+
+  /// Arrays and header of the next piece of at least so many points, but for the last one.
+  py::tuple next() {
+    if (!made_) throw py::stop_iteration();
+    try {
+      run([&](const Progress&) {
+        while (more_ && keeper_.rows() < rows_) more_ = made_->next();
+      });
+    } catch (...) {
+      close();
+      throw;
+    }
+    if (keeper_.rows() == 0) {
+      result_ = told_of(made_->result());
+      close();
+      throw py::stop_iteration();
+    }
+    return keeper_.release();
+  }
+
+  /// What the job says; None before the last piece.
+  py::object result() const { return result_; }
+
+  void close() { made_.reset(); }
+
+ private:
+  template <class Job>
+  void run(const Job& job) {
+    if (busy_) throw py::value_error("another call is reading these points");
+    busy_ = true;
+    try {
+      run_job(py::none(), threads_, job, &cancel_);
+    } catch (...) {
+      busy_ = false;
+      throw;
+    }
+    busy_ = false;
+  }
+
+  std::size_t rows_;
+  int threads_;
+  bool busy_ = false, more_ = true;
+  CancelFlag cancel_;
+  Progress progress_;
+  PointKeeper keeper_;
+  std::unique_ptr<jobs::PointsOfRecording> made_;
+  py::object result_ = py::none();
+};
+
+}  // namespace
+
+void bind_points(py::module_& module) {
+  py::class_<PointReader>(module, "PointReader",
+                          "Iterator over the points of a recording; see `point_chunks`.")
+      .def(py::init<const py::dict&, std::size_t, int>(), py::arg("options"), py::arg("rows"),
+           py::arg("threads"))
+      .def("__iter__", [](py::object self) { return self; })
+      .def("__next__", &PointReader::next)
+      .def("close", &PointReader::close,
+           "close(self)\n--\n\nCloses the recording; there are no further points.")
+      .def_property_readonly("result", &PointReader::result,
+                             "What is known of all points, behind the last of them.");
+  module.def("points", &points, py::arg("options"), py::arg("threads"), py::arg("tell"));
+}
+
+}  // namespace risley::python
