@@ -46,9 +46,9 @@ constexpr double kGoodResidual = radians_from_degrees(0.08);
 /// Two answers are told apart when their chi2 differ by this.
 constexpr double kDecisive = 25.0;
 /// A turn that leaves all shots in the field of view is believed from this angle on, rad, where it
-/// takes this share of the residuals away, or adds at most the second where a lean of the last axis
-/// explains it as well.
-constexpr double kLeastTurn = radians_from_degrees(0.3);
+/// takes this share of the residuals away. Where the last axis may lean, it explains a turn as
+/// well: then a turn is one that no unit leans by, and may add the second share.
+constexpr double kLeastTurn = radians_from_degrees(0.3), kMostLean = radians_from_degrees(0.6);
 constexpr double kTurnGain = 0.1, kTurnLoss = 0.02;
 
 /// A fit of parameters and one parabola per rotor to a few shots.
@@ -704,8 +704,10 @@ Start new_start(const AngleSeries& head, const sensors::Sensor& sensor, const St
   if (turned || options.turned || options.free.empty()) return start;
   // A small turn leaves the shots in the field of view and shows in the residuals alone.
   Start free = window.start_of(window.answer(answer.trial, kEnoughShots, true));
-  const bool far = std::hypot(free.frame->yaw, free.frame->pitch) > kLeastTurn;
-  const double allowed = window.last_axis_leans() ? 1.0 + kTurnLoss : 1.0 - kTurnGain;
+  const bool leans = window.last_axis_leans();
+  const double turn = std::hypot(free.frame->yaw, free.frame->pitch);
+  const bool far = turn > (leans ? kMostLean : kLeastTurn);
+  const double allowed = leans ? 1.0 + kTurnLoss : 1.0 - kTurnGain;
   if (far && free.residual_rms < allowed * start.residual_rms) return free;
   return start;
 }

@@ -75,7 +75,7 @@ TEST(Reflector, UnitsAreEstimatedToTheirNoise) {
 
 TEST(Reflector, RotorsThatLeanAreNoTurnOfTheFrame) {
   sensors::Sensor unit = sensors::load_sensor("mid-360");
-  const double lean = radians_from_degrees(0.15);
+  const double lean = radians_from_degrees(0.35);
   for (const int element : {0, 1})
     unit.train.set_place(place::bearing_tilt_vertical(element), lean);
   for (int emitter = 0; emitter < 4; ++emitter) {
