@@ -14,6 +14,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/setting.hpp"
+#include "risley/estimation/frame_turn.hpp"
 #include "risley/optics/batch.hpp"
 #include "risley/sensors/range_errors.hpp"
 
@@ -106,15 +107,14 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
 std::vector<estimation::FreeParameter> calibration_parameters(
     TrainShape shape, const std::vector<std::string>& fixed,
     const std::vector<std::string>& additional) {
-  std::vector<std::string> names;
-  for (const std::string& name : estimation::default_free_names(shape)) {
-    if (name != "refractive_index") names.push_back(name);
-  }
+  std::vector<estimation::FreeParameter> usual =
+      estimation::free_parameters(estimation::default_free_names(shape), shape);
   // Walls of unknown pose turn with the sensor as a lean of its last axis would turn it.
-  std::erase_if(names, [&](const std::string& name) {
-    const int at = find_parameter(name, shape).places.front();
-    return at == place::frame_yaw(shape.prisms) || at == place::frame_pitch(shape.prisms);
-  });
+  estimation::hold_last_bearing(shape.prisms, usual);
+  std::vector<std::string> names;
+  for (const estimation::FreeParameter& parameter : usual) {
+    if (parameter.name != "refractive_index") names.push_back(parameter.name);
+  }
   for (const std::string& name : fixed) {
     if (find_parameter(name, shape).kind != ParameterKind::train) {
       throw InvalidArgument(

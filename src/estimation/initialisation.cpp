@@ -317,7 +317,6 @@ class StartWindow {
   StartWindow& operator=(const StartWindow&) = delete;
 
   const LineSearch& search() const { return *search_; }
-  bool last_axis_leans() const { return axis_up_; }
   /// The lines near a hypothesis's speeds.
   std::vector<RotorLines> near(const std::vector<double>& speeds) const {
     if (search_ != found_.lines) return search_->near(speeds, kUsualShare, kMostMinima, axis_up_);
@@ -704,7 +703,8 @@ Start new_start(const AngleSeries& head, const sensors::Sensor& sensor, const St
   if (turned || options.turned || options.free.empty()) return start;
   // A small turn leaves the shots in the field of view and shows in the residuals alone.
   Start free = window.start_of(window.answer(answer.trial, kEnoughShots, true));
-  const bool leans = window.last_axis_leans();
+  const TrainLayout layout = sensor.train.layout();
+  const bool leans = layout.has_bearing(static_cast<std::size_t>(layout.elements) - 1);
   const double turn = std::hypot(free.frame->yaw, free.frame->pitch);
   const bool far = turn > (leans ? kMostLean : kLeastTurn);
   const double allowed = leans ? 1.0 + kTurnLoss : 1.0 - kTurnGain;
