@@ -261,8 +261,8 @@ TEST_F(CalibrateFlightTest, RefusesWhatDoesNotFit) {
   };
   EXPECT_NE(refused([](auto& o) { o.recordings.clear(); }), "");
   EXPECT_NE(refused([](auto& o) { o.recordings.push_back(o.recordings.front()); }), "");
-  EXPECT_NE(refused([](auto& o) { o.platform.trajectory.clear(); }), "");
-  EXPECT_NE(refused([](auto& o) { o.platform.mount.clear(); }), "");
+  EXPECT_NE(refused([](auto& o) { o.platform.trajectory = {}; }), "");
+  EXPECT_NE(refused([](auto& o) { o.platform.mount = {}; }), "");
   EXPECT_NE(refused([](auto& o) { o.platform.errors.clear(); }), "");
   EXPECT_NE(refused([](auto& o) { o.platform.crs = "EPSG:25832"; }), "");
   EXPECT_NE(refused([](auto& o) { o.truths.clear(), o.truths.resize(2); }), "");
