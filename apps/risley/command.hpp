@@ -32,6 +32,8 @@ using enum jobs::ExitStatus;
 struct CommonOptions {
   bool json = false;
   bool quiet = false;
+  bool no_progress = false;
+  bool no_summary = false;  ///< print no text: with --quiet where a file is the result
   bool verbose = false;
   int threads = 0;  ///< 0: all cores
   std::uint64_t seed = 0;
@@ -83,8 +85,13 @@ void end_in_own_time();
 /// is meant for a terminal.
 void hold_standard_streams();
 
-/// A bar with the remaining time on stderr, only on a terminal and not with --quiet. The bar is
-/// gone when the object is.
+/// Whether progress is shown: on a terminal, without --quiet and --no-progress.
+bool shows_progress(const CommonOptions& common);
+
+/// From now on print_text() prints nothing.
+void print_no_text();
+
+/// A progress bar on stderr with the remaining time, if shows_progress(); the destructor clears it.
 class ProgressBar {
  public:
   /// @param label  for work that does not name its stages

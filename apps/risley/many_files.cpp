@@ -23,17 +23,17 @@ using jobs::InputJob;
 using jobs::InputResult;
 using jobs::InputRun;
 
-/// Options that change where and how results are told, not what they are.
-constexpr std::array<std::string_view, 10> kOfTelling = {
-    "INPUT",  "--list",    "--output", "--table",   "--resume",
-    "--json", "--threads", "--quiet",  "--verbose", "--help"};
+/// Options that change where and how results are printed, not what they are.
+constexpr std::array<std::string_view, 12> kOfPrinting = {
+    "INPUT",     "--list",  "--output",      "--table",   "--resume", "--json",
+    "--threads", "--quiet", "--no-progress", "--verbose", "--help",   "--help-all"};
 
 /// All that decides results apart from the inputs.
 std::string settings_text(const CLI::App& verb, const CommonOptions& common) {
   std::vector<std::pair<std::string, std::vector<std::string>>> settings;
   for (const CLI::Option* option : verb.get_options()) {
     const std::string name = option->get_name();
-    if (std::find(kOfTelling.begin(), kOfTelling.end(), name) != kOfTelling.end()) continue;
+    if (std::find(kOfPrinting.begin(), kOfPrinting.end(), name) != kOfPrinting.end()) continue;
     std::vector<std::string> values = option->results();
     if (values.empty()) values.push_back(option->get_default_str());
     if (!values.front().empty()) settings.emplace_back(name, std::move(values));

@@ -149,12 +149,10 @@ std::string optics_words(const jobs::OpticsHealth& health) {
   return state.alarm ? "optics: changed before" : "optics: no change seen";
 }
 
-/// What is going on in one line on stderr, only on a terminal and not with --quiet. The line is
-/// gone when the object is.
+/// The state of the recording in one line on stderr, if shows_progress(); the destructor clears it.
 class StatusLine {
  public:
-  explicit StatusLine(const CommonOptions& common)
-      : visible_(!common.quiet && isatty(STDERR_FILENO) != 0) {}
+  explicit StatusLine(const CommonOptions& common) : visible_(shows_progress(common)) {}
   ~StatusLine() { clear(); }
   StatusLine(const StatusLine&) = delete;
   StatusLine& operator=(const StatusLine&) = delete;

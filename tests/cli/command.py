@@ -4,6 +4,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,11 @@ def run(*arguments, folder=None):
     if "--json" in arguments:
         schemas.check_output(arguments, done.stdout)
     return done
+
+
+def verbs():
+    """The verbs that --help lists."""
+    return re.findall(r"^  ([a-z]+) ", run("--help").stdout, re.MULTILINE)
 
 
 def codes_of(result):

@@ -18,7 +18,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from command import COMMAND, SOURCE, run
+from command import COMMAND, SOURCE, run, verbs
 from documents_data import DATA, LEFT_OUT, MESSAGES, STATUS
 
 TOLD = "\036"  # before the exit status of a command
@@ -53,9 +53,8 @@ def commands_of(lines):
 
 def help_text():
     """The examples of all verbs as one document of shell blocks."""
-    verbs = re.findall(r"^  ([a-z]+) ", run("--help").stdout.split("Subcommands:")[1], re.MULTILINE)
-    examples = [run(verb, "--help").stdout.split("Example:\n")[1] for verb in verbs]
-    return "".join(f"```sh\n{re.sub('^  ', '', text, flags=re.MULTILINE)}```\n" for text in examples)
+    examples = [run(verb, "--help").stdout.partition("Examples:\n")[2].partition("\n\n")[0] for verb in verbs()]
+    return "".join(f"```sh\n{re.sub('^  ', '', text, flags=re.MULTILINE)}\n```\n" for text in examples)
 
 
 def plain(line):
