@@ -55,14 +55,16 @@ constexpr Verb kVerbs[] = {
      "  risley record --list",
      "--output --interface --list --duration-s --serial --passive --watch --optics", kNothing,
      declare_record},
-    {"identify", kLook, "Identify the prisms that made a scan, from its directions alone",
-     "  risley identify sequence.csv -o mine.yaml\n"
-     "  risley identify frame.pcd --shot-rate-hz 240385 --json",
-     "--output --force --shot-rate-hz --most-prisms --fastest-hz", kThreads, declare_identify},
-    {"preset", kLook, "List, show, check or copy sensor presets",
-     "  risley preset list\n  risley preset show avia\n"
-     "  risley preset new unit-17 --from avia -o unit-17.yaml\n  risley preset check unit-17.yaml",
-     "--output --from", kNothing, declare_preset},
+    {"emulate", kLook, "Emulate a sensor on the network, with any faults you choose",
+     "  risley emulate --interface 127.0.0.5 --sensor avia --duration-s 60\n"
+     "  risley emulate --interface 127.0.0.5 --loss 0.01 --speed 10",
+     "--interface --sensor --serial --scene --recording --duration-s --speed --set --seed", kSeed,
+     declare_emulate},
+    {"report", kLook,
+     "Draw the page of a result folder again from its report.json, or compare two results on one",
+     "  risley report result/\n  risley report result/ -o sensor-17.html\n"
+     "  risley report result/ calibration/ -o both.html",
+     "--output", kNothing, declare_report},
     {"estimate", kCalibrate,
      "Estimate the sensor's parameters and rotation angles from a recording",
      "  risley estimate recording.lvx -o result/\n"
@@ -85,25 +87,12 @@ constexpr Verb kVerbs[] = {
      "  risley compare march/ june/ november/\n"
      "  risley compare march/calibration.yaml november/calibration.yaml -o changes.html",
      "--output --unlike --false-alarm --anywhere", kThreads, declare_compare},
-    {"report", kCalibrate,
-     "Draw the page of a result folder again from its report.json, or compare two results on one",
-     "  risley report result/\n  risley report result/ -o sensor-17.html\n"
-     "  risley report result/ calibration/ -o both.html",
-     "--output", kNothing, declare_report},
     {"cloud", kPoints, "Make point clouds with covariances from recordings and a calibration",
      "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
      "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
      "--calibration --output --format --directions --covariance --trajectory --mount --crs "
      "--report",
      kThreads, declare_cloud},
-    {"pattern", kPoints,
-     "Export a sensor's scan pattern for simulators, or show how it covers the field of view",
-     "  risley pattern --sensor avia --format npy --duration-s 4 -o avia.npy\n"
-     "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -\n"
-     "  risley pattern --sensor horizon --format helios-xml -o horizon.xml\n"
-     "  risley pattern --sensor tele-15 --coverage --report tele-15.html",
-     "--output --format --sensor --duration-s --rate-hz --every --coverage --report", kThreads,
-     declare_pattern},
     {"simulate", kSimulate, "Simulate a recording whose truth is known",
      "  risley simulate -o room.lvx --sensor mid-40 --scene data/room.yaml --duration-s 10\n"
      "  risley simulate -o unit.csv --rate-hz 1000 --set prism_tilt_a_vertical_deg=0.1 --seed 7\n"
@@ -113,11 +102,22 @@ constexpr Verb kVerbs[] = {
      "--output --sensor --duration-s --rate-hz --scene --station --set --reported --flight --mount "
      "--seed",
      kThreads | kSeed, declare_simulate},
-    {"emulate", kSimulate, "Emulate a sensor on the network, with any faults you choose",
-     "  risley emulate --interface 127.0.0.5 --sensor avia --duration-s 60\n"
-     "  risley emulate --interface 127.0.0.5 --loss 0.01 --speed 10",
-     "--interface --sensor --serial --scene --recording --duration-s --speed --set --seed", kSeed,
-     declare_emulate},
+    {"pattern", kSimulate,
+     "Export a sensor's scan pattern for simulators, or show how it covers the field of view",
+     "  risley pattern --sensor avia --format npy --duration-s 4 -o avia.npy\n"
+     "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -\n"
+     "  risley pattern --sensor horizon --format helios-xml -o horizon.xml\n"
+     "  risley pattern --sensor tele-15 --coverage --report tele-15.html",
+     "--output --format --sensor --duration-s --rate-hz --every --coverage --report", kThreads,
+     declare_pattern},
+    {"identify", kSimulate, "Identify the prisms that made a scan, from its directions alone",
+     "  risley identify sequence.csv -o mine.yaml\n"
+     "  risley identify frame.pcd --shot-rate-hz 240385 --json",
+     "--output --force --shot-rate-hz --most-prisms --fastest-hz", kThreads, declare_identify},
+    {"preset", kSimulate, "List, show, check or copy sensor presets",
+     "  risley preset list\n  risley preset show avia\n"
+     "  risley preset new unit-17 --from avia -o unit-17.yaml\n  risley preset check unit-17.yaml",
+     "--output --from", kNothing, declare_preset},
     {"campaign", kSimulate, "Simulate and estimate, or calibrate, many times over, as a plan says",
      "  risley campaign plan.yaml -o campaign/\n"
      "  risley campaign plan.yaml --chunk 3/40 -o campaign/\n"

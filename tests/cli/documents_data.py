@@ -4,8 +4,8 @@
 import sys
 
 HALL = "--sensor mid-40-table3 --reported nominal --scene data/hall.yaml"
-DAMAGED = ("cp out/unit.lvx out/damaged.lvx && "
-           "printf '\\377\\377' | dd of=out/damaged.lvx bs=1 seek=3000004 conv=notrunc status=none")
+DAMAGED = ("cp data/recordings/mid-40.lvx out/damaged.lvx && "
+           "printf '\\377\\377' | dd of=out/damaged.lvx bs=1 seek=300008 conv=notrunc status=none")
 
 # The tables of a reproduction as its text has them.
 TABLES = f"""{sys.executable} - <<'TEXT'
