@@ -50,7 +50,7 @@ void note_signal(int) {
   ::sem_post(&interruptions);
 }
 
-/// Ends the process when nobody notices that it was interrupted.
+/// Ends the process if it does not stop in time after an interruption.
 void wait_for_interruption() {
   constexpr auto kPatience = std::chrono::milliseconds(1500);
   while (::sem_wait(&interruptions) != 0) {

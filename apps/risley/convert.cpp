@@ -54,7 +54,7 @@ std::map<std::string, std::uint8_t> sensor_types() {
   return types;
 }
 
-/// Somebody who wants points has to take another verb.
+/// Points are written by another verb.
 void refuse_point_clouds(const std::string& output) {
   const std::string name = lower_case(output);
   const auto has_ending = [&name](const auto& format) { return name.ends_with(format.ending); };

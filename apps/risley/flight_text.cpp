@@ -54,7 +54,7 @@ void print_judgement(const calibration::FlightJudgement& judgement) {
       in_degrees(datum.total), in_degrees(datum.rotation), in_degrees(datum.shape),
       offset_text(datum.total, datum.height));
   for (const calibration::NotTold& own : judgement.not_told) {
-    say("not told by this flight: {} (keeps {:.0f} % of its sigma)\n", own.words,
+    say("not determined by this flight: {} (keeps {:.0f} % of its sigma)\n", own.words,
         100 * std::min(1.0, own.sigma));
   }
 }
@@ -107,7 +107,7 @@ void print_flight(const CalibratedFlight& outcome) {
         before == nullptr ? "-" : fmt::format("{:.1f}", 1e3 * before->rms),
         fmt::format("{:.1f}", 1e3 * after.rms)};
     for (Eigen::Index k = 0; k < 3; ++k) {
-      row.push_back(after.sigma[k] >= 1 ? "not told"
+      row.push_back(after.sigma[k] >= 1 ? "not determined"
                                         : fmt::format("{:.1f} +- {:.1f}", 1e3 * after.shift[k],
                                                       1e3 * after.sigma[k]));
     }

@@ -77,7 +77,7 @@ void print_outcome(const IdentifiedRecording& outcome) {
   }
   ranking.print();
   say("\n");
-  for (const std::string& words : outcome.unobservable) say("never told: {}.\n", words);
+  for (const std::string& words : outcome.unobservable) say("cannot be determined: {}.\n", words);
   if (!outcome.to_do.empty()) say("what to do: {}.\n", outcome.to_do);
 }
 

@@ -46,7 +46,7 @@ std::string range_text(const std::optional<ValueRange>& range, double scale, int
                      decimals, unit);
 }
 
-/// What only a sensor of the second generation tells.
+/// What only sensors of the second generation report.
 void add_numbered(const recordings::RecordingHeader& header, const recordings::Device& device,
                   const recordings::NumberedAudit& audit, Table& table) {
   const auto add_known = [&table](const char* name, const std::string& value) {

@@ -50,7 +50,7 @@ void print_emitters(const estimation::EmitterComparison& emitters, TrainShape sh
   table.print();
   fmt::print("\nalone: as many shots of emitter {}, with what is free for a single one.\n", alone);
   for (const auto& weak : emitters.untold_alone) {
-    fmt::print("not told by emitter {} alone: {}\n", alone, direction_text(weak));
+    fmt::print("not determined by emitter {} alone: {}\n", alone, direction_text(weak));
   }
   fmt::print("\n");
 }
@@ -73,7 +73,7 @@ void print_observability(const JudgedObservability& judged) {
       "freed.\n");
   if (!o.emitters.bounds.empty()) print_emitters(o.emitters, shape);
   for (const auto& weak : o.unobservable) {
-    say("not told by such data: {}\n", direction_text(weak));
+    say("not determined by such data: {}\n", direction_text(weak));
   }
   for (const std::string& words : judged.words) {
     say("{}.\n", words);

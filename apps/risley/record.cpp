@@ -260,7 +260,7 @@ Run declare_record(CLI::App& verb) {
              {"first", "strongest", "dual", "triple", "as-is"},
              "Returns of a shot that the sensors are to send");
   verb.add_option("--optics", o.optics,
-                  "Watch the optics, and tell when they change: 'own' against their beginning; a "
+                  "Watch the optics, and report when they change: 'own' against their beginning; a "
                   "preset or calibration file also against that")
       ->type_name("own|NAME|FILE")
       ->excludes(list);

@@ -329,7 +329,7 @@ class CalibrateTest(CommandTest):
             self.assertTrue(any(word in text for text in poor["advice"]), word)
         text = self.expect(0, *arguments).stdout
         self.assertIn("advice: ", text)
-        self.assertIn("not told by these walls: ", text)
+        self.assertIn("not determined by these walls: ", text)
         self.assertIn("share %", text)
         kept = self.expect_json(0, *arguments, "--prior-sigma-deg", "0.1")
         self.assertLess(kept["parameters"]["incident_beam_vertical_deg"]["sigma"], 0.1)

@@ -199,7 +199,7 @@ class ChainTest(CommandTest):
                 self.assertLess(seen["parameters"][name]["sigma"], 0.001)
         text = self.expect(0, *plan).stdout
         self.assertIn("only the 6 emitters together tell", text)
-        self.assertIn("not told by emitter", text)
+        self.assertIn("not determined by emitter", text)
 
     def test_reported_nominal(self):
         arguments = ("--sensor", "mid-40-table3", "--rate-hz", "1000", "--duration-s", "0.2",

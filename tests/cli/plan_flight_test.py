@@ -67,7 +67,7 @@ class PlanFlightTest(CommandTest):
 
     def test_words(self):
         said = self.expect(0, *self.plan(*MOUNT, *ERRORS, *QUICK))
-        for words in ("boresight and prisms together", "not told by this flight: ", "lever_arm_z_m",
+        for words in ("boresight and prisms together", "not determined by this flight: ", "lever_arm_z_m",
                       "strip against strip", "ANPD", "dense: width"):
             self.assertIn(words, said.stdout)
         self.assertIn("no terrain is given", said.stderr)

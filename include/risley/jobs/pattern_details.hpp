@@ -13,7 +13,7 @@
 
 namespace risley::jobs {
 
-/// What a page tells of a scan pattern.
+/// What a page shows of a scan pattern.
 struct PatternDetails {
   sensors::Sensor sensor;
   sensors::PatternCoverage coverage;
