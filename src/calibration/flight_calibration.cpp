@@ -200,7 +200,7 @@ class FlightCalibrator {
     model_.planes = flight.cells.planes;
   }
 
-  /// Shots between two knots that a jump is between tell nothing: corrections are linear there.
+  /// Shots between two knots with a jump between them are left out: corrections are linear there.
   void leave_out_jumps(LabelledFlight& flight) const {
     for (const ProcessBreak& one : priors_.breaks) {
       for (const TrajectoryKnots::Interval& interval : model_.knots.intervals) {

@@ -19,7 +19,7 @@ namespace {
 
 using Eigen::Index;
 
-/// Attitudes count as late from so many sigmas on, since few flights tell a delay well.
+/// Attitudes count as late from so many sigmas on, since few flights determine a delay well.
 constexpr double kDelaySigmas = 3;
 /// The clock offset contradicts what is stated of it from so many sigmas on.
 constexpr double kClockSigmas = 4;

@@ -28,7 +28,7 @@ struct FlightEvidence {
   const RoughGround* ground = nullptr;  ///< or none: planes
 };
 
-/// What the evidence tells: of a calibration that was made, or of one that is planned.
+/// What the evidence shows: of a calibration that was made, or of one that is planned.
 FlightJudgement judge_flight(const FlightEvidence& evidence);
 
 }  // namespace risley::calibration

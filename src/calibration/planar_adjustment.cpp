@@ -142,7 +142,7 @@ FlatSolution solve_flat(const ShapeProblem& problem, double damping = 0) {
 }
 
 /// Information on the free parameters when everything else is unknown. Directions without any
-/// information come out as zero, also where the others cannot be told apart.
+/// information come out as zero, also where the others cannot be separated.
 Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
   const Index rest = hessian.rows() - free;
   if (rest <= 0) return hessian;

@@ -14,7 +14,7 @@ namespace {
 using Eigen::Index;
 constexpr int kPatches = RoughGround::kPatches;
 
-/// Shots that tell, at most: more hardly tell more.
+/// Most shots that are used: more hardly add anything.
 constexpr std::size_t kRoughShots = 400'000;
 /// Ground counts as rough from so many sigmas of the chance on.
 constexpr double kRoughSigmas = 5;

@@ -31,7 +31,7 @@ struct Labels {
 };
 
 /// Every shot to the plane that explains its range best, in sigmas. Where two planes meet no range
-/// can tell them apart; shots there go to neither, and that is decided by the predicted ranges
+/// can separate them; shots there go to neither, and that is decided by the predicted ranges
 /// alone: a choice by the measured one would keep those whose noise points away from the other
 /// plane.
 /// @param pointing  1 sigma of the directions, rad

@@ -18,7 +18,7 @@ namespace {
 
 using recordings::kNoPlace;
 
-/// Shots of a run that are looked at on either side of a border, and from how many on they tell.
+/// Shots of a run that are examined on either side of a border, and the fewest that are enough.
 constexpr std::size_t kArm = 8, kFewestOfArm = 5;
 /// A curve goes on smoothly when it leaves less than this share of the step from shot to shot, and
 /// no more than half of what one missing shot would leave.

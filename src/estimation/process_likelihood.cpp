@@ -41,7 +41,7 @@ constexpr double kNone = -std::numeric_limits<double>::infinity();
 /// The decade that minimises a cost: steps of one decade, then a golden section around the best.
 template <class Cost>
 double best_decade(const Cost& cost, double lowest, double highest) {
-  constexpr double kTolerance = 0.12;  // far below what the data tell
+  constexpr double kTolerance = 0.12;  // far below what the data resolve
   double best = highest, best_cost = std::numeric_limits<double>::infinity();
   for (double decade = highest; decade >= lowest - 1e-9; decade -= 1.0) {
     const double value = cost(decade);

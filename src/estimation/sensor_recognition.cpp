@@ -37,7 +37,7 @@ constexpr double kMostMisfit = radians_from_degrees(4.0);
 constexpr double kFarWorse = 3.0;
 /// Optics are tried of sensors whose lines leave up to so many times as much as the best.
 constexpr double kWorthATrial = 3.0;
-/// Emitters tell the roll when what their constants leave is below this share of how far they
+/// Emitters show the roll when what their constants leave is below this share of how far they
 /// stand apart.
 constexpr double kEmittersFit = 0.25;
 

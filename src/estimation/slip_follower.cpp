@@ -21,7 +21,7 @@ namespace {
 
 /// Shots that are predicted and tested together.
 constexpr std::size_t kTestedShots = 96;
-/// Blocks behind a suspicious one that may be needed to tell what happened there.
+/// Blocks after a suspicious one that may be needed to find out what happened there.
 constexpr std::size_t kMostBlocksAhead = 8;
 /// Time over which a prediction is held against shots, s: rotors hardly bend in it.
 constexpr double kLongestTest = 0.012;
@@ -43,7 +43,7 @@ constexpr double kLooseShots = 0.15;
 /// Of the start about the truth.
 constexpr double kAnchorAngleSigma = radians_from_degrees(0.5), kAnchorSpeedShare = 1e-3;
 /// Packets of the formats hold so many shots. Recorders lose some at their borders: so many slips,
-/// and such a share of them, tell where in the count the borders are.
+/// and such a share of them, show where in the count the borders are.
 constexpr std::int64_t kPacketShots[] = {96, 100};
 constexpr std::size_t kFewestAtBorders = 5;
 constexpr double kShareAtBorders = 0.7;
@@ -461,7 +461,7 @@ class Follower : private BlockFit {
 };
 
 /// Moves slips to the borders of packets where most are there: at some rotation angles rotors that
-/// turn against each other do not tell by some dozens of shots where it was.
+/// turn against each other leave it open by some dozens of shots where it was.
 void move_to_borders(const NumberedShots& shots, ShotRange range, std::vector<FoundSlip>& slips) {
   if (slips.size() < kFewestAtBorders) return;
   const auto past = [](std::int64_t number, std::int64_t border, std::int64_t packet) {

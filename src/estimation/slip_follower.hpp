@@ -14,7 +14,7 @@
 
 namespace risley::estimation {
 
-/// Noise is not taken below this share of the step from shot to shot: nobody needs it better.
+/// Noise is not taken below this share of the step from shot to shot: better is not needed.
 inline constexpr double kLeastNoiseSteps = 0.2;
 /// The valid shots of a recording by their numbers in the count.
 struct NumberedShots {

@@ -24,7 +24,7 @@ namespace risley::identification {
 namespace {
 
 /// Lines are looked for in so much of a scan, s, or in so many shots if that is longer; where no
-/// train fits, rotors may turn nearly alike, and longer windows tell their lines apart.
+/// train fits, rotors may turn nearly alike, and longer windows separate their lines.
 constexpr double kLineWindow = 1.0;
 constexpr double kLineShots = 4096;
 constexpr double kLongerWindow = 4;
@@ -663,7 +663,7 @@ class TrainSearch {
       if (rival.excess > kFairLead) break;
       const TrainFit fit =
           fit_train(scan, rival.fit.model, result.freedom, {.iterations = 25}, progress_.silent());
-      // Of a single emitter's first prism only tilts tell the faces, and barely.
+      // Only tilts reveal the faces of a single emitter's first prism, and barely.
       if (fit.rms < most ||
           (grid_.emitters == 1 && only_first_faces_differ(rival, result.hypotheses.front()))) {
         same.push_back(h);

@@ -61,7 +61,7 @@ std::string canonical(const YamlNode& node) {
   return fmt::format("{{{}}}", fmt::join(parts, ","));
 }
 
-/// How a value is told: as it is written.
+/// A value as text: as it is written.
 std::string shown(const YamlNode& node) {
   return node.kind == YamlNode::Kind::scalar ? node.scalar : canonical(node);
 }
@@ -273,7 +273,7 @@ class PlanReader {
         job.additional.push_back(io::yaml_text(item, path_, "a name in " + map.field("free")));
       }
     }
-    // Unknown names and values out of bounds are told before the first cell.
+    // Unknown names and values out of bounds are refused before the first cell.
     sensors::Sensor held = believed;
     hold(job.fixed, held);
     estimation::free_parameters(job.additional, shape);

@@ -198,7 +198,7 @@ class ChainTest(CommandTest):
             if name.startswith("incident_beam"):
                 self.assertLess(seen["parameters"][name]["sigma"], 0.001)
         text = self.expect(0, *plan).stdout
-        self.assertIn("only the 6 emitters together tell", text)
+        self.assertIn("only the 6 emitters together determine", text)
         self.assertIn("not determined by emitter", text)
 
     def test_reported_nominal(self):

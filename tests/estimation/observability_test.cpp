@@ -125,7 +125,7 @@ TEST(Observability, Section23OfThePaper) {
     return std::any_of(words.begin(), words.end(),
                        [&](const std::string& one) { return one.find(text) != std::string::npos; });
   };
-  EXPECT_TRUE(says("refractive_index_air cannot be told from refractive_index"));
+  EXPECT_TRUE(says("refractive_index_air cannot be separated from refractive_index"));
   EXPECT_TRUE(says("rotation_angle_a_deg (rho = -0.99"));
 }
 
@@ -208,7 +208,7 @@ TEST(Observability, SixEmittersTellTheFirstPrismWhichOneDoesNot) {
   EXPECT_EQ(emitters.untold_alone[0].weights.front().first, "prism_tilt_a_vertical_deg");
   const auto words = observability_words(all, {3, 6});
   EXPECT_TRUE(std::any_of(words.begin(), words.end(), [](const std::string& one) {
-    return one.starts_with("only the 6 emitters together tell") &&
+    return one.starts_with("only the 6 emitters together determine") &&
            one.find("refractive_index_a") != std::string::npos;
   }));
 }

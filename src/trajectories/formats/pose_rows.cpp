@@ -34,7 +34,7 @@ std::optional<std::int64_t> period_ns(TimeScale scale) {
 }
 
 int unwrap_times(std::vector<std::int64_t>& times_ns, std::int64_t period) {
-  constexpr int kMost = 1000;  // nobody flies for so many weeks
+  constexpr int kMost = 1000;  // no flight takes so many weeks
   int periods = 0, most = 0;
   std::int64_t before = times_ns.empty() ? 0 : times_ns.front();
   for (std::int64_t& time : times_ns) {

@@ -141,7 +141,7 @@ class RowReader {
 
  private:
   /// Makes a second of the day, or of the week, one of the week, as the first date behind a Sunday
-  /// tells; on a Sunday both are the same.
+  /// shows; on a Sunday both are the same.
   void place_in_week(std::int64_t day, std::int64_t& time_ns, std::optional<std::int64_t>& week) {
     constexpr std::int64_t kDay_ns = 86'400'000'000'000, kDays = 7;
     constexpr std::int64_t kLate_ns = 60'000'000'000;  // dates of UTC change so much later at most
