@@ -280,8 +280,8 @@ Run declare_calibrate(CLI::App& verb) {
       ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--plan", o.plan,
-                  "Scene or flight (YAML) to plan for: predicts how good a calibration there would "
-                  "be and, for a flight, how its points would lie on the ground")
+                  "Predict a calibration in this scene or flight (YAML) and, for a flight, how its "
+                  "points would lie on the ground")
       ->excludes("--output", "--method", "--planes", "--stations", "--station", "--list");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording, s")
       ->needs("--plan")
@@ -340,8 +340,8 @@ Run declare_calibrate(CLI::App& verb) {
                 "roll of 180 degrees on the spot: the walls' shape then cancels (default: if their "
                 "planes fit in one way only)");
   verb.add_option("--tolerance-deg", o.tolerance_deg,
-                  "Root mean square error of directions up to which a unit counts as sound, deg "
-                  "(default: the manufacturer's specification, as in the preset)");
+                  "RMS error of directions up to which a unit counts as sound, deg (default: the "
+                  "manufacturer's specification in the preset)");
   add_choice(verb, "--beam-origin", o.beam_origin, {"yes", "no"},
              "Let beams start where they leave the last prism; 'no': at the sensor's origin");
   add_choice(verb, "--states", o.states, {"knots", "all", "none"},

@@ -45,11 +45,12 @@ constexpr Verb kVerbs[] = {
     {"info", kLook, "Show what a recording holds, and check its times",
      "  risley info recording.lvx\n  risley info recording.lvx --json\n"
      "  risley info recording.lvx --share excerpt.nc",
-     "--device --share --table", kThreads, declare_info},
+     "--device --share --share-ranges --table", kThreads, declare_info},
     {"convert", kLook,
      "Convert a recording or trajectory to the format that the output's ending names",
-     "  risley convert recording.lvx -o recording.csv", "--output --format --device", kThreads,
-     declare_convert},
+     "  risley convert recording.lvx -o recording.csv\n"
+     "  risley convert 'survey/*.lvx' --format netcdf -o converted/",
+     "--output --device", kThreads, declare_convert},
     {"record", kLook, "Record first-generation Livox sensors from the network",
      "  risley record -o hall.lvx --interface 192.168.1.5 --duration-s 30\n"
      "  risley record --list",
@@ -76,7 +77,7 @@ constexpr Verb kVerbs[] = {
      "  risley calibrate upright.lvx flipped.lvx --stations stations.yaml -o calibration/\n"
      "  risley calibrate --plan hall.yaml --duration-s 30",
      "--output --sensor --stations --same-walls --tolerance-deg --force --plan --trajectory "
-     "--mount --fix --free --truth --table",
+     "--mount",
      kThreads | kSeed, declare_calibrate},
     {"observability", kCalibrate,
      "Show how well a recording, planned or made, determines each parameter",
@@ -90,7 +91,7 @@ constexpr Verb kVerbs[] = {
     {"cloud", kPoints, "Make point clouds with covariances from recordings and a calibration",
      "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
      "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
-     "--calibration --output --format --directions --covariance --trajectory --mount --crs "
+     "--calibration --output --directions --covariance --trajectory --mount --crs "
      "--report",
      kThreads, declare_cloud},
     {"simulate", kSimulate, "Simulate a recording whose truth is known",
@@ -146,8 +147,8 @@ void add_common_options(CLI::App& verb, unsigned uses, CommonOptions& common) {
       ->group(kCommonGroup);
   auto* quiet =
       verb.add_flag("--quiet", common.quiet,
-                    "Print nothing but errors and the result that was asked for: no progress, no "
-                    "warnings, and no summary of what is written to --output or --table")
+                    "Print errors and the result alone: no progress, no warnings, no summary of "
+                    "what is written to --output or --table")
           ->group(kCommonGroup);
   verb.add_flag("--no-progress", common.no_progress, "Show no progress bar");
   verb.add_flag("--verbose", common.verbose, "Print more detail on stderr")->excludes(quiet);

@@ -241,6 +241,7 @@ void arrange_options(CLI::App& verb, std::string_view usual) {
   }
   for (CLI::App* action : verb.get_subcommands([](CLI::App*) { return true; })) {
     arrange_options(*action, usual);
+    action->get_help_ptr()->group(kCommonGroup)->description("Print this help");
   }
 }
 

@@ -76,10 +76,11 @@ class CommandWithVerbs(CommandTest):
     def choices(self, verb, option):
         text = self.expect(0, verb, "--help-all").stdout
         shown = re.search(option + r" ([a-z-]+(\|[a-z-]+)+)", text)
-        if not shown:  # a long list is part of the description
-            shown = re.search(option + r" NAME\b[^;]*; one of: ([^(]+?)( \(|\n  -)", text)
-            return set(re.split(r",\s+", shown.group(1)))
-        return set(shown.group(1).split("|"))
+        if shown:
+            return set(shown.group(1).split("|"))
+        # A long list is part of the description.
+        entry = re.search(rf"^  {option} NAME(.*?)^(  \S|$)", text, re.MULTILINE | re.DOTALL).group(1)
+        return set(" ".join(entry.split()).partition("; one of: ")[2].partition(" (")[0].split(", "))
 
 
 @unittest.skipUnless(shutil.which("bash"), "no bash")

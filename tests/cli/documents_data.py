@@ -39,7 +39,7 @@ DATA = {
         *(f"risley simulate -o {station}.lvx --sensor mid-40-table3 --reported nominal "
           f"--scene stations.yaml --station '{station} right' --duration-s 1"
           for station in ("upright", "flipped")),
-        "mkdir flight && cp recording.lvx flight/",
+        "mkdir flight survey && cp recording.lvx flight/ && cp wall.lvx survey/",
         "risley calibrate wall.lvx --force -o march/ && cp -r march june && cp -r march november",
         "risley pattern --sensor horizon --format livox-csv --duration-s 0.1 -o sequence.csv",
         # A frame of a sensor in which no shot is missing, as points.
