@@ -24,7 +24,7 @@ struct Group {
   const char* heading;
   std::string_view options;
 };
-constexpr std::array<Group, 8> kGroups = {{
+constexpr std::array<Group, 10> kGroups = {{
     {"Many recordings", "--list --table --resume --no-report"},
     {"How the recording is read",
      "--sensor --rate-hz --device --every-device --shot-rate-hz --extrinsics --mirror "
@@ -32,6 +32,9 @@ constexpr std::array<Group, 8> kGroups = {{
     {"Noise and parameters",
      "--noise-angle-deg --noise-range-m --noise-model --process-noise --fix --free --set "
      "--reported --prior-sigma-deg --range-offset-sigma-m --method --beam-origin --tolerance-deg"},
+    {"What is simulated",
+     "--quantize --no-rounding --rotor --start-angles-deg --firing --integration-s --cell-deg"},
+    {"What sensors send", "--coordinates --return-mode --imu --data-port --find-s"},
     {"Walls", "--planes --stations --station --walls --same-walls --patch-thickness-m"},
     {"Flights and other trajectories",
      "--trajectory --trajectory-topic --mount --accuracy --trajectory-errors "
