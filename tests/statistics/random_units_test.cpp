@@ -116,7 +116,7 @@ simulation::SimulationSettings random_sensor(std::uint64_t seed) {
 }
 
 TEST(RandomUnits, SensorsLieWithinTheirTotalSigmasOrAreRefused) {
-  const int seeds = seeds_or(6);
+  const int seeds = seeds_or(6, 6);
   Score score;
   for (int seed = 0; seed < seeds; ++seed) {
     SCOPED_TRACE(seed);
