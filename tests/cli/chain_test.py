@@ -125,7 +125,7 @@ class ChainTest(CommandTest):
         self.assertIn("prism_tilt_a_horizontal_deg", result["parameters"])
         self.assertEqual(result["fixed"]["refractive_index_a"], 1.51)
         self.expect(2, "estimate", "fix.csv", "--fix", "no_such_parameter")
-        # The batch estimator knows that this data cannot tell the tilt, and names it.
+        # The batch estimator notices that these data do not determine the tilt, and names it.
         result = self.expect_json(1, "estimate", "fix.csv", "--noise-angle-deg", "0.01",
                                   "--free", "prism_tilt_a_horizontal_deg")
         self.assertFalse(result["converged"])

@@ -87,7 +87,7 @@ class ProcessTest(CommandTest):
         return process
 
     def skip_where_the_kernel_drops(self, recorded):
-        """What a sensor that waits for nobody sends cannot be kept where the kernel grants too little memory for it."""
+        """A sensor does not wait: without enough memory from the kernel, its packets cannot all be kept."""
         buffer = recorded["receive_buffer_bytes"]
         drops = sum(one["kernel_drops"] for one in recorded["sensors"])
         if drops > 0 and buffer["granted"] < buffer["asked"]:

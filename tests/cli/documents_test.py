@@ -148,7 +148,7 @@ class DocumentsTest(unittest.TestCase):
             skip_aloud(command, f"{name} is not set")
         return bool(missing)
 
-    def told(self, status, command):
+    def output_of(self, status, command):
         """What a command prints."""
         found, printed = self.shell.run(command)
         self.assertEqual(found, status, command + "\n".join(printed))
@@ -166,7 +166,7 @@ class DocumentsTest(unittest.TestCase):
             if reason:
                 skip_aloud(command.strip(), reason)
                 continue
-            printed.append(self.told(STATUS.get(command.strip(), 0), command))
+            printed.append(self.output_of(STATUS.get(command.strip(), 0), command))
         return printed
 
     def check_message(self, shown, commands):
@@ -174,7 +174,7 @@ class DocumentsTest(unittest.TestCase):
         for status, command in commands:
             if self.lacks(command):
                 return
-            printed += self.told(status, command)
+            printed += self.output_of(status, command)
         apart = ["..."] + [part for line in shown for part in (line, "...")]
         self.assertTrue(follows(apart, printed), "\n".join(["shown:", *shown, "printed:", *printed]))
 
@@ -194,7 +194,7 @@ class DocumentsTest(unittest.TestCase):
         for command in DATA.get(name, ()):
             if self.lacks(command):
                 self.skipTest("data")
-            self.told(0, command)
+            self.output_of(0, command)
         messages = dict(MESSAGES.get(name, {}))
         printed = []
         for language, lines in blocks_of(text):

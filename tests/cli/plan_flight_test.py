@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Planning a flight: what its calibration will tell, and how its points will lie on the ground."""
+"""Planning a flight: what its calibration will determine, and how its points will lie on the ground."""
 import unittest
 
 from command import SOURCE, CommandTest

@@ -104,7 +104,7 @@ TEST(Observability, SensitivitiesAreDifferenceQuotients) {
 
 TEST(Observability, Section23OfThePaper) {
   const Observability all = observability_of_plan(plan_of("mid-40-table3", 30, 1000));
-  // The index of air cannot be told at all, prism A's horizontal tilt hardly: it goes with A's
+  // The index of air is not determined at all, prism A's horizontal tilt hardly: it goes with A's
   // rotation angle at -0.99, and moves the beam least of all.
   EXPECT_TRUE(std::isinf(quantity(all, "refractive_index_air").sigma));
   EXPECT_NEAR(correlation(all, "prism_tilt_a_horizontal_deg", "rotation_angle_a_deg"), -0.99,
@@ -114,7 +114,7 @@ TEST(Observability, Section23OfThePaper) {
     if (one.name == tilt.name) continue;
     EXPECT_GT(one.sensitivity, tilt.sensitivity) << one.name;
   }
-  // Wedge and index are not one quantity: enough data tell them apart.
+  // Wedge and index are not one quantity: enough data separate them.
   const QuantityObservability wedge = quantity(all, "wedge_angle_deg");
   EXPECT_TRUE(std::isfinite(wedge.sigma));
   EXPECT_GT(std::abs(wedge.twins.front().second), 0.999);
