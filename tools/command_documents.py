@@ -47,7 +47,7 @@ class Entry:
 
     @property
     def choices(self):
-        found = re.search(r"; one of: ([^(]*)", self.text)
+        found = re.search(r"\bone of: ([^(]*)", self.text)
         if found:
             return [one.strip() for one in found.group(1).split(",")]
         return self.value_text.split("|") if re.fullmatch(r"[a-z-]+(\|[a-z-]+)+", self.value_text) else []

@@ -127,14 +127,14 @@ Run declare_compare(CLI::App& verb) {
       ->required()
       ->expected(1, 1'000'000);
   verb.add_option("-o,--output", o.page, "Page (HTML) to write (default: none)");
-  verb.add_flag("--unlike", o.job.unlike,
-                "Compare a calibration, which says where beams truly go, with an estimate of what "
-                "the sensor believes, too");
+  verb.add_flag(
+      "--unlike", o.job.unlike,
+      "Also compare calibrations (where beams truly go) with estimates (what the sensor believes)");
   verb.add_flag("--anywhere", o.job.anywhere,
-                "Open results that a table names outside of its own folder, too");
+                "Also open results outside the folder of the table that names them");
   verb.add_option(
           "--false-alarm", o.job.false_alarm,
-          "Probability that chance is taken for a change, or a unit for an outlier, at most")
+          "Highest probability of taking chance for a change, or a sound unit for an outlier")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   return [options](const CommonOptions& common) { return run_compare(*options, common); };

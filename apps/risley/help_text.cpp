@@ -163,11 +163,12 @@ std::string option_entry(const CLI::Option& option) {
   const std::string value = value_of(option, choices);
   std::string text = option.get_description();
   if (value == "NAME" && !choices.empty()) {
-    text += fmt::format("; one of: {}", fmt::join(choices, ", "));
+    const bool is_list = text.find('\n') != std::string::npos;
+    text += fmt::format("{}one of: {}", is_list ? "\n" : "; ", fmt::join(choices, ", "));
   }
   const std::string preset = option.get_default_str();
   const bool has_default = !preset.empty() && preset != "false" && preset.front() != '[';
-  if (option.get_required()) text += " (required)";
+  if (option.get_required()) text = "Required. " + text;
   if (has_default && text.find("default: ") == std::string::npos) {
     text += fmt::format(" (default: {})", preset);
   }

@@ -130,18 +130,16 @@ CLI::Option* add_many_options(CLI::App& verb, jobs::ManyInputsOptions& wishes,
       what +
           "; folders, for all recordings in and below them; quoted patterns such as '*.lvx' or "
           "'survey/**/*.lvx' (** is any number of folders)");
-  verb.add_option("--list", wishes.list,
-                  "Text file with further inputs, one a line; lines that begin with # do not count")
-      ->type_name("FILE");
   verb.add_option(
-          "--table", wishes.table,
-          "Table to write with one row per input; the ending chooses the format: .csv or .nc "
-          "(NetCDF)")
+          "--list", wishes.list,
+          "Text file with further inputs, one per line; lines that begin with # are ignored")
+      ->type_name("FILE");
+  verb.add_option("--table", wishes.table,
+                  "Table to write, one row per input, as .csv or .nc (NetCDF)")
       ->type_name("FILE");
   verb.add_flag(
       "--resume", wishes.resume,
-      "Skip inputs whose results are whole and were made from the same bytes with the same "
-      "options and version");
+      "Skip inputs whose results are complete and come from the same bytes, options and version");
   return inputs;
 }
 

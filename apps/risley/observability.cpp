@@ -114,18 +114,16 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
 Run declare_observability(CLI::App& verb) {
   const auto options = std::make_shared<ObservabilityCommandOptions>();
   ObservabilityCommandOptions& o = *options;
-  verb.add_option("INPUT", o.input,
-                  "Recording to judge; without one a planned recording is judged");
+  verb.add_option("INPUT", o.input, "Recording to judge (default: a planned one)");
   verb.add_option(
       "--sensor", o.sensor,
       "Preset by name, or a preset or calibration file (default: from the recording, or "
       "mid-40)");
   verb.add_option("--duration-s", o.duration_s, "Length of the planned recording, s")
       ->capture_default_str();
-  verb.add_option(
-      "--rate-hz", o.rate_hz,
-      "Shots per second to plan with, Hz (default: the sensor's), or to use of the recording, "
-      "'full' for all");
+  verb.add_option("--rate-hz", o.rate_hz,
+                  "Shots per second, Hz, to plan with (default: the sensor's) or to use of the "
+                  "recording; 'full': all of them");
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith before rounding, deg (default: the sensor's)");
   verb.add_flag("!--no-rounding", o.rounding,

@@ -80,7 +80,7 @@ class CommandWithVerbs(CommandTest):
             return set(shown.group(1).split("|"))
         # A long list is part of the description.
         entry = re.search(rf"^  {option} NAME(.*?)^(  \S|$)", text, re.MULTILINE | re.DOTALL).group(1)
-        return set(" ".join(entry.split()).partition("; one of: ")[2].partition(" (")[0].split(", "))
+        return set(" ".join(entry.split()).partition("one of: ")[2].partition(" (")[0].split(", "))
 
 
 @unittest.skipUnless(shutil.which("bash"), "no bash")
