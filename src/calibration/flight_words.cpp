@@ -13,7 +13,7 @@
 namespace risley::calibration {
 namespace {
 
-/// Parts of a jump are named from so many of their sigmas on.
+/// Parts of a jump are named if they exceed this many of their sigmas.
 constexpr double kNamedSigmas = 3;
 
 const FlightUnknown& clock_of(const FlightCalibration& c) {

@@ -13,14 +13,14 @@ namespace {
 
 using Eigen::Index;
 
-/// A jump counts from so many sigmas on: there are thousands of steps.
+/// A jump counts beyond this many sigmas: there are thousands of steps.
 constexpr double kJumpSigmas = 5;
 /// One jump also shows in the steps beside it, up to here.
 constexpr double kJumpsApart = 4;  // s
 /// Share of a step's variance that the flight has to determine.
 constexpr double kLeastTold = 1e-3;
-/// The process counts as larger than stated from so many sigmas of chi2 on, if it is so many times
-/// as large. Where one error is, nothing vouches for the others.
+/// The process counts as larger than stated beyond this many sigmas of chi2, if it is this many
+/// times as large. Where one error is, nothing vouches for the others.
 constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
 constexpr double kOthersSigmas = 1, kOthersRatio = 1.1;
 /// Nothing is concluded from less, and little from less than the second number.

@@ -10,10 +10,10 @@
 
 namespace risley::calibration {
 
-/// A shot belongs to a plane within so many sigmas: 3 of 1000 with normal noise do not.
+/// A shot belongs to a plane within this many sigmas: 3 of 1000 with normal noise do not.
 inline constexpr double kGate = 3.0;
-/// What lies beyond the gate and within so many sigmas is an outlier of its plane. Steps of it are
-/// looked for as far: docs/theory/calibration.md
+/// What lies beyond the gate and within this many sigmas is an outlier of its plane. Steps of it
+/// are looked for as far: docs/theory/calibration.md
 inline constexpr double kNearby = 10.0;
 
 /// A view of fewer shots is none: its range variance would be known to no better than a quarter,

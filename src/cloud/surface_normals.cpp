@@ -22,7 +22,7 @@ constexpr double kLeastSpread = 1e-3;
 /// Cells between a cell without a fit and those that it looks at: an edge in one cell spoils the
 /// fits of all eight around it.
 constexpr int kReach = 2;
-/// A shot is on a surface nearby that leads to its range within so many sigmas.
+/// A shot is on a surface nearby that predicts its range within this many sigmas.
 constexpr double kNearEnough = 3;
 /// Surfaces that differ by less, in sigmas and as the cosine between normals, are one: 3 degrees.
 constexpr double kSameRange = 1, kSameNormal = 0.9986;

@@ -19,7 +19,7 @@
 namespace risley::estimation {
 namespace {
 
-/// A sigma that is so many times another is worth a word.
+/// Ratio of two sigmas from which it is reported.
 constexpr double kNotable = 2.0;
 
 bool is_beam(int place, int prisms) { return place::emitter(place, prisms) >= 0; }

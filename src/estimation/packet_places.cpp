@@ -36,7 +36,7 @@ constexpr double kSurePlace = 12.0;
 constexpr double kPlaceSoftening = softening_at(1.5);
 /// Noise is not taken below this share of the step from shot to shot.
 constexpr double kLeastPlaceNoise = 0.2;
-/// A packet of more noise than so many times the usual one does not fit.
+/// A packet whose noise exceeds the usual one by this factor does not fit.
 constexpr double kPoorPacket = 4.0;
 
 /// What one packet says of the rotors.

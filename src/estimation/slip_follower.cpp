@@ -30,7 +30,7 @@ constexpr double kLongestTest = 0.012;
 constexpr std::int64_t kDoubledShots = 96, kUsualSlip = 120, kNearSlip = 200, kFarSlip = 2000;
 /// A slip, and its size, are believed from this difference of chi2 on.
 constexpr double kSure = 30.0;
-/// Residuals that hang together count for less; by so much at most.
+/// Largest factor by which correlated residuals count for less.
 constexpr double kMostCorrelation = 10.0;
 /// Losses of single shots end at 1 / softening: mean losses near it say that nothing fits.
 constexpr double kSoftening = softening_at(1.0);
@@ -42,7 +42,7 @@ constexpr double kLostSteps = 8.0;
 constexpr double kLooseShots = 0.15;
 /// Of the start about the truth.
 constexpr double kAnchorAngleSigma = radians_from_degrees(0.5), kAnchorSpeedShare = 1e-3;
-/// Packets of the formats hold so many shots. Recorders lose some at their borders: so many slips,
+/// Shots in packets of the formats. Recorders lose some at their borders: so many slips,
 /// and such a share of them, show where in the count the borders are.
 constexpr std::int64_t kPacketShots[] = {96, 100};
 constexpr std::size_t kFewestAtBorders = 5;
@@ -65,7 +65,7 @@ class Follower : private BlockFit {
   }
 
   /// Fits a state to all places, as if they were free of slips.
-  /// @param from  noise with which that begins: by so much directions may be missed at first, rad
+  /// @param from  initial noise: how far directions may be off at first, rad
   /// @return scale of the residuals, rad
   double settle(RotorState& state, double from) {
     load(0, count_, 0);

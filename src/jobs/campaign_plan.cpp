@@ -351,9 +351,9 @@ std::uint64_t count_of(const std::vector<GridAxis>& axes, const std::string& pat
   for (const GridAxis& axis : axes) {
     count *= axis.values.size();
     if (count > kMostSettings) {
-      fail_at(path, axis.line,
-              fmt::format("grid: more than {} combinations, at most so many are allowed",
-                          kMostSettings));
+      fail_at(
+          path, axis.line,
+          fmt::format("grid: more than {} combinations, which is the most allowed", kMostSettings));
     }
   }
   return count;

@@ -32,7 +32,7 @@ using estimation::SensorMatch;
 using estimation::SensorRecognition;
 using sensors::Sensor;
 
-/// A variant of a sensor's optics is tried where the residuals of its own are so many times what
+/// A variant of a sensor's optics is tried if the residuals of its own are this many times what
 /// its noise and the recording's rounding leave, and taken where it leaves this share of them.
 constexpr double kPoorOptics = 3.0, kBetterOptics = 0.5;
 /// Times are at fault where counted shots leave this share of what the times do.

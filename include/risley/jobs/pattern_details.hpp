@@ -19,7 +19,7 @@ struct PatternDetails {
   sensors::PatternCoverage coverage;
   /// The first shots, as long as the longest integration time, thinned for drawing.
   sensors::ScanPattern rosette;
-  std::uint64_t rosette_every = 1;  ///< of so many shots one
+  std::uint64_t rosette_every = 1;  ///< one shot of this many is drawn
 };
 
 /// @param sensor  as sensors::load_sensor()

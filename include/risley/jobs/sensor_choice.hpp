@@ -51,8 +51,7 @@ struct SensorChoice {
   /// that are none of a sensor's frame, a field of view beyond theirs. The sensor is the usual one.
   std::string impossible;
   std::string beyond_reach;  ///< what is wrong with ranges that the sensor cannot measure, or empty
-  int lines =
-      0;  ///< the first shots name so many (one more than the highest), 0 when not looked at
+  int lines = 0;             ///< in the first shots (one more than the highest), 0 if not counted
   /// The times of the recording do not describe its scan, and shots that are counted at the rate of
   /// the sensor do.
   bool times_at_fault = false;

@@ -40,8 +40,8 @@ struct Observations {
 
   std::size_t size() const { return time_ns.size(); }
   void clear();                    ///< leaves no row
-  void resize(std::size_t rows);   ///< gives every column so many rows
-  void reserve(std::size_t rows);  ///< takes memory for so many at once
+  void resize(std::size_t rows);   ///< gives every column this many rows
+  void reserve(std::size_t rows);  ///< allocates memory for this many
   /// @throws InvalidArgument as require_columns()
   void append(const Observations& other);
   /// Appends rows [begin, end) of another. @throws InvalidArgument as append(), and beyond its rows
