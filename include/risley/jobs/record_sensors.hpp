@@ -67,7 +67,7 @@ struct RecordedStatus {
 /// What was recorded of a sensor.
 struct RecordedSensor {
   FoundSensor sensor;
-  std::string firmware;                    ///< empty if the sensor did not report it
+  std::string firmware;                    ///< empty where it was not told
   recordings::livox::PacketCounts counts;  ///< without those of strangers
   std::uint64_t kernel_drops = 0;
   std::uint64_t rejected = 0;  ///< datagrams that were no packets, or from somebody else
@@ -104,7 +104,7 @@ struct LiveSensorState {
 /// A recording while it runs.
 struct LiveRecording {
   double duration = 0;  ///< s since the first data
-  bool over = false;    ///< no further reports follow
+  bool over = false;    ///< nothing will be told any more
   std::vector<LiveSensorState> sensors;
 };
 
@@ -121,7 +121,7 @@ std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progre
 /// Finds sensors, starts them, and writes what they send into one LVX 1.1 file while it comes, see
 /// recordings::livox::PacketFile, also where that is converted to NetCDF at the end: until the time
 /// is over or the progress is cancelled: that is the clean end of a recording, for which the
-/// sensors are stopped. A sensor that falls silent is reported, waited for, and goes on in the same
+/// sensors are stopped. A sensor that falls silent is told of, waited for, and goes on in the same
 /// file; one that is found later than the others is not taken: the table of sensors stands before
 /// the data.
 /// @throws InvalidArgument; NetworkError also where there is no sensor, or none sends anything;

@@ -59,7 +59,7 @@ class SensorSession {
   void advance(std::int64_t now_ns);
   /// A datagram that arrived at kSensorPort. Only commands with right checksums and lengths act,
   /// only those of the host, and only a handshake where there is none: whose payload names the
-  /// address that it comes from, so that no host receives what another one asked for.
+  /// address that it comes from, so that nobody is sent what somebody else asked for.
   void receive(const Endpoint& from, std::span<const std::uint8_t> datagram, std::int64_t now_ns);
   /// As the sensor knows itself from now on, see recordings::Packet::status.
   void set_status(std::uint32_t status) { status_ = status; }

@@ -54,8 +54,8 @@ struct PacketGap {
 /// Puts the packets of one sensor into their order and counts what is missing. Packets have no
 /// numbers, so everything follows from their times and the period of their data type. Packets that
 /// overtake each other are put right as long as not more than kWindow came in between. A clock that
-/// jumps ahead is distinguished from loss by when packets come: they can be late, never early. One
-/// that jumps back by less than kWindow packets, or ahead by less than 10 ms, is not seen.
+/// jumps ahead is told from loss by when packets come: they can be late, never early. One that
+/// jumps back by less than kWindow packets, or ahead by less than 10 ms, is not seen.
 class PacketOrder {
  public:
   /// Packets that wait for others.
@@ -68,7 +68,7 @@ class PacketOrder {
   /// @param device_type  as recordings::Device::type
   explicit PacketOrder(std::uint8_t device_type);
 
-  /// How special firmware measures, if the device type does not imply it.
+  /// How special firmware measures, where the device type does not tell.
   void set_grid(const ShotGrid& grid) { grid_ = grid; }
 
   /// Takes a datagram that the sensor sent to the data port.
@@ -83,7 +83,7 @@ class PacketOrder {
   /// Packets in their order since the last call.
   std::vector<std::vector<std::uint8_t>> take();
 
-  /// The sensor's clock and its status, as stated in packets of points.
+  /// The sensor's clock and its status, as the packets of points tell them.
   const ClockWatch& clock() const { return clock_; }
   const PacketCounts& counts() const { return counts_; }        ///< of what take() has given
   const std::vector<PacketGap>& gaps() const { return gaps_; }  ///< the first kMostGaps
@@ -107,7 +107,7 @@ class PacketOrder {
     bool empty = true;
 
     void add(std::int64_t time_ns, std::int64_t host_ns);
-    /// Whether the sensor's time goes as fast as the host's, as far as is known.
+    /// Whether the sensor's time goes as fast as the host's, as far as it can be told.
     bool in_real_time() const;
     /// By how much a packet comes before it can have been sent, ns; below 0: it does not.
     std::int64_t early_ns(std::int64_t time_ns, std::int64_t host_ns) const;
