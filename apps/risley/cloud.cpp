@@ -115,9 +115,11 @@ Run declare_cloud(CLI::App& verb) {
           "calibration.yaml of estimate or calibrate, the folder that holds it, or a preset by "
           "name")
       ->required();
-  auto* output = verb.add_option(
-      "-o,--output", o.many.output,
-      "Cloud to write, or a folder for several; the ending chooses the format:" + cloud_endings());
+  auto* output = verb.add_option("-o,--output", o.many.output,
+                                 "Cloud to write, or a folder for several, which is made where it "
+                                 "is missing and in which they "
+                                 "are placed as the inputs are; the ending chooses the format:" +
+                                     cloud_endings());
   verb.add_option(
           "--format", o.format,
           "Format to write, whatever the ending (default: by the ending, las-1.4 in a folder)")

@@ -134,7 +134,7 @@ Run declare_compare(CLI::App& verb) {
                 "Also open results outside the folder of the table that names them");
   verb.add_option(
           "--false-alarm", o.job.false_alarm,
-          "Highest probability of taking chance for a change, or a sound unit for an outlier")
+          "Probability that chance is taken for a change, or a unit for an outlier, at most")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   return [options](const CommonOptions& common) { return run_compare(*options, common); };

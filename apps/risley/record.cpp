@@ -233,9 +233,8 @@ Run declare_record(CLI::App& verb) {
   verb.add_option(
       "-o,--output", o.output,
       "Recording to write (.lvx, .nc); until the end it is an LVX file called FILE.unfinished");
-  verb.add_option(
-          "--interface", o.interface,
-          "IPv4 address of this machine in the network of the sensors (default: the only one)")
+  verb.add_option("--interface", o.interface,
+                  "IPv4 address of this machine where the sensors are (default: the only one)")
       ->type_name("ADDRESS");
   auto* list = verb.add_flag("--list", o.list, "Only list the sensors that are found");
   verb.add_flag("--passive", o.passive,
@@ -256,7 +255,7 @@ Run declare_record(CLI::App& verb) {
                   "Length of the recording, s (default: until Ctrl-C or SIGTERM)")
       ->excludes(list);
   add_choice(verb, "--coordinates", o.coordinates, {"spherical", "cartesian", "as-is"},
-             "Coordinates to request from the sensors");
+             "What the sensors are to send");
   add_choice(verb, "--return-mode", o.return_mode,
              {"first", "strongest", "dual", "triple", "as-is"},
              "Returns per shot to request from the sensors");
@@ -270,8 +269,7 @@ Run declare_record(CLI::App& verb) {
                   "port of 127.0.0.1 or at an address and port of this machine")
       ->type_name("[ADDRESS:]PORT")
       ->excludes(list);
-  add_choice(verb, "--imu", o.imu, {"yes", "no"},
-             "Record inertial samples of Avia, Horizon and Tele-15");
+  add_choice(verb, "--imu", o.imu, {"yes", "no"}, "Inertial samples of Avia, Horizon and Tele-15");
   return [options](const CommonOptions& common) {
     end_in_own_time();
     const jobs::RecordOptions job = job_of(*options);
