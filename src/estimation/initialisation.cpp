@@ -240,7 +240,7 @@ class WindowFitter {
   std::vector<double> azimuth_, zenith_;
 };
 
-/// One way the recording may have come about.
+/// One hypothesis of how the recording was made.
 struct Hypothesis {
   bool mirrored = false;
   sensors::Sensor sensor;  // in one of its speed combinations

@@ -30,7 +30,7 @@ double log_uniform(const RandomStream& stream, std::uint64_t number, double leas
   return least * std::pow(most / least, stream.uniform(number));
 }
 
-/// What the answers of many units come to.
+/// Summary of the answers of many units.
 class Score {
  public:
   void refuse(int unit, const std::string& reason) {

@@ -50,7 +50,7 @@ struct ShotDensity {
   double mean_per_cell = 1.0;  ///< over the cells that were met
 };
 
-/// What there is to say of an estimate beside the numbers that it found.
+/// Details of an estimate beyond its numbers.
 struct EstimateDetails {
   /// What the recording can determine, as sentences; empty for the filter and after a failure.
   std::vector<std::string> advice;

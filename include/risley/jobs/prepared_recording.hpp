@@ -79,7 +79,7 @@ struct PreparedRecording {
 /// moved by it (see estimation/stored_pose.hpp), and where it does not, a recording made
 /// through a hub counts as moved, because hubs move points, and any other one does not, because LVX
 /// keeps points as they are. Moved points are turned back. Where emitters show that the recording
-/// is rolled about the optical axis, and no pose says so, it is turned back by that.
+/// is rolled about the optical axis, and no pose says so, it is turned back.
 ///
 /// Where times are counted, here or evidently by the writer of the file (each row of a file without
 /// packets follows the one before it by the same time), the rotors are followed to find slips of

@@ -69,7 +69,7 @@ class PoseRows {
   std::vector<FilePlace> places_;  ///< of the rows
 };
 
-/// What is to be said of records that were put in order.
+/// Warnings about records that were put in order.
 /// @param place_of  of a record, by its number from 0
 std::vector<Warning> order_warnings(const TimeOrder& told, std::size_t records,
                                     const std::function<FilePlace(std::size_t)>& place_of);
