@@ -126,13 +126,12 @@ void print_outcome(const EstimatedRecording& outcome) {
   table.print();
   say("\n");
   Table residuals({"residual", "mean deg", "std deg", "rms deg",
-                   fmt::format("at {:.0f} m, mm", kStatedDistance), "skewness", "excess kurtosis"});
+                   fmt::format("at {:.0f} m, mm", kStatedDistance)});
   const auto add = [&residuals](const char* name, const estimation::Moments& m) {
     residuals.add({name, fmt::format("{:.6f}", degrees_from_radians(m.mean)),
                    fmt::format("{:.6f}", degrees_from_radians(m.std)),
                    fmt::format("{:.6f}", degrees_from_radians(m.rms)),
-                   fmt::format("{:.2f}", 1e3 * offset_at(m.rms)), fmt::format("{:.3f}", m.skewness),
-                   fmt::format("{:.3f}", m.kurtosis)});
+                   fmt::format("{:.2f}", 1e3 * offset_at(m.rms))});
   };
   add("azimuth", e.azimuth_moments);
   add("zenith", e.zenith_moments);
