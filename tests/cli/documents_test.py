@@ -52,8 +52,9 @@ def commands_of(lines):
 
 
 def help_text():
-    """The examples of all verbs as one document of shell blocks."""
-    examples = [run(verb, "--help").stdout.partition("Examples:\n")[2].partition("\n\n")[0] for verb in verbs()]
+    """The examples of all verbs as one document of shell blocks, those first whose files others use."""
+    ordered = sorted(verbs(), key=lambda verb: {"simulate": 0, "estimate": 1, "calibrate": 1}.get(verb, 2))
+    examples = [run(verb, "--help").stdout.partition("Examples:\n")[2].partition("\n\n")[0] for verb in ordered]
     return "".join(f"```sh\n{re.sub('^  ', '', text, flags=re.MULTILINE)}\n```\n" for text in examples)
 
 
