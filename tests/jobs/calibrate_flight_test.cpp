@@ -149,7 +149,7 @@ TEST_F(CalibrateFlightTest, LeadsFromAFlightToAMount) {
   fs::remove_all(file("out"));
 }
 
-// A recording tells what a sensor believes of its glass. Where the glass is another, strips say so.
+// A recording shows what a sensor believes of its glass. If the glass is another, strips show that.
 TEST_F(CalibrateFlightTest, ContradictsAnIndexThatIsHeld) {
   record(sensors::load_sensor("mid-40"), "other-index.nc");
   CalibrateFlightOptions wanted = options("other-index.nc");
