@@ -3,12 +3,12 @@
 # SPDX-License-Identifier: MIT
 """Makes an installed tree need nothing of the system but its C and C++ library, as auditwheel does.
 
-Usage: tools/carry_libraries.py TREE [--folder FOLDER]
+Usage: tools/carry_libraries.py TREE
 The programs and libraries in and below TREE, bin/* and lib/*.so* and python/**/*.so, get what they are linked with
 into TREE/lib, under names with a hash of the bytes, so that no other library of the process is taken for one of
-them, and search there alone. PROJ's data comes to TREE/share/proj. TREE/share/doc/risley/libraries lists what was
-carried, with the licences that Debian's packages state. --folder looks for libraries there first (stand-ins).
-Needs patchelf. Prints the newest versions that are asked of libc and libstdc++.
+them, and search there alone. PROJ's data and rosbag_storage's plugins come to TREE/share. TREE/share/doc/risley/libraries
+lists what was carried, with the licences that Debian's packages state. Stand-ins of packaging/wheel/stand_ins replace
+two libraries. Needs patchelf and g++. Prints the newest versions that are asked of libc and libstdc++.
 """
 import argparse
 import hashlib
@@ -17,10 +17,13 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 
 #: What every Linux with Python has; the platform tag of a wheel says how new (PEP 600).
 SYSTEM = re.compile(r"(ld-linux-x86-64|lib(c|m|dl|rt|pthread|resolv|util|gcc_s|stdc\+\+))\.so\.\d+")
 PROJ_DATA = pathlib.Path("/usr/share/proj")
+BAG_PLUGINS = pathlib.Path("/usr/share/rosbag_storage")
+STAND_INS = pathlib.Path(__file__).parents[1] / "packaging/wheel/stand_ins"
 #: Debian packages whose headers are compiled into the binaries.
 HEADERS = ("libeigen3-dev", "libxsimd-dev", "librandom123-dev", "nlohmann-json3-dev", "libcli11-dev", "pybind11-dev")
 
@@ -51,11 +54,22 @@ def system_libraries():
     return found
 
 
-def closure(files, own, folders):
-    """All libraries that files need, beside those of the system and the tree's own, by name."""
+def stand_in(name, folder):
+    """Builds what replaces a library, or gives None."""
+    match = re.fullmatch(r"lib(roslib|icudata)\.so\.(\w+)", name)
+    if not match:
+        return None
+    subprocess.run(["g++", "-std=c++20", "-O1", "-fPIC", "-shared", f"-Wl,-soname,{name}",
+                    f"-DICU_DATA=icudt{match[2]}_dat", STAND_INS / f"{match[1]}.cpp", "-o", folder / name], check=True)
+    return folder / name
+
+
+def closure(files, own, folder):
+    """All libraries that files need, beside those of the system and the tree's own, by name.
+
+    @param folder  for stand-ins
+    """
     known = system_libraries()
-    for folder in folders:
-        known.update({path.name: path for path in folder.glob("*.so*")})
     carried, todo = {}, list(files)
     while todo:
         user = todo.pop()
@@ -64,7 +78,7 @@ def closure(files, own, folders):
                 continue
             if name not in known:
                 sys.exit(f"carry_libraries: {user} needs {name}, which is not on this machine")
-            carried[name] = known[name].resolve()
+            carried[name] = stand_in(name, folder) or known[name].resolve()
             todo.append(carried[name])
     return carried
 
@@ -110,18 +124,31 @@ def newest_versions(files):
     return {kind: ".".join(map(str, number)) for kind, number in newest.items()}
 
 
-def carry(tree, folders):
+def carry(tree):
     """Does what this file says. @returns the versions that are asked of the system"""
+    with tempfile.TemporaryDirectory() as folder:
+        return carry_with(tree, pathlib.Path(folder))
+
+
+def carry_with(tree, folder):
+    """The same, with a folder for stand-ins."""
     library = tree / "lib"
     library.mkdir(exist_ok=True)
-    files = [path for path in sorted(tree.glob("bin/*")) + sorted(tree.glob("python/**/*.so")) if is_elf(path)]
+    share = tree / "share"
+    shutil.copytree(PROJ_DATA, share / "proj")
+    shutil.copytree(BAG_PLUGINS, share / BAG_PLUGINS.name)
+    plugins = {path.name: path for path in system_libraries()["libc.so.6"].resolve().parent.glob("ros/librosbag_default_*.so")}
+    for name, path in plugins.items():
+        shutil.copy(path, share / BAG_PLUGINS.name / name)
+    files = [path for pattern in ("bin/*", "python/**/*.so", "share/rosbag_storage/*.so")
+             for path in sorted(tree.glob(pattern)) if is_elf(path)]
     own = {}
     for path in sorted(library.glob("*.so*")):
         if path.is_symlink():
             path.unlink()
         else:
             own[output("patchelf", "--print-soname", path).strip()] = path
-    carried = closure([*files, *own.values()], own, folders)
+    carried = closure([*files, *own.values()], own, folder)
     names = {}
     for name, path in {**own, **carried}.items():
         names[name] = hashed(name, path)
@@ -134,8 +161,8 @@ def carry(tree, folders):
         files.append(target)
     for path in files:
         subprocess.run(["strip", "--strip-unneeded", path], check=True)
-        where = "$ORIGIN" if path.parent == library else \
-            "$ORIGIN/lib" if "python" in path.parts else "$ORIGIN/../lib"
+        inside = path.parent.relative_to(tree / "python/risley" if "python" in path.relative_to(tree).parts else tree)
+        where = "/".join(["$ORIGIN", *[".."] * len(inside.parts), "lib"]) if path.parent != library else "$ORIGIN"
         changes = [["--force-rpath", "--set-rpath", where]]
         if path.parent == library:
             changes.append(["--set-soname", path.name])
@@ -144,14 +171,13 @@ def carry(tree, folders):
             changes.append(sum(renamed, []))
         for change in changes:  # patchelf heeds one kind at a time
             subprocess.run(["patchelf", *change, path], check=True)
-    shutil.copytree(PROJ_DATA, tree / "share/proj")
     packages = {package: {"headers"} for package in HEADERS}
-    came = {**carried, "proj.db": PROJ_DATA / "proj.db"}
+    came = {**carried, **plugins, "proj.db": PROJ_DATA / "proj.db"}
     holders = packages_of(came.values())
     for name, path in came.items():
         if path in holders:
             packages.setdefault(holders[path], set()).add(name)
-        elif path.parent not in folders:
+        elif path.parent != folder:
             sys.exit(f"carry_libraries: no package holds {path}, so that its licence is unknown")
     write_licences(tree / "share/doc/risley/libraries", packages)
     return newest_versions(files)
@@ -161,9 +187,7 @@ def main():
     """Does it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("tree", type=pathlib.Path)
-    parser.add_argument("--folder", type=pathlib.Path, action="append", default=[])
-    options = parser.parse_args()
-    for kind, version in sorted(carry(options.tree.resolve(), [one.resolve() for one in options.folder]).items()):
+    for kind, version in sorted(carry(parser.parse_args().tree.resolve()).items()):
         print(f"{kind}_{version}")
 
 

@@ -19,7 +19,8 @@ import zipfile
 ROOT = pathlib.Path(__file__).parents[1]
 #: Where parts of the tree go; what none names stays out. {data} lands below the prefix of the Python.
 PLACES = {"python/risley": "risley", "bin": "risley/bin", "lib": "risley/lib", "share/proj": "risley/share/proj",
-          "share/risley": "risley/share/risley", "share/doc/risley": "{info}/licenses",
+          "share/rosbag_storage": "risley/share/rosbag_storage", "share/risley": "risley/share/risley",
+          "share/doc/risley": "{info}/licenses",
           "share/man": "{data}/share/man", "share/bash-completion": "{data}/share/bash-completion",
           "share/zsh": "{data}/share/zsh", "share/fish": "{data}/share/fish"}
 METADATA = """Metadata-Version: 2.1

@@ -34,7 +34,7 @@ class CarriedTest(unittest.TestCase):
             for part in ("proc", "tmp", "lib64", "risley/bin", "risley/lib", "risley/work"):
                 (root / part).mkdir(parents=True)
             shutil.copy(os.environ["RISLEY_COMMAND"], tree / "bin/risley")
-            versions = carry_libraries.carry(tree, [])
+            versions = carry_libraries.carry(tree)
             self.assertIn("GLIBC", versions)
             licences = tree / "share/doc/risley/libraries"
             for package in ("libtbb12", "libsqlite3-0", "proj-data"):
@@ -51,8 +51,7 @@ class CarriedTest(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, f"{words}: {done.stderr}")
                 return done.stdout
 
-            try_wheel.use(run, "/risley/data")
-            self.assertGreater((tree / "work/result/report.html").stat().st_size, 100_000)
+            try_wheel.use(run, tree / "work", "/risley/data")
 
 
 if __name__ == "__main__":
