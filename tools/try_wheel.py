@@ -32,8 +32,8 @@ strips: [{headings_deg: [0, 180], length_m: 20}]
 IN_PYTHON = """
 import sys
 import risley
-made = risley.simulate("python.lvx", sensor="mid-40-table3", reported="nominal", scene=sys.argv[1] + "/hall.yaml",
-                       duration=1)
+risley.simulate("python.lvx", sensor="mid-40-table3", reported_nominal=True, scene=sys.argv[1] + "/hall.yaml",
+                duration=1)
 print(risley.estimate("python.lvx", output="python/"))
 print(risley.calibrate("python.lvx"))
 risley.cloud("flight.nc", "flight.nc.truth.yaml", "python.las", trajectory="flight.nc.trajectory.csv",
