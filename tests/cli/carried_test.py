@@ -33,7 +33,10 @@ class CarriedTest(unittest.TestCase):
             tree = root / "risley"
             for part in ("proc", "tmp", "lib64", "risley/bin", "risley/lib", "risley/work"):
                 (root / part).mkdir(parents=True)
-            shutil.copy(os.environ["RISLEY_COMMAND"], tree / "bin/risley")
+            command = pathlib.Path(os.environ["RISLEY_COMMAND"])
+            shutil.copy(command, tree / "bin/risley")
+            for library in command.parents[2].glob("librisley_*.so.*"):  # where they are shared
+                shutil.copy(library, tree / "lib", follow_symlinks=False)
             versions = carry_libraries.carry(tree)
             self.assertIn("GLIBC", versions)
             licences = tree / "share/doc/risley/libraries"
