@@ -50,8 +50,10 @@ class ManyResults(_Shown, Sequence[Dict[str, Any]]):
         return needed("xarray", "to_xarray()").Dataset(columns)
 
     def _lines(self) -> List[Tuple[str, str]]:
-        return [(one["input"], one["message"] or one.get("verdict", {}).get("code", "done"))
-                for one in self]
+        counts = f"{self.done} done, {self.skipped} skipped, {self.failed} failed"
+        return [("inputs", counts),
+                *((one["input"], one["message"] or one.get("verdict", {}).get("code", "done"))
+                  for one in self)]
 
 
 def _many(verb: str, job: Callable[..., Any], wanted: Dict[str, Any], options: Dict[str, Any],

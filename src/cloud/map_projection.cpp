@@ -56,6 +56,7 @@ void use_own_data(PJ_CONTEXT* context) {
   std::istringstream others(given == nullptr ? "" : given);
   for (std::string other; std::getline(others, other, ':');) folders.push_back(other);
   std::vector<const char*> names;
+  names.reserve(folders.size());
   for (const std::string& name : folders) names.push_back(name.c_str());
   proj_context_set_search_paths(context, static_cast<int>(names.size()), names.data());
 }

@@ -146,6 +146,7 @@ class PointArrays {
                                Column, std::array<PointColumn::Numbers, cloud::kCovarianceTerms>>) {
         if (column[0].size() != points.size()) return;
         std::vector<const double*> terms;
+        terms.reserve(std::size(kSquare));
         for (const std::size_t term : kSquare) terms.push_back(column[term].data());
         visit(kEntry, terms, {3, 3});
       } else if constexpr (std::is_same_v<Column, std::vector<PointColumn::Numbers>>) {

@@ -50,7 +50,7 @@ py::array_t<double> array_of_rows(const std::vector<Row>& rows, py::ssize_t numb
 
 Numbers columns_from(const py::handle& values, const char* name, std::size_t rows,
                      py::ssize_t numbers) {
-  const Numbers array = numbers_from(values, name);
+  Numbers array = numbers_from(values, name);
   const Shape wanted{static_cast<py::ssize_t>(rows), numbers};
   if (shape_of(array) != wanted) {
     throw InvalidArgument(fmt::format("{} has the shape {}, expected {}", name, shape_text(array),
