@@ -94,7 +94,9 @@ TEST(ControlSession, FromTheFirstRequestToTheEnd) {
     EXPECT_EQ(link.met(ClientEvent::Kind::refused), 0U);
     link.run(60'000);
     EXPECT_EQ(link.client.state(), ClientState::sampling);
-    if (type == kMid360) EXPECT_NEAR(link.pushes, 60, 3);
+    if (type == kMid360) {
+      EXPECT_NEAR(link.pushes, 60, 3);
+    }
     link.client.stop(link.now);
     ASSERT_TRUE(link.run_until(ClientState::closed, 1000));
     link.run(1000);
