@@ -519,10 +519,14 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
 /// Widens the sigmas by what held parameters may be off by.
 void count_held_parameters(Estimate& estimate, const sensors::Sensor& nominal) {
   estimate.held_changes = changes_by_held_parameters(estimate, nominal);
-  const Eigen::VectorXd changes = estimate.held_changes.values.rowwise().norm();
-  for (std::size_t i = 0; i < estimate.values.size(); ++i) {
-    EstimatedValue& value = estimate.values[i];
-    value.sigma = std::hypot(value.sigma_given_held, changes[static_cast<Eigen::Index>(i)]);
+  const auto count = static_cast<Eigen::Index>(estimate.values.size());
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(count);
+  for (std::size_t j = 0; j < estimate.held_changes.held.size(); ++j) {
+    variance += estimate.held_changes.covariance(j, count).diagonal();
+  }
+  for (Eigen::Index i = 0; i < count; ++i) {
+    EstimatedValue& value = estimate.values[static_cast<std::size_t>(i)];
+    value.sigma = std::hypot(value.sigma_given_held, std::sqrt(variance[i]));
   }
 }
 

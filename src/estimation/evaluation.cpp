@@ -70,8 +70,7 @@ Eigen::MatrixXd covariance_of_held_errors(const Estimate& estimate, const PrismT
   for (std::size_t j = 0; j < changes.held.size(); ++j) {
     const int at = changes.held[j].places.front();
     if (truth[at] == estimate.sensor.train[at]) continue;
-    const Eigen::VectorXd change = changes.values.col(static_cast<Eigen::Index>(j)).head(count);
-    sum += change * change.transpose();
+    sum += changes.covariance(j, count);
   }
   return sum;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "risley/algebra/symmetric.hpp"
 #include "risley/estimation/normal_equations.hpp"
@@ -62,65 +63,143 @@ struct Sample {
   }
 };
 
+/// One Gauss-Newton step of a sample of the shots, as certain as all of them are together. The
+/// prior of the constants pulls towards where they are.
+SmootherSolution step_of(const Estimate& estimate, const Sample& sample,
+                         const RotorTrajectory& knots, const PrismTrain& train,
+                         const std::vector<FreeParameter>& constants) {
+  NormalEquations equations;
+  accumulate(sample.series, knots, train, constants, weights_of(estimate), equations);
+  equations.scale(1.0 / sample.share / estimate.variance_factor);
+  const auto count = static_cast<Index>(constants.size());
+  ParameterPrior prior{Eigen::VectorXd(count), Eigen::VectorXd::Zero(count)};
+  for (Index j = 0; j < count; ++j) {
+    const double sigma = constants[static_cast<std::size_t>(j)].prior_sigma;
+    prior.information[j] = 1.0 / (sigma * sigma);
+  }
+  return smooth(equations, knots, estimate.rotor_process, prior, true);
+}
+
+/// Derivatives of the constants and of the held parameters themselves by these, where the data
+/// decide on the constants, times one sigma of each [free + held, held].
+/// @param solution  of free and held parameters together
+Eigen::MatrixXd changes_of_constants(const SmootherSolution& solution,
+                                     const std::vector<FreeParameter>& all, Index free) {
+  const Index count = static_cast<Index>(all.size()) - free;
+  Eigen::MatrixXd information = solution.parameter_information.topLeftCorner(free, free);
+  for (Index j = 0; j < free; ++j) {
+    const double sigma = all[static_cast<std::size_t>(j)].prior_sigma;
+    information(j, j) += 1.0 / (sigma * sigma);
+  }
+  Eigen::MatrixXd changes(free + count, count);
+  changes.topRows(free) =
+      -algebra::SymmetricSolver(information)
+           .solve_columns(solution.parameter_information.topRightCorner(free, count));
+  changes.bottomRows(count).setIdentity();
+  for (Index j = 0; j < count; ++j) {
+    changes.col(j) *= all[static_cast<std::size_t>(free + j)].prior_sigma;
+  }
+  return changes;
+}
+
+/// The second order of what one sigma of a held parameter does: how far the mean of both signs is
+/// from no change, by one step from either end of the first order.
+/// @param solution  of free and held parameters together, from which the rotors follow
+/// @param change    of the constants [free + held]
+/// @return of the constants [free] and of the states of the knots
+std::pair<Eigen::VectorXd, std::vector<double>> second_order(const Estimate& estimate,
+                                                             const Sample& sample,
+                                                             const SmootherSolution& solution,
+                                                             const std::vector<FreeParameter>& all,
+                                                             const Eigen::VectorXd& change) {
+  const std::vector<FreeParameter>& constants = constants_of(estimate);
+  const Eigen::VectorXd values = free_values(estimate.train, all);
+  Eigen::VectorXd curve = Eigen::VectorXd::Zero(static_cast<Index>(constants.size()));
+  std::vector<double> states(sample.knots.state.size(), 0.0);
+  for (const auto& [sign, weight] : {std::pair{1.0, 0.5}, {-1.0, 0.5}, {0.0, -1.0}}) {
+    RotorTrajectory moved = sample.knots;
+    for (std::size_t knot = 0; knot < moved.size(); ++knot) {
+      const auto state = moved.state_of(knot);
+      Eigen::Map<Eigen::VectorXd>(state.data(), moved.states()) +=
+          sign * (solution.sensitivity(knot, moved.states()) * change);
+    }
+    const PrismTrain train = with_free_values(estimate.train, all, values + sign * change);
+    const SmootherSolution step = step_of(estimate, sample, moved, train, constants);
+    curve += weight * step.parameter_step;
+    for (std::size_t i = 0; i < states.size(); ++i) states[i] += weight * step.state_step[i];
+  }
+  return {std::move(curve), std::move(states)};
+}
+
+/// What becomes of the answers: the free parameters, mean speeds and first angles of the rotors.
+/// @param angles_of  changes of the rotation angles at a knot [prisms, columns]
+template <class Angles>
+Eigen::MatrixXd changes_of_values(const Eigen::MatrixXd& parameters, const RotorTrajectory& knots,
+                                  const Angles& angles_of) {
+  const Index prisms = knots.prisms, columns = parameters.cols();
+  Eigen::MatrixXd turned = Eigen::MatrixXd::Zero(prisms, columns);
+  double time = 0;
+  for (std::size_t s = 0; s < knots.stretch_begin.size(); ++s) {
+    const std::size_t first = knots.stretch_begin[s], last = knots.stretch_end(s) - 1;
+    turned += angles_of(last) - angles_of(first);
+    time += 1e-9 * static_cast<double>(knots.time_ns[last] - knots.time_ns[first]);
+  }
+  if (time > 0) turned /= time;
+  Eigen::MatrixXd changes(parameters.rows() + 2 * prisms, columns);
+  changes << parameters, turned, angles_of(0);
+  return changes;
+}
+
 }  // namespace
+
+Eigen::MatrixXd HeldChanges::covariance(std::size_t one, Index rows) const {
+  constexpr double kMeanFourthPower = 3.0;  // of x
+  const Eigen::VectorXd first = values.col(static_cast<Index>(one)).head(rows);
+  const Eigen::VectorXd second = curves.col(static_cast<Index>(one)).head(rows);
+  return first * first.transpose() + kMeanFourthPower * second * second.transpose();
+}
 
 HeldChanges changes_by_held_parameters(const Estimate& estimate, const sensors::Sensor& sensor) {
   HeldChanges result;
   result.held = telling_held(estimate, sensor);
-  const std::vector<FreeParameter>& held = result.held;
   std::vector<FreeParameter> all = constants_of(estimate);
   const auto free = static_cast<Index>(all.size());
   const auto parameters = static_cast<Index>(estimate.free.size());
   const Index prisms = sensor.prisms();
-  const auto count = static_cast<Index>(held.size());
-  Eigen::MatrixXd& changes = result.values;
-  changes = Eigen::MatrixXd::Zero(parameters + 2 * prisms, count);
+  const auto count = static_cast<Index>(result.held.size());
+  result.values = Eigen::MatrixXd::Zero(parameters + 2 * prisms, count);
+  result.curves = result.values;
   result.mean_angles = Eigen::MatrixXd::Zero(prisms, count);
   if (count == 0) return result;
-  all.insert(all.end(), held.begin(), held.end());
+  all.insert(all.end(), result.held.begin(), result.held.end());
 
   const Sample sample(estimate);
-  NormalEquations equations;
-  accumulate(sample.series, sample.knots, estimate.train, all, weights_of(estimate), equations);
-  equations.scale(1.0 / sample.share / estimate.variance_factor);
-  ParameterPrior prior;
-  prior.information.resize(free + count);
-  prior.gradient = Eigen::VectorXd::Zero(free + count);
-  for (Index j = 0; j < free + count; ++j) {
-    const double sigma = all[static_cast<std::size_t>(j)].prior_sigma;
-    prior.information[j] = 1.0 / (sigma * sigma);
-  }
-  const SmootherSolution solution =
-      smooth(equations, sample.knots, estimate.rotor_process, prior, true);
-  Eigen::MatrixXd information = solution.parameter_information.topLeftCorner(free, free);
-  information.diagonal() += prior.information.head(free);
-  Eigen::MatrixXd constants(free + count, count);  // d constants / d held
-  constants.topRows(free) =
-      -algebra::SymmetricSolver(information)
-           .solve_columns(solution.parameter_information.topRightCorner(free, count));
-  constants.bottomRows(count).setIdentity();
-  for (Index j = 0; j < count; ++j) {
-    constants.col(j) *= held[static_cast<std::size_t>(j)].prior_sigma;
-  }
-
   const RotorTrajectory& knots = sample.knots;
+  const SmootherSolution solution = step_of(estimate, sample, knots, estimate.train, all);
+  const Eigen::MatrixXd constants = changes_of_constants(solution, all, free);
   const auto angles_of = [&](std::size_t knot) -> Eigen::MatrixXd {
     const auto own = solution.sensitivity(knot, knots.states());
     Eigen::MatrixXd angles(prisms, count);
     for (Index k = 0; k < prisms; ++k) angles.row(k) = own.row(kStatesPerRotor * k) * constants;
     return angles;
   };
-  changes.topRows(parameters) = constants.topRows(parameters);
-  double time = 0;
-  for (std::size_t s = 0; s < knots.stretch_begin.size(); ++s) {
-    const std::size_t first = knots.stretch_begin[s], last = knots.stretch_end(s) - 1;
-    changes.middleRows(parameters, prisms) += angles_of(last) - angles_of(first);
-    time += 1e-9 * static_cast<double>(knots.time_ns[last] - knots.time_ns[first]);
-  }
-  if (time > 0) changes.middleRows(parameters, prisms) /= time;
-  changes.bottomRows(prisms) = angles_of(0);
+  result.values = changes_of_values(constants.topRows(parameters), knots, angles_of);
   for (std::size_t knot = 0; knot < knots.size(); ++knot) result.mean_angles += angles_of(knot);
   result.mean_angles /= static_cast<double>(knots.size());
+
+  // Only behind a reflection do the others follow a held parameter along a visible curve.
+  for (Index j = 0; sensor.shape().prisms.reflects() && j < count; ++j) {
+    const auto [curve, states] = second_order(estimate, sample, solution, all, constants.col(j));
+    const auto curve_of_angles = [&, &steps = states](std::size_t knot) -> Eigen::MatrixXd {
+      Eigen::MatrixXd angles(prisms, 1);
+      for (Index k = 0; k < prisms; ++k) {
+        angles(k, 0) = steps[knot * static_cast<std::size_t>(knots.states()) +
+                             static_cast<std::size_t>(kStatesPerRotor * k)];
+      }
+      return angles;
+    };
+    result.curves.col(j) = changes_of_values(curve.head(parameters), knots, curve_of_angles);
+  }
   return result;
 }
 

@@ -25,17 +25,14 @@ Json hypothesis_json(const identification::Identification& found, const Hypothes
   }
   for (const double lag : hypothesis.fit.model.lag) lags.push_back(lag);
   const estimation::FrameTurn& turn = hypothesis.fit.model.frame;
-  const auto [first, second] = estimation::turn_names(hypothesis.train().layout().axis_up);
-  Json frame{{"yaw_deg", 0.0}};
-  frame[first + "_deg"] = deg(turn.yaw);
-  frame[second + "_deg"] = deg(turn.pitch);
   return {{"faces", to_string(hypothesis.train().face_order())},
           {"parameters", parameters},
           {"rms_deg", deg(hypothesis.fit.rms)},
           {"chi2_excess", hypothesis.excess},
           {"equivalent_to", equivalent},
           {"emitter_lags_s", lags},
-          {"frame", frame},
+          {"frame",
+           turn_json(hypothesis.train().layout().axis_up, 0.0, deg(turn.yaw), deg(turn.pitch))},
           {"observations_used", hypothesis.fit.shots},
           {"outliers", hypothesis.fit.outliers}};
 }

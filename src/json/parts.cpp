@@ -3,6 +3,7 @@
 #include "json/parts.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "risley/core/angle.hpp"
 #include "risley/jobs/recording_input.hpp"
@@ -28,12 +29,20 @@ Json value_json(double value, double sigma) {
   return {{"value", deg(value)}, {"sigma", deg(sigma)}};
 }
 
+Json turn_json(bool axis_up, Json yaw, Json about_first, Json about_second) {
+  const auto [first, second] = estimation::turn_names(axis_up);
+  Json json{{"yaw_deg", std::move(yaw)}};
+  json[first + "_deg"] = std::move(about_first);
+  json[second + "_deg"] = std::move(about_second);
+  return json;
+}
+
 Json frame_json(const std::optional<estimation::FrameEstimate>& turn, bool axis_up) {
   const estimation::FrameEstimate frame = turn.value_or(estimation::FrameEstimate{});
-  const auto [first, second] = estimation::turn_names(axis_up);
-  Json json{{"yaw_deg", value_json(0, 0)}, {"estimated", turn.has_value()}};
-  json[first + "_deg"] = value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0)));
-  json[second + "_deg"] = value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1)));
+  Json json = turn_json(axis_up, value_json(0, 0),
+                        value_json(frame.turn.yaw, std::sqrt(frame.covariance(0, 0))),
+                        value_json(frame.turn.pitch, std::sqrt(frame.covariance(1, 1))));
+  json["estimated"] = turn.has_value();
   return json;
 }
 

@@ -39,6 +39,10 @@ Json verdict_json(const Verdict& verdict) {
 /// Which sensor it was and who says so: sensor, preset, sensor_chosen_by, sensor_choice.
 Json choice_json(const jobs::SensorChoice& choice);
 
+/// A turn of a frame by the names of its angles, of which a sensor about Z has a roll, too.
+/// @param about_first  and second: in the order of estimation::turn_names()
+Json turn_json(bool axis_up, Json yaw, Json about_first, Json about_second);
+
 /// How a recording's frame is turned; zeros without sigma where it is the sensor's.
 /// @param axis_up  of the sensor: a roll takes the place of the yaw, which is 0
 Json frame_json(const std::optional<estimation::FrameEstimate>& turn = {}, bool axis_up = false);

@@ -8,6 +8,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/setting.hpp"
+#include "risley/estimation/frame_turn.hpp"
 #include "risley/report/html.hpp"
 
 #include "report/pages.hpp"
@@ -86,10 +87,11 @@ std::string estimate_subject(const View& r) {
   }
   if (r["mirrored"].flag()) text += "; the sign of the elevation was reversed";
   if (r["frame"]["estimated"].flag()) {
-    text += fmt::format(
-        "; the recording's frame was turned back by {:.3f}° in yaw and {:.3f}° in "
-        "pitch",
-        r["frame"]["yaw_deg"]["value"].number(), r["frame"]["pitch_deg"]["value"].number());
+    const auto [first, second] = estimation::turn_names(r["frame"].has("roll_deg"));
+    text +=
+        fmt::format("; the recording's frame was turned back by {:.3f}° in {} and {:.3f}° in {}",
+                    r["frame"][first + "_deg"]["value"].number(), first,
+                    r["frame"][second + "_deg"]["value"].number(), second);
   }
   return text + ".";
 }

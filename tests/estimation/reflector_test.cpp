@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/estimation/estimate.hpp"
 #include "risley/estimation/frame_turn.hpp"
@@ -71,6 +72,29 @@ TEST(Reflector, UnitsAreEstimatedToTheirNoise) {
       EXPECT_NEAR(found.sensor.train[place], unit.train[place], radians_from_degrees(0.6)) << place;
     }
   }
+}
+
+TEST(Reflector, JointErrorsAreThoseStated) {
+  // The held tilt of the reflector moves the others by up to 30 sigma of what is known best, in
+  // second order.
+  constexpr unsigned kUnits = 20;
+  double chi2 = 0, values = 0;
+  for (unsigned seed = 1; seed <= kUnits; ++seed) {
+    const sensors::Sensor unit = random_unit(seed);
+    const AngleSeries series = shots_of(unit, 20'000, seed);
+    const Estimate found = estimate(Method::map, series, series, options_of_preset());
+    ASSERT_TRUE(found.converged) << found.reason;
+    const Eigen::Index n = found.parameters.size();
+    Eigen::MatrixXd covariance = found.covariance;
+    for (std::size_t j = 0; j < found.held_changes.held.size(); ++j) {
+      covariance += found.held_changes.covariance(j, n);
+    }
+    chi2 += algebra::SymmetricSolver(covariance)
+                .chi2(found.parameters - free_values(unit.train, found.free));
+    values += static_cast<double>(n);
+  }
+  EXPECT_GT(chi2 / values, 0.8);
+  EXPECT_LT(chi2 / values, 1.25);
 }
 
 TEST(Reflector, RotorsThatLeanAreNoTurnOfTheFrame) {

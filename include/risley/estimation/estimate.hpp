@@ -57,12 +57,18 @@ struct EstimatedValue {
   double sigma_given_held = 0;  ///< if they were exactly as held
 };
 
-/// How an estimate changes where parameters that it held are off: by these amounts for one sigma of
-/// each, the first order of which is all there is.
+/// How an estimate changes where parameters that it held are off by x sigma each: by x times the
+/// first order plus x^2 times the second.
 struct HeldChanges {
   std::vector<FreeParameter> held;  ///< with the sigma that the sensor states as prior_sigma
-  Eigen::MatrixXd values;           ///< [values, held], in the order of Estimate::values
-  Eigen::MatrixXd mean_angles;  ///< of the rotation angles, mean over the recording [prisms, held]
+  Eigen::MatrixXd values;           ///< first order [values, held], ordered as Estimate::values
+  Eigen::MatrixXd curves;  ///< second order [values, held]; zero where no reflection makes it large
+  /// First order of the rotation angles, mean over the recording [prisms, held].
+  Eigen::MatrixXd mean_angles;
+
+  /// What one held parameter with a normally distributed x adds to the covariance of the first so
+  /// many values [rows, rows].
+  Eigen::MatrixXd covariance(std::size_t one, Eigen::Index rows) const;
 };
 
 /// All rotors turn faster or slower than the sensor's by one factor: so they do where the clock of
