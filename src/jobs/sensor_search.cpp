@@ -36,14 +36,14 @@ BroadcastListener::BroadcastListener(const wire::Interface& interface) {
     if (interface.broadcast && *interface.broadcast != wire::kEverybody) {
       sockets.emplace_back(wire::Endpoint{*interface.broadcast, port}, 0, interface.name);
     }
-    sockets.emplace_back(wire::Endpoint{interface.address, port});
   };
   listen(broadcasts_, wire::kBroadcastPort);
+  broadcasts_.emplace_back(wire::Endpoint{interface.address, wire::kBroadcastPort});
+  listen(answers_, wire::kSearchPort);
   try {
-    listen(answers_, wire::kSearchPort);
+    answers_.emplace_back(wire::Endpoint{interface.address, wire::kSearchPort});
   } catch (const wire::NetworkError&) {
     // Another program, such as a driver, has the port: sensors answer whoever asks.
-    answers_.clear();
     answers_.emplace_back(wire::Endpoint{interface.address, 0});
   }
 }
