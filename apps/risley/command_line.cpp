@@ -44,13 +44,14 @@ constexpr Verb kVerbs[] = {
      "\\\n"
      "    --scene data/village.yaml --rate-hz 5000",
      declare_simulate},
-    {"record", "Record first-generation Livox sensors from the network",
+    {"record", "Record Livox sensors from the network",
      "  risley record -o hall.lvx --interface 192.168.1.5 --duration-s 30\n"
      "  risley record --list",
      declare_record},
     {"emulate", "Be a virtual sensor on the network, with faults to order",
      "  risley emulate --interface 127.0.0.5 --sensor avia --duration-s 60\n"
-     "  risley emulate --interface 127.0.0.5 --loss 0.01 --speed 10",
+     "  risley emulate --interface 127.0.0.5 --loss 0.01 --speed 10\n"
+     "  risley emulate --interface 127.0.0.7 --sensor mid-360",
      declare_emulate},
     {"estimate", "Estimate the sensor's parameters and rotation angles from one recording",
      "  risley estimate recording.lvx -o result/\n"
