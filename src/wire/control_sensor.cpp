@@ -239,8 +239,12 @@ ControlSensor::Bytes ControlSensor::answer(const Endpoint& from, const ControlFr
       reboot_ = std::int64_t{io::load<std::uint16_t>(frame.data.data())} * 1'000'000;
       return {kDone};
     case ControlCommand::factory_reset: {
-      const Bytes& serial = values_[kSerialKey];
-      if (!std::ranges::equal(frame.data, serial)) return {kFails};
+      // What hosts send behind it is anything.
+      const std::string& serial = identity().code;
+      if (frame.data.size() < serial.size() ||
+          !std::equal(serial.begin(), serial.end(), frame.data.begin())) {
+        return {kFails};
+      }
       reset_values();
       follow_values(now_ns);
       return {kDone};
@@ -323,8 +327,11 @@ ControlSensor::Bytes ControlSensor::answer_set(const Address& from, const Contro
     if (const std::uint8_t code = judge(from, entry); code != kDone) return reply(code, entry.key);
   }
   for (const KeyValue& entry : list) {
-    values_[entry.key].assign(entry.value.begin(), entry.value.end());
-    if (entry.key == kPointTargetKey) ++handshakes_;
+    Bytes& value = values_[entry.key];
+    // Hosts that did not hear the reply say it again.
+    const bool changes = !std::ranges::equal(value, entry.value);
+    if (entry.key == kPointTargetKey && changes) ++handshakes_;
+    value.assign(entry.value.begin(), entry.value.end());
   }
   follow_values(now_ns);
   return reply(kDone, 0);
