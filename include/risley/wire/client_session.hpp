@@ -106,26 +106,28 @@ class ClientSession {
   /// receive(), of a session that is not over.
   virtual void take(std::span<const std::uint8_t> datagram, std::int64_t now_ns) = 0;
 
+  /// Of the next request.
   std::uint16_t next_sequence() { return ++sequence_; }
   /// Sends a request until its reply comes.
   void send(std::vector<std::uint8_t> request, std::uint16_t sequence, std::int64_t now_ns);
-  void send_heartbeat(std::int64_t now_ns);
+  void send_heartbeat(std::int64_t now_ns);  ///< asks for a sign of life
   /// Takes a reply of this sequence. @return whether it answers the request that waits
   bool answers(std::uint16_t sequence, std::int64_t now_ns);
   bool answers_heartbeat(std::uint16_t sequence, std::int64_t now_ns);  ///< the same of that
   void go_on(std::int64_t now_ns);  ///< asks what comes next, once the last request was answered
-  void lose(std::string why);
+  void lose(std::string why);       ///< and tells it
+  /// An event.
   void tell(ClientEvent::Kind kind, std::uint32_t value = 0, std::string text = {});
-  void tell(const SensorReport& report);
-  void reject() { ++rejected_; }
+  void tell(const SensorReport& report);  ///< that it differs
+  void reject() { ++rejected_; }          ///< a datagram
   /// The sensor has answered.
   void connect(std::int64_t now_ns);
-  bool connected() const { return connected_; }
+  bool connected() const { return connected_; }  ///< connect() was called
   /// From now on.
   void set_heartbeat_period(std::int64_t period_ns) { heartbeat_period_ns_ = period_ns; }
-  void set_state(ClientState state) { state_ = state; }
-  void close();
-  const ClientSettings& settings() const { return settings_; }
+  void set_state(ClientState state) { state_ = state; }         ///< that it is in now
+  void close();                                                 ///< and tells it
+  const ClientSettings& settings() const { return settings_; }  ///< as they were given
 
  private:
   /// A request that waits for its reply.

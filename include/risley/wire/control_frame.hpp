@@ -73,9 +73,11 @@ inline constexpr std::uint16_t kDataTypeKey = 0x0000,  ///< of points, 1 byte
     kFirmwareTypeKey = 0x8010,                         ///< 0 loader, 1 application
     kFaultsKey = 0x8011;                               ///< 8 of SensorReport::faults
 
-/// Work states that hosts ask for and wait for.
-inline constexpr std::uint8_t kSamplingState = 1, kIdleState = 2, kStartingState = 6,
-                              kReadyState = 9;
+/// Work states, as kStateKey and kTargetStateKey have them.
+inline constexpr std::uint8_t kSamplingState = 1,  ///< it sends data
+    kIdleState = 2,                                ///< nothing runs
+    kStartingState = 6,                            ///< the motors start
+    kReadyState = 9;                               ///< the motors run, the laser is off
 
 /// Where a sensor listens, and from where it sends. Several may be the same.
 struct ControlPorts {

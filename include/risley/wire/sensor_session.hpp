@@ -76,7 +76,7 @@ class SensorSession {
  protected:
   /// @throws InvalidArgument for a code that is empty or too long
   explicit SensorSession(SensorIdentity identity);
-  const SensorIdentity& identity() const { return identity_; }
+  const SensorIdentity& identity() const { return identity_; }  ///< as it was given
 
   bool connected_ = false, sampling_ = false, imu_ = false;
   Endpoint data_target_, imu_target_;

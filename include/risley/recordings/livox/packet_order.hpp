@@ -89,6 +89,7 @@ class PacketSequence {
   std::optional<std::int64_t> first_host_ns() const { return first_host_ns_; }
 
  protected:
+  /// Keeps a gap, unless there are too many.
   void note_gap(const PacketGap& gap) {
     if (gaps_.size() < kMostGaps) gaps_.push_back(gap);
   }
