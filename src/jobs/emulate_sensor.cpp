@@ -446,9 +446,9 @@ EmulatedSensor Emulator::run() {
   for (std::int64_t now = begin; !progress_.cancelled(); now = steady_ns()) {
     if (options_.duration && now - begin >= duration) break;
     take_commands(now);
-    set_clock(now);
     if (!session_ && now >= dead_until_ns_) power_on(now);
     say(now);
+    set_clock(now);
     send_due(now);
     const auto since_start =
         first_start_ns_ ? 1e-9 * static_cast<double>(now - *first_start_ns_) : -1.0;

@@ -157,7 +157,8 @@ class RecordMid360Test(ProcessTest):
         connection = http.client.HTTPConnection(url[1], int(url[2]), timeout=20)
         connection.request("GET", "/events")
         with connection.getresponse() as reply:
-            event = json.loads(next(line for line in reply if line.startswith(b"data: "))[6:])
+            event = next(event for event in (json.loads(line[6:]) for line in reply if line.startswith(b"data: "))
+                         if event["sensors"][0]["packets"] > 0)
         connection.close()
         self.assertEqual(event["sensors"][0]["report"]["work_state"], "sampling")
         self.assertIn("no preset", event["sensors"][0]["optics"]["words"])

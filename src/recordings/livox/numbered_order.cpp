@@ -31,7 +31,8 @@ bool NumberedOrder::add(std::span<const std::uint8_t> packet, std::int64_t host_
     ++counts_.wrong_checksums;
   }
   Track& track = tracks_[header.data_type == kNumberedImu ? 1 : 0];
-  const PacketNumbers::Place place = track.numbers.add(chunk_.packets.front(), track.paused);
+  const PacketNumbers::Place place =
+      track.numbers.add(chunk_.packets.front(), std::exchange(track.flushed, false));
   if (place.kind == PacketNumbers::Kind::restarted) {
     while (!track.held.empty()) give_out(track);
     track.restarted = track.last_index.has_value();
@@ -119,7 +120,7 @@ void NumberedOrder::advance(std::int64_t host_ns) {
 void NumberedOrder::flush() {
   for (Track& track : tracks_) {
     while (!track.held.empty()) give_out(track);
-    track.paused = true;
+    track.flushed = track.paused = true;
   }
 }
 

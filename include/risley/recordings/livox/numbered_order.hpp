@@ -39,7 +39,8 @@ class NumberedOrder final : public PacketSequence {
     std::int64_t last_ns = 0, last_host_ns = 0;
     std::int64_t period_ns = 0;  // shortest time between neighbours so far; 0 when unknown
     std::uint8_t last_time_type = 0;
-    bool paused = false;     // the sensor was stopped before the next packet
+    bool flushed = false;    // before the next packet
+    bool paused = false;     // before the next packet that is given out
     bool restarted = false;  // before the next packet that is given out
   };
 
