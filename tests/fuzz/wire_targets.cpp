@@ -165,7 +165,7 @@ std::vector<std::uint8_t> control_datagram(std::span<const std::uint8_t> bytes, 
   constexpr std::array kCommands = {ControlCommand::get,    ControlCommand::set,
                                     ControlCommand::push,   ControlCommand::search,
                                     ControlCommand::reboot, ControlCommand::factory_reset};
-  const auto command = kCommands.at((how & 0xFU) % kCommands.size());
+  const auto command = kCommands.at((how >> 1U & 7U) % kCommands.size());
   return encode_control_frame({command, reply, reply, sequence, bytes});
 }
 
