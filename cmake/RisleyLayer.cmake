@@ -119,7 +119,7 @@ function(risley_make_layer name)
   set(target risley_${name})
   add_library(${target} ${sources})
   add_library(risley::${name} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name}
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} DEFINE_SYMBOL "" # static or shared, the same objects
                         VERSION ${PROJECT_VERSION} INSTALL_RPATH $ORIGIN
                         SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
   if(BUILD_SHARED_LIBS) # what is ours is exported, templates of other libraries stay inside

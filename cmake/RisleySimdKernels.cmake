@@ -12,22 +12,23 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   set(flags_avx512 -mavx512f -mavx512dq -mavx512bw -mavx512cd -mavx512vl -mfma
                    -Wno-uninitialized -Wno-maybe-uninitialized)
 endif()
-if(RISLEY_INSTRUCTION_SETS STREQUAL all)
+set(held_sets ${RISLEY_INSTRUCTION_SETS})
+if(held_sets STREQUAL all)
   set(held_sets ${known_sets})
-elseif(RISLEY_INSTRUCTION_SETS STREQUAL native)
+elseif(native IN_LIST held_sets)
   if(CMAKE_CROSSCOMPILING)
     message(FATAL_ERROR "RISLEY_INSTRUCTION_SETS = native asks the processor that builds; for another "
                         "one, name its sets: ${known_sets}, or all")
   endif()
   try_run(status compiled SOURCES ${CMAKE_CURRENT_LIST_DIR}/best_instruction_set.cpp
           CMAKE_FLAGS -DINCLUDE_DIRECTORIES=${PROJECT_SOURCE_DIR}/src
-          COMPILE_OUTPUT_VARIABLE errors RUN_OUTPUT_VARIABLE held_sets)
+          COMPILE_OUTPUT_VARIABLE errors RUN_OUTPUT_VARIABLE best_set)
   if(NOT compiled OR NOT status EQUAL 0)
     message(FATAL_ERROR "RISLEY_INSTRUCTION_SETS = native: ${CMAKE_CURRENT_LIST_DIR}/best_instruction_set.cpp "
                         "did not run (${status}). Name sets instead: ${known_sets}, or all\n${errors}")
   endif()
-else()
-  set(held_sets ${RISLEY_INSTRUCTION_SETS})
+  list(TRANSFORM held_sets REPLACE "^native$" "${best_set}")
+  list(REMOVE_DUPLICATES held_sets)
 endif()
 if(NOT held_sets)
   message(FATAL_ERROR "RISLEY_INSTRUCTION_SETS is empty, allowed: all, native, or a list of ${known_sets}")

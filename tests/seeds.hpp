@@ -14,7 +14,9 @@ inline int number_or(const char* variable, int usual) {
 }
 
 /// How many seeds a Monte Carlo takes: RISLEY_SEEDS in the environment, or the usual number. Bounds
-/// that depend on it are written as functions of it.
-inline int seeds_or(int usual) { return number_or("RISLEY_SEEDS", usual); }
+/// that depend on it are written as functions of it. @param fewest  that the bounds hold for
+inline int seeds_or(int usual, int fewest = 1) {
+  return std::max(fewest, number_or("RISLEY_SEEDS", usual));
+}
 
 }  // namespace risley::testing

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Manual pages and shell completions of the risley command, made from its own --help.
+"""Manual pages and shell completions of the risley command, made from its own --help-all.
 
 Usage: tools/command_documents.py COMMAND FOLDER [--compress]
 Writes FOLDER/man/risley.1 and a risley-VERB.1 of each verb (--compress: .1.gz), and
@@ -18,20 +18,19 @@ import shlex
 import subprocess
 import time
 
-INDENT = "  "  # of an entry of --help; deeper lines go on with it
-COLUMN = 30    # where CLI11 begins what it says of an entry, or, after a long name, the next line
-NAME_GOES_ON = re.compile(r"-|[\[\]{}.\d]|in \[|[A-Z]{2,}|(Needs|Excludes):")
+INDENT = "  "  # of an entry; deeper lines continue it
+COLUMN = 30    # where the description of an entry begins, on the next line after a long name
 
 
 @dataclasses.dataclass
 class Entry:
-    """An option, an argument or a subcommand: `head` as --help shows it, `text` says what it is."""
+    """An option, an argument or a verb: `head` as --help shows it, `text` describes it."""
     head: str
     text: str
 
     @property
     def names(self):
-        return re.findall(r"(?<![\w-])--?\w[\w-]*", self.head.split(" ")[0].replace(",", " "))
+        return re.findall(r"(?<![\w-])--?[a-z][\w-]*", self.head)
 
     @property
     def long_name(self):
@@ -43,14 +42,15 @@ class Entry:
 
     @property
     def value_text(self):
-        """What follows the names: type, choices and default."""
-        rest = self.head.partition(" ")[2]
-        return re.sub(r"\b(Needs|Excludes):.*|\bREQUIRED\b", "", rest).strip()
+        """What follows the names."""
+        return re.sub(r"(?<![\w-])--?[a-z][\w-]*,? ?", "", self.head).strip()
 
     @property
     def choices(self):
-        found = re.search(r"\{([^}]*)\}", self.value_text)  # {false} of a flag is none
-        return [one.strip() for one in found.group(1).split(",")] if found else []
+        found = re.search(r"\bone of: ([^(]*)", self.text)
+        if found:
+            return [one.strip() for one in found.group(1).split(",")]
+        return self.value_text.split("|") if re.fullmatch(r"[a-z-]+(\|[a-z-]+)+", self.value_text) else []
 
     @property
     def repeatable(self):
@@ -59,65 +59,62 @@ class Entry:
 
 @dataclasses.dataclass
 class Help:
-    """What --help of a verb says, part by part."""
+    """What --help-all of a verb says, part by part."""
     description: str
     usage: str
+    examples: list  # of lines
     sections: dict  # heading to entries, in order
     footer: list  # of paragraphs, as lines
 
-    def entries(self, *headings):
-        return [entry for heading in headings for entry in self.sections.get(heading, [])]
+    @property
+    def entries(self):
+        return [entry for entries in self.sections.values() for entry in entries]
 
     @property
     def options(self):
-        return [entry for heading, entries in self.sections.items() for entry in entries
-                if heading not in ("Positionals", "Subcommands")]
+        return [entry for entry in self.entries if entry.names]
+
+    @property
+    def verbs(self):
+        return [entry for entry in self.entries if re.fullmatch("[a-z]+", entry.head)]
+
+    @property
+    def positionals(self):
+        return self.sections["Arguments"]
 
 
 def split_entry(lines):
-    """One entry from its lines: names and type, then the second column."""
-    head, text = [], []
-    for line in lines:
-        name, rest = line[:COLUMN], line[COLUMN:]
-        if not name.strip():
-            text.append(rest.strip())
-        elif not text and (name.endswith("  ") or name.endswith(" ") and not NAME_GOES_ON.match(rest)):
-            head.append(name.strip())
-            text.append(rest.strip())
-        else:
-            head.append(line.strip())
-    return Entry(" ".join(head), " ".join(text))
+    """One entry from its lines: names and value, then the second column."""
+    has_text = len(lines[0]) > COLUMN and lines[0][COLUMN - 2:COLUMN] == "  "
+    head = lines[0][:COLUMN] if has_text else lines[0]
+    text = [lines[0][COLUMN:]] if has_text else []
+    return Entry(head.strip(), " ".join([*text, *(line.strip() for line in lines[1:])]))
 
 
 def read_help(text):
     lines = text.rstrip("\n").split("\n")
     usage = next(i for i, line in enumerate(lines) if line.startswith("Usage:"))
-    result = Help(" ".join(lines[:usage]).strip(), lines[usage][len("Usage:"):].strip(), {}, [])
-    heading, gathered = None, []
+    examples = [line[len(INDENT):] for line in lines[:usage] if line.startswith(INDENT)]
+    result = Help(lines[0], lines[usage][len("Usage:"):].strip(), examples, {"Arguments": []}, [])
+    gathered, section = [], result.sections["Arguments"]
 
     def finish():
         if gathered:
-            result.sections[heading].append(split_entry(gathered))
+            section.append(split_entry(gathered))
             gathered.clear()
 
-    rest = lines[usage + 1:]
-    while rest:
-        line = rest.pop(0)
-        if not line:
-            continue
-        if not line.startswith(" "):
-            finish()
-            entries = rest and rest[0].startswith(INDENT) and line.endswith(":")
-            if not entries or line == "Example:":
-                result.footer = [line, *rest]
-                break
-            heading = line[:-1].capitalize()  # CLI11 2.5 writes OPTIONS
-            result.sections[heading] = []
-        elif re.match(INDENT + r"\S", line):
-            finish()
+    for number, line in enumerate(lines[usage + 1:], usage + 1):
+        if line.startswith(INDENT):
+            if line[len(INDENT)] != " ":
+                finish()
             gathered.append(line)
-        else:
-            gathered.append(line)
+        elif line.endswith(":"):
+            finish()
+            section = result.sections[line[:-1]] = []
+        elif line:
+            finish()
+            result.footer = lines[number:]
+            break
     finish()
     return result
 
@@ -130,9 +127,9 @@ class Command:
         self.main = self.help()
         self.version = self.say("--version").strip()
         self.pages = {}  # by verb, or by verb and action: preset, preset show
-        for entry in self.main.entries("Subcommands"):
+        for entry in self.main.verbs:
             self.pages[(entry.head,)] = page = self.help(entry.head)
-            for action in page.entries("Subcommands"):
+            for action in page.verbs:
                 self.pages[entry.head, action.head] = self.help(entry.head, action.head)
         self.presets = [one["name"] for one in json.loads(self.say("preset", "list", "--json"))["presets"]]
         self.parameters = self.parameters_of_presets()
@@ -141,7 +138,7 @@ class Command:
         return subprocess.run([self.path, *words], check=True, capture_output=True, text=True).stdout
 
     def help(self, *words):
-        return read_help(self.say(*words, "--help"))
+        return read_help(self.say(*words, *(["--help-all"] if words else ["--help"])))
 
     def parameters_of_presets(self):
         names = []
@@ -180,13 +177,13 @@ class Command:
         quoted = re.findall(r"'(\w+)'", option.text)
         if quoted:
             return "words", quoted
-        return ("none" if re.match(r"(U?INT|FLOAT)\b", option.value_text) else "files"), []
+        return ("none" if re.match(r"(N|NUMBER|HZ|[A-Z]+,.*)$", option.value_text) else "files"), []
 
     def arguments(self, words):
         """As values, of what follows a verb and is no option."""
         if words == ("preset", "show"):
             return "words", self.presets
-        positionals = self.pages[words].entries("Positionals")
+        positionals = self.pages[words].positionals
         if not positionals or positionals[0].head.split(" ")[0] == "NAME":
             return "none", []
         return "files", []
@@ -204,12 +201,8 @@ def bold(text):
 
 
 def roff_head(entry):
-    names, _, rest = entry.head.partition(" ")
-    if entry.names:
-        result = ", ".join(map(bold, entry.names))
-    else:
-        result = bold(names)
-    rest = re.sub(r",(?! )", ", ", rest)
+    rest = entry.value_text if entry.names else ""
+    result = ", ".join(map(bold, entry.names)) if entry.names else bold(entry.head)
     return result + (rf" \fI{roff(rest)}\fR" if rest else "")
 
 
@@ -218,14 +211,11 @@ def roff_entries(entries):
 
 
 def roff_footer(lines):
-    """Paragraphs, and as sections of their own examples and what "Exit status:" says."""
+    """Paragraphs, and as a section of its own what "Exit status:" says."""
     result = []
     text = "\n".join(lines)
     for part in re.split(r"(?<=\.)\n(?=\w)|\n\n", text):
-        first, _, rest = part.partition("\n")
-        if first == "Example:":
-            result += [".SH EXAMPLES", ".EX", *map(roff, (line[2:] for line in rest.split("\n"))), ".EE"]
-        elif part.startswith("Exit status: "):
+        if part.startswith("Exit status: "):
             result += [".SH EXIT STATUS", roff(" ".join(part[len("Exit status: "):].split()))]
         elif part.strip():
             result += [".PP", roff(" ".join(part.split()))]
@@ -238,14 +228,16 @@ def roff_page(command, words, page, date):
              ".SH NAME", f"{roff(name)} \\- {roff(page.description)}",
              ".SH SYNOPSIS", roff_synopsis(page.usage)]
     for heading, entries in page.sections.items():
-        title = {"Positionals": "ARGUMENTS", "Subcommands": "VERBS" if not words else "ACTIONS"}
-        lines += [f".SH {title.get(heading, heading.upper())}", *roff_entries(entries)]
+        if entries:
+            lines += [f".SH {heading.upper()}", *roff_entries(entries)]
     for action in command.actions(words[0]) if words else []:
         below = command.pages[(*words, action)]
         lines += [f".SH {roff(' '.join(('risley', *words, action)).upper())}",
                   roff_synopsis(below.usage), ".PP", roff(below.description) + "."]
         for entries in below.sections.values():
             lines += roff_entries(entries)
+    if page.examples:
+        lines += [".SH EXAMPLES", ".EX", *map(roff, page.examples), ".EE"]
     lines += roff_footer(page.footer)
     others = [f"risley-{verb}" for verb in command.verbs] if not words else ["risley"]
     lines += [".SH SEE ALSO", ",\n".join(f".BR {roff(other)} (1)" for other in others).replace("(1),", "(1) ,")]
@@ -268,7 +260,7 @@ def pages(command, date):
 # Completions
 
 def made_by(mark):
-    return f"{mark} Made by tools/command_documents.py of what risley --help says.\n"
+    return f"{mark} Made by tools/command_documents.py of what risley --help-all says.\n"
 
 
 def bash_completion(command):
@@ -367,13 +359,13 @@ def zsh_completion(command):
         lines.extend(["      esac ;;", "  esac", "}"])
 
     for words, page in command.pages.items():
-        if page.entries("Subcommands"):
-            level(zsh_function(words), words, page.entries("Subcommands"), page.options)
+        if page.verbs:
+            level(zsh_function(words), words, page.verbs, page.options)
             continue
         lines += [f"{zsh_function(words)}() {{", "  _arguments \\"]
         lines += [f"    {spec} \\" for spec in zsh_specs(command, command.options(words))]
         lines += [f"    '*:argument:{zsh_action(*command.arguments(words))}'", "}"]
-    level("_risley", (), command.main.entries("Subcommands"), command.main.options)
+    level("_risley", (), command.main.verbs, command.main.options)
     lines += ['_risley "$@"']
     return "\n".join(lines) + "\n"
 
@@ -406,18 +398,18 @@ def fish_completion(command):
                           "words": ["-x", "-a", " ".join(found)]}[kind]
             lines.append(fish_line([*words, "-d", option.text]))
 
-    for entry in command.main.entries("Subcommands"):
+    for entry in command.main.verbs:
         lines.append(fish_line(["complete", "-c", "risley", "-n", "__risley_ends", "-a", entry.head,
                                 "-d", entry.text]))
     offer("__risley_ends", command.main.options)
     for words, page in command.pages.items():
         at = " ".join(words)
-        for entry in page.entries("Subcommands"):
+        for entry in page.verbs:
             lines.append(fish_line(["complete", "-c", "risley", "-n", f"__risley_ends {at}", "-a", entry.head,
                                     "-d", entry.text]))
         offer(f"__risley_at {at}", page.options)
         kind, found = command.arguments(words)
-        if kind == "files" and not page.entries("Subcommands"):
+        if kind == "files" and not page.verbs:
             lines.append(fish_line(["complete", "-c", "risley", "-n", f"__risley_at {at}", "-F"]))
         elif found:
             lines.append(fish_line(["complete", "-c", "risley", "-n", f"__risley_at {at}", "-a",

@@ -71,11 +71,13 @@ def document_of(script, folder):
     """The text of an example's document, and its pictures: {name: file}."""
     name = name_of(script)
     source = os.path.relpath(script, DOCUMENTS)
-    note = f"*Made by `tools/notebooks.py` of [{script.name}]({source}).*"
-    blocks, pictures = [], {}
+    note = f"*Made by `tools/notebooks.py` of [{script.name}]({source}), which begins with imports and options.*"
+    blocks, pictures, has_begun = [], {}, False
     for is_text, body, printed, new in execute(script, folder):
         if is_text:
             blocks.append(text_of(body))
+        elif not has_begun:  # imports and options, which are alike in all examples
+            has_begun = True
         else:
             blocks.append(f"```python\n{body}\n```")
         if len(blocks) == 1:

@@ -247,7 +247,7 @@ Run declare_calibrate(CLI::App& verb) {
   CalibrateCommandOptions& o = *options;
   add_many_options(verb, o.many,
                    "Recordings of one sensor with ranges to plane walls, or from a flight, for one "
-                   "calibration, or with --table for one each");
+                   "calibration; with --table one each");
   verb.get_option("--table")->description(
       "Calibrate every recording on its own, and write a table with one row for each; the ending "
       "chooses the format: .csv or .nc (NetCDF)");
@@ -255,12 +255,10 @@ Run declare_calibrate(CLI::App& verb) {
       ->description(
           "Calibrate every recording on its own, but skip those whose results are whole and were "
           "made from the same bytes with the same options and version");
-  verb.add_option(
-      "-o,--output", o.many.output,
-      "Folder to write calibration.yaml, states.nc (states_1.nc, ...), report.json and report.html "
-      "to; with --table a folder of such folders, placed as the recordings are (default: none)");
-  verb.add_flag("--no-report", o.no_report,
-                "Write no report.json and report.html, and do not compute what only they show");
+  verb.add_option("-o,--output", o.many.output,
+                  "Folder for calibration.yaml, states.nc (states_1.nc, ...), report.json and "
+                  "report.html; with --table, a folder of such folders (default: none)");
+  verb.add_flag("--no-report", o.no_report, "Write no report.json and report.html");
   add_choice(verb, "--method", o.method, {"adjustment", "paper"},
              "adjustment: weighted, of all recordings together; paper: unweighted distances "
              "from planes fitted by SVD");
@@ -270,18 +268,17 @@ Run declare_calibrate(CLI::App& verb) {
       "are found in the data)");
   verb.add_option(
       "--stations", o.stations,
-      "Known rotations of the sensor (YAML): one station for each recording, in the same "
-      "order");
-  verb.add_option("--station", o.station_names,
-                  "Station of each recording, in the same order, where --stations lists others as "
-                  "well (repeatable)")
+      "Known rotations of the sensor (YAML): one station per recording, in the same order");
+  verb.add_option(
+          "--station", o.station_names,
+          "Station of each recording, in the same order, if --stations lists more (repeatable)")
       ->type_name("NAME")
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--plan", o.plan,
-                  "Scene or flight (YAML) to plan for: predicts how good a calibration there would "
-                  "be and, for a flight, how its points would lie on the ground")
+                  "Predict a calibration in this scene or flight (YAML) and, for a flight, how its "
+                  "points would lie on the ground")
       ->excludes("--output", "--method", "--planes", "--stations", "--station", "--list");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording, s")
       ->needs("--plan")
@@ -300,7 +297,7 @@ Run declare_calibrate(CLI::App& verb) {
   verb.get_option("--trajectory")
       ->excludes("--plan", "--method", "--planes", "--stations", "--table", "--resume");
   verb.add_option("--control", o.control,
-                  "Known points and planes on the ground that a flight is tied to (YAML)")
+                  "Known points and planes on the ground to tie a flight to (YAML)")
       ->needs("--trajectory");
   verb.add_option("--knot-spacing-s", o.knot_spacing_s,
                   "Flights: time between corrections of the trajectory, s; longer flights may get "
@@ -336,24 +333,25 @@ Run declare_calibrate(CLI::App& verb) {
                   "1 sigma of how far dark or light patches stand off their wall, m: 0 for paint, "
                   "which makes the range error that depends on intensity exact (default: 0.01)");
   verb.add_flag("--same-walls", o.same_walls,
-                "The recordings are of the same walls from poses that differ by a turn, best a "
-                "roll of 180 degrees on the spot: the walls' shape then cancels (default: if their "
-                "planes fit in one way only)");
+                "The recordings show the same walls from poses that differ by a turn, ideally a "
+                "roll of 180 degrees on the spot, so that the walls' shape cancels (default: if "
+                "their planes match in only one way)");
   verb.add_option("--tolerance-deg", o.tolerance_deg,
-                  "Root mean square error of directions up to which a unit counts as sound, deg "
-                  "(default: the manufacturer's specification, as in the preset)");
+                  "RMS error of directions up to which a unit counts as sound, deg (default: the "
+                  "manufacturer's specification in the preset)");
   add_choice(verb, "--beam-origin", o.beam_origin, {"yes", "no"},
              "Let beams start where they leave the last prism; 'no': at the sensor's origin");
   add_choice(verb, "--states", o.states, {"knots", "all", "none"},
              "Rotor states to write: 'knots': at one shot every 2 ms; 'all': at all shots; 'none'");
-  add_choice(verb, "--mirror", o.mirror, {"auto", "yes", "no"},
-             "Whether the elevation in the files has the opposite sign; 'auto' finds out");
+  add_choice(
+      verb, "--mirror", o.mirror, {"auto", "yes", "no"},
+      "Whether the elevation in the files has the opposite sign; 'auto' decides from the data");
   verb.add_flag("--force", o.force,
-                "Write calibration.yaml even where it does not improve on what the sensor believes")
+                "Write calibration.yaml even if it does not improve on what the sensor believes")
       ->excludes("--plan");
   verb.add_option("--truth", o.truths,
-                  "OUT.truth.yaml of each simulated recording, to compare the calibration with "
-                  "(repeatable)")
+                  "Truth of each simulated recording (OUT.truth.yaml) to compare the calibration "
+                  "with (repeatable)")
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();

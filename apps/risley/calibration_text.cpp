@@ -150,7 +150,7 @@ void print_forecast(const CalibrationForecast& f, TrainShape shape) {
         plain_text(deg(f.rolled->total), 2), offset_text(f.rolled->total));
   }
   for (const auto& weak : f.unobservable) {
-    say("not told by these walls: {}\n", direction_text(weak));
+    say("not determined by these walls: {}\n", direction_text(weak));
   }
   for (const std::string& words : f.advice) say("advice: {}\n", words);
 }

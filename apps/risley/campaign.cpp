@@ -172,18 +172,17 @@ Run declare_campaign(CLI::App& verb) {
   const auto options = std::make_shared<CampaignCommandOptions>();
   CampaignCommandOptions& o = *options;
   verb.add_option("PLAN", o.plan,
-                  "Plan (YAML): what to simulate, what to do with it, a grid of settings, and how "
-                  "many seeds")
+                  "Plan (YAML): what to simulate, what to do with it, a grid of settings, and the "
+                  "number of seeds")
       ->required();
   verb.add_option("-o,--output", o.folder,
                   "Folder for the results: chunks/, cells.csv and summary.json")
       ->required();
-  verb.add_option(
-          "--chunk", o.chunk,
-          "Compute chunk I of N alone, on this machine or another; a chunk that is there and "
-          "whole is not computed again (default: all chunks, then the merge)")
+  verb.add_option("--chunk", o.chunk,
+                  "Compute only chunk I of N; complete chunks are not computed again (default: all "
+                  "chunks, then the merge)")
       ->type_name("I/N");
-  verb.add_flag("--merge", o.merge, "Make the table and the summary of the chunks that are there");
+  verb.add_flag("--merge", o.merge, "Make the table and the summary from the existing chunks");
   verb.add_option(
           "--table", o.table,
           "Table to write with one row per cell; the ending chooses the format: .csv or .nc "

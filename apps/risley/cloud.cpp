@@ -133,8 +133,8 @@ Run declare_cloud(CLI::App& verb) {
   yes_no("--beam-divergence", o.beam_divergence,
          "Include the size of the beam's footprint in the covariance");
   yes_no("--common-factors", o.common_factors,
-         "Write, for every point, the loadings of the errors that all points share, from which "
-         "covariances between points follow");
+         "Write every point's loadings of the errors that all points share, for covariances "
+         "between points");
   add_reading_options(verb, o.reading);
   add_every_device(verb, o.reading);
   add_platform_options(verb, o.platform);
@@ -147,16 +147,15 @@ Run declare_cloud(CLI::App& verb) {
                   "EPSG:4979)");
   verb.add_option(
           "--distribution", o.distribution,
-          "Page (HTML) to write about how the points of one flight lie on the ground; --json has "
-          "its numbers")
+          "Page (HTML) to write about the density and gaps of one flight's points on the ground")
       ->needs("--trajectory");
   verb.add_option(
       "--report", o.report,
       "Page (HTML) to write that shows the points of one recording in three dimensions, coloured "
       "by uncertainty, height, intensity or angle of incidence");
-  verb.add_option(
-          "--rate-hz", o.rate_hz,
-          "Directions per second, Hz, to find the rotation angles from; 'full': all of them")
+  verb.add_option("--rate-hz", o.rate_hz,
+                  "Directions per second, Hz, from which the rotation angles are found; 'full': "
+                  "all of them")
       ->capture_default_str();
   verb.add_option(
       "--noise-angle-deg", o.noise_angle_deg,
@@ -166,9 +165,8 @@ Run declare_cloud(CLI::App& verb) {
   add_choice(verb, "--time", o.time, {"gps", "recording"},
              "Times in LAS files: 'gps', GPS time where the recording's clock is UTC; "
              "'recording', the recording's clock as it is");
-  verb.add_option(
-          "--beam-origin-map", o.beam_origin_map,
-          "Page (HTML) to write with maps of where the calibration's beams start; no cloud is made")
+  verb.add_option("--beam-origin-map", o.beam_origin_map,
+                  "Page (HTML) to write with maps of the beams' origins; no cloud is made")
       ->excludes(inputs, output);
   return [options, &verb](const CommonOptions& common) {
     cloud::CloudOptions settings = cloud_options(*options);

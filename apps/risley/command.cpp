@@ -42,6 +42,7 @@ CancelFlag
 
 sem_t interruptions;                    // NOLINT(*-avoid-non-const-global-variables): as above
 std::string object_when_interrupted;    // NOLINT(*-avoid-non-const-global-variables): as above
+bool prints_text = true;                // NOLINT(*-avoid-non-const-global-variables): as above
 std::atomic<bool> in_own_time = false;  // NOLINT(*-avoid-non-const-global-variables): as above
 
 void note_signal(int) {
@@ -49,7 +50,7 @@ void note_signal(int) {
   ::sem_post(&interruptions);
 }
 
-/// Ends the process when nobody notices that it was interrupted.
+/// Ends the process if it does not stop in time after an interruption.
 void wait_for_interruption() {
   constexpr auto kPatience = std::chrono::milliseconds(1500);
   while (::sem_wait(&interruptions) != 0) {
@@ -121,8 +122,12 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+bool shows_progress(const CommonOptions& common) {
+  return !common.quiet && !common.no_progress && isatty(STDERR_FILENO) != 0;
+}
+
 ProgressBar::ProgressBar(std::string_view label, const CommonOptions& common)
-    : label_(label), visible_(!common.quiet && isatty(STDERR_FILENO) != 0), started_(now()) {}
+    : label_(label), visible_(shows_progress(common)), started_(now()) {}
 
 ProgressBar::~ProgressBar() {
   if (visible_ && shown_ >= 0) std::fputs("\r\033[K", stderr);
@@ -254,7 +259,10 @@ void print_json(const CommonOptions& common, const Json& object, const jobs::Pro
   say("{}\n", whole.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
+void print_no_text() { prints_text = false; }
+
 void print_text(std::string_view text) {
+  if (!prints_text) return;
   const std::string shown = printable(text, true);
   std::fwrite(shown.data(), 1, shown.size(), stdout);
 }

@@ -32,6 +32,8 @@ using enum jobs::ExitStatus;
 struct CommonOptions {
   bool json = false;
   bool quiet = false;
+  bool no_progress = false;
+  bool no_summary = false;  ///< print no text: with --quiet where a file is the result
   bool verbose = false;
   int threads = 0;  ///< 0: all cores
   std::uint64_t seed = 0;
@@ -68,8 +70,8 @@ CLI::Option* add_choice(CLI::App& verb, const std::string& name, std::string& va
 
 /// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in
 /// the making is removed by its owner.
-/// Who does not notice within two seconds, because it waits for a pipe or computes what cannot be
-/// stopped, is ended; outputs in the making are removed then, too. Writing to a closed pipe, or
+/// Work that does not stop within two seconds, because it waits for a pipe or cannot be cancelled,
+/// is ended; incomplete outputs are removed then, too. Writing to a closed pipe, or
 /// beyond the limit for files, fails like any other writing.
 void watch_signals();
 
@@ -83,8 +85,13 @@ void end_in_own_time();
 /// is meant for a terminal.
 void hold_standard_streams();
 
-/// A bar with the remaining time on stderr, only on a terminal and not with --quiet. The bar is
-/// gone when the object is.
+/// Whether progress is shown: on a terminal, without --quiet and --no-progress.
+bool shows_progress(const CommonOptions& common);
+
+/// From now on print_text() prints nothing.
+void print_no_text();
+
+/// A progress bar on stderr with the remaining time, if shows_progress(); the destructor clears it.
 class ProgressBar {
  public:
   /// @param label  for work that does not name its stages
@@ -120,7 +127,7 @@ std::optional<double> rate_from(const std::string& text);
 /// The value of --noise-angle-deg, rad. @throws InvalidArgument
 std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg);
 
-/// For a library function that tells nothing; a signal cancels it.
+/// For a library function whose progress is not shown; a signal cancels it.
 Progress cancellable();
 
 /// Adds a file to others, or the files of which a folder of ROS 2 consists.

@@ -23,86 +23,113 @@
 namespace risley::app {
 namespace {
 
+/// Common options that do something for a verb, and are therefore shown; all verbs take them.
+enum Uses : unsigned { kNothing = 0, kThreads = 1, kSeed = 2 };
+
 struct Verb {
   const char* name;
+  const char* group;
   const char* description;
-  const char* example;
+  const char* examples;
+  const char* usual;  ///< options that --help shows without --help-all
+  unsigned uses;
   Run (*declare)(CLI::App& verb);
 };
 
+constexpr const char* kLook = "Look";
+constexpr const char* kCalibrate = "Calibrate";
+constexpr const char* kPoints = "Make points";
+constexpr const char* kSimulate = "Simulate";
+
 constexpr Verb kVerbs[] = {
-    {"info", "Show what a recording holds, and check its times",
+    {"info", kLook, "Show what a recording holds, and check its times",
      "  risley info recording.lvx\n  risley info recording.lvx --json\n"
      "  risley info recording.lvx --share excerpt.nc",
-     declare_info},
-    {"convert", "Convert a recording or trajectory to the format that the output's ending names",
-     "  risley convert recording.lvx -o recording.csv", declare_convert},
-    {"simulate", "Simulate a recording whose truth is known",
+     "--device --share --share-ranges --table", kThreads, declare_info},
+    {"convert", kLook,
+     "Convert a recording or trajectory to the format that the output's ending names",
+     "  risley convert recording.lvx -o recording.csv\n"
+     "  risley convert 'survey/*.lvx' --format netcdf -o converted/",
+     "--output --device", kThreads, declare_convert},
+    {"record", kLook, "Record Livox sensors from the network",
+     "  risley record -o hall.lvx --interface 192.168.1.5 --duration-s 30\n"
+     "  risley record --list",
+     "--output --interface --list --duration-s --serial --passive --watch --optics", kNothing,
+     declare_record},
+    {"emulate", kLook, "Emulate a sensor on the network, with any faults you choose",
+     "  risley emulate --interface 127.0.0.5 --sensor avia --duration-s 60\n"
+     "  risley emulate --interface 127.0.0.5 --loss 0.01 --speed 10\n"
+     "  risley emulate --interface 127.0.0.7 --sensor mid-360",
+     "--interface --sensor --serial --scene --recording --duration-s --speed --set --seed", kSeed,
+     declare_emulate},
+    {"report", kLook,
+     "Draw the page of a result folder again from its report.json, or compare two results on one",
+     "  risley report result/\n  risley report result/ -o sensor-17.html\n"
+     "  risley report result/ calibration/ -o both.html",
+     "--output", kNothing, declare_report},
+    {"estimate", kCalibrate,
+     "Estimate the sensor's parameters and rotation angles from a recording",
+     "  risley estimate recording.lvx -o result/\n"
+     "  risley estimate unit.csv --truth unit.csv.truth.yaml --json",
+     "--output --sensor --method --rate-hz --noise-angle-deg --fix --free --truth --table",
+     kThreads, declare_estimate},
+    {"calibrate", kCalibrate, "Calibrate the sensor on scans of plane walls or on a flight",
+     "  risley calibrate wall.lvx -o calibration/\n"
+     "  risley calibrate upright.lvx flipped.lvx --stations stations.yaml -o calibration/\n"
+     "  risley calibrate --plan hall.yaml --duration-s 30",
+     "--output --sensor --stations --same-walls --tolerance-deg --force --plan --trajectory "
+     "--mount",
+     kThreads | kSeed, declare_calibrate},
+    {"observability", kCalibrate,
+     "Show how well a recording, planned or made, determines each parameter",
+     "  risley observability --sensor mid-40 --duration-s 30 --rate-hz 100000\n"
+     "  risley observability recording.lvx --free wedge_angle_deg",
+     "--sensor --duration-s --rate-hz --fix --free", kThreads, declare_observability},
+    {"compare", kCalibrate, "Find out whether a unit has changed, from results of different days",
+     "  risley compare march/ june/ november/\n"
+     "  risley compare march/calibration.yaml november/calibration.yaml -o changes.html",
+     "--output --unlike --false-alarm --anywhere", kThreads, declare_compare},
+    {"cloud", kPoints, "Make point clouds with covariances from recordings and a calibration",
+     "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
+     "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
+     "--calibration --output --directions --covariance --trajectory --mount --crs "
+     "--report",
+     kThreads, declare_cloud},
+    {"simulate", kSimulate, "Simulate a recording whose truth is known",
      "  risley simulate -o room.lvx --sensor mid-40 --scene data/room.yaml --duration-s 10\n"
      "  risley simulate -o unit.csv --rate-hz 1000 --set prism_tilt_a_vertical_deg=0.1 --seed 7\n"
      "  risley simulate -o flight.lvx --flight data/flight-v4.yaml --mount data/mount-nadir.yaml "
      "\\\n"
      "    --scene data/village.yaml --rate-hz 5000",
-     declare_simulate},
-    {"record", "Record Livox sensors from the network",
-     "  risley record -o hall.lvx --interface 192.168.1.5 --duration-s 30\n"
-     "  risley record --list",
-     declare_record},
-    {"emulate", "Be a virtual sensor on the network, with faults to order",
-     "  risley emulate --interface 127.0.0.5 --sensor avia --duration-s 60\n"
-     "  risley emulate --interface 127.0.0.5 --loss 0.01 --speed 10\n"
-     "  risley emulate --interface 127.0.0.7 --sensor mid-360",
-     declare_emulate},
-    {"estimate", "Estimate the sensor's parameters and rotation angles from one recording",
-     "  risley estimate recording.lvx -o result/\n"
-     "  risley estimate unit.csv --truth unit.csv.truth.yaml --json",
-     declare_estimate},
-    {"observability", "Show how well a recording, planned or made, determines each parameter",
-     "  risley observability --sensor mid-40 --duration-s 30 --rate-hz 100000\n"
-     "  risley observability recording.lvx --free wedge_angle_deg",
-     declare_observability},
-    {"calibrate", "Calibrate the sensor on scans of plane walls or on a flight",
-     "  risley calibrate wall.lvx -o calibration/\n"
-     "  risley calibrate upright.lvx flipped.lvx --stations stations.yaml -o calibration/\n"
-     "  risley calibrate --plan hall.yaml --duration-s 30",
-     declare_calibrate},
-    {"cloud", "Make point clouds with covariances from recordings and a calibration",
-     "  risley cloud recording.lvx --calibration calibration/calibration.yaml -o cloud.las\n"
-     "  risley cloud 'flight/*.lvx' --calibration mid-40 --format ply -o clouds/",
-     declare_cloud},
-    {"compare", "Find out whether a unit has changed, from results of different days",
-     "  risley compare march/ june/ november/\n"
-     "  risley compare march/calibration.yaml november/calibration.yaml -o changes.html",
-     declare_compare},
-    {"campaign", "Simulate and estimate, or calibrate, many times over, as a plan says",
-     "  risley campaign plan.yaml -o campaign/\n"
-     "  risley campaign plan.yaml --chunk 3/40 -o campaign/\n"
-     "  risley campaign plan.yaml --merge -o campaign/",
-     declare_campaign},
-    {"identify", "Identify the prisms that made a scan, from its directions alone",
-     "  risley identify sequence.csv -o mine.yaml\n"
-     "  risley identify frame.pcd --shot-rate-hz 240385 --json",
-     declare_identify},
-    {"pattern",
+     "--output --sensor --duration-s --rate-hz --scene --station --set --reported --flight --mount "
+     "--seed",
+     kThreads | kSeed, declare_simulate},
+    {"pattern", kSimulate,
      "Export a sensor's scan pattern for simulators, or show how it covers the field of view",
      "  risley pattern --sensor avia --format npy --duration-s 4 -o avia.npy\n"
      "  risley pattern --sensor horizon-sequence --format livox-csv --every 40 -o -\n"
      "  risley pattern --sensor horizon --format helios-xml -o horizon.xml\n"
      "  risley pattern --sensor tele-15 --coverage --report tele-15.html",
+     "--output --format --sensor --duration-s --rate-hz --every --coverage --report", kThreads,
      declare_pattern},
-    {"preset", "List, show, check or copy sensor presets",
+    {"identify", kSimulate, "Identify the prisms that made a scan, from its directions alone",
+     "  risley identify sequence.csv -o mine.yaml\n"
+     "  risley identify frame.pcd --shot-rate-hz 240385 --json",
+     "--output --force --shot-rate-hz --most-prisms --fastest-hz", kThreads, declare_identify},
+    {"preset", kSimulate, "List, show, check or copy sensor presets",
      "  risley preset list\n  risley preset show avia\n"
      "  risley preset new unit-17 --from avia -o unit-17.yaml\n  risley preset check unit-17.yaml",
-     declare_preset},
-    {"report",
-     "Draw the page of a result folder again from its report.json, or compare two results on one",
-     "  risley report result/\n  risley report result/ -o sensor-17.html\n"
-     "  risley report result/ calibration/ -o both.html",
-     declare_report},
-    {"reproduce", "Reproduce every table and figure of the paper, beside the paper's own values",
+     "--output --from", kNothing, declare_preset},
+    {"campaign", kSimulate, "Simulate and estimate, or calibrate, many times over, as a plan says",
+     "  risley campaign plan.yaml -o campaign/\n"
+     "  risley campaign plan.yaml --chunk 3/40 -o campaign/\n"
+     "  risley campaign plan.yaml --merge -o campaign/",
+     "--output --chunk --merge --table --seed", kThreads | kSeed, declare_campaign},
+    {"reproduce", kSimulate,
+     "Reproduce every table and figure of the paper, beside the paper's own values",
      "  risley reproduce -o reproduction/\n"
      "  risley reproduce --full --recording stationary.lvx -o reproduction/",
-     declare_reproduce},
+     "--output --full --recording --seed", kThreads | kSeed, declare_reproduce},
 };
 
 /// Text of --seed, which CLI11 would wrap around.
@@ -115,22 +142,37 @@ std::string seed_problem(const std::string& text) {
                      std::numeric_limits<std::uint64_t>::max());
 }
 
-void add_common_options(CLI::App& verb, CommonOptions& common) {
-  const std::string group = "Common options";
+void add_common_options(CLI::App& verb, unsigned uses, CommonOptions& common) {
+  constexpr const char* kHidden = "";
   verb.add_flag("--json", common.json, "Print the result as exactly one JSON object on stdout")
-      ->group(group);
-  verb.add_option("--threads", common.threads, "Number of threads (default: all cores)")
-      ->check(CLI::Range(1, 4096))
-      ->group(group);
-  verb.add_option("--seed", common.seed, "Seed of all random numbers (default: 0)")
-      ->check(CLI::Validator(seed_problem, ""))
-      ->group(group);
+      ->group(kCommonGroup);
   auto* quiet =
-      verb.add_flag("--quiet", common.quiet, "Show no progress bar and no warnings on stderr")
-          ->group(group);
-  verb.add_flag("--verbose", common.verbose, "Print more detail on stderr")
-      ->excludes(quiet)
-      ->group(group);
+      verb.add_flag("--quiet", common.quiet,
+                    "Print errors and the result alone: no progress, no warnings, no summary of "
+                    "what is written to --output or --table")
+          ->group(kCommonGroup);
+  verb.add_flag("--no-progress", common.no_progress, "Show no progress bar");
+  verb.add_flag("--verbose", common.verbose, "Print more detail on stderr")->excludes(quiet);
+  auto* threads =
+      verb.add_option("--threads", common.threads, "Number of threads (default: all cores)")
+          ->check(CLI::Range(1, 4096));
+  if ((uses & kThreads) == 0) threads->group(kHidden);
+  auto* seed = verb.add_option("--seed", common.seed, "Seed of all random numbers (default: 0)")
+                   ->check(CLI::Validator(seed_problem, ""));
+  if ((uses & kSeed) == 0) seed->group(kHidden);
+  verb.get_help_ptr()->group(kCommonGroup)->description("Print this help");
+  verb.set_help_all_flag("--help-all", "Print this help with all options")->group(kCommonGroup);
+}
+
+/// Whether a verb was asked for a file, so that what it prints is only a summary.
+bool writes_a_file(const CLI::App& verb) {
+  for (const CLI::Option* option : verb.get_options()) {
+    const std::string name = option->get_name();
+    if ((name == "--output" || name == "--table") && option->count() > 0) return true;
+  }
+  const auto below = verb.get_subcommands();
+  return std::any_of(below.begin(), below.end(),
+                     [](const CLI::App* action) { return writes_a_file(*action); });
 }
 
 /// The command as it could be typed again.
@@ -249,25 +291,35 @@ CommandLine::CommandLine()
   app_.formatter(std::make_shared<HelpFormatter>());
   app_.set_version_flag("--version", "risley " RISLEY_VERSION);
   app_.require_subcommand(1);
+  for (const Verb& verb : kVerbs) {
+    CLI::App& sub = *app_.add_subcommand(verb.name, verb.description)->group(verb.group);
+    runs_[&sub] = verb.declare(sub);
+    take_result_folders(sub);
+    add_common_options(sub, verb.uses, common_);
+    arrange_options(sub, verb.usual);
+    sub.footer(verb.examples);
+  }
+  app_.get_help_ptr()->group(kCommonGroup)->description("Print this help");
+  app_.get_option("--version")->group(kCommonGroup)->description("Print the version");
   app_.footer(
       "Exit status: 0 done, 1 no trustworthy result from these data, 2 wrong usage, 3 a bad file,\n"
       "4 a fault in the program or the machine, 130 interrupted.\n"
-      "risley VERB --help shows the options of a verb.");
-  for (const Verb& verb : kVerbs) {
-    CLI::App& sub = *app_.add_subcommand(verb.name, verb.description);
-    runs_[&sub] = verb.declare(sub);
-    take_result_folders(sub);
-    add_common_options(sub, common_);
-    sub.footer(fmt::format("Example:\n{}", verb.example));
-  }
+      "risley VERB --help shows a verb's usual options, risley VERB --help-all all of them.");
 }
 
 CommandLine::Parsed CommandLine::parse(const std::vector<std::string>& words) {
   common_ = {};
   common_.command = shell_text(words);
   Parsed parsed;
+  std::vector<std::string> reversed(words.rbegin(), words.rend());
+  if (words.empty()) {
+    reversed = {"--help"};
+  } else if (words.front() == "help") {  // risley help VERB
+    reversed.pop_back();
+    reversed.insert(reversed.begin(), "--help");
+  }
   try {
-    app_.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+    app_.parse(std::move(reversed));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // --help, --version
       std::ostringstream text;
@@ -286,6 +338,7 @@ CommandLine::Parsed CommandLine::parse(const std::vector<std::string>& words) {
     parsed.problem = fmt::format("{} (see risley {} --help)", unusable, common_.verb);
     return parsed;
   }
+  common_.no_summary = common_.quiet && !common_.json && writes_a_file(*parsed.verb);
   note_files(*parsed.verb, common_);
   return parsed;
 }

@@ -127,11 +127,11 @@ Run declare_compare(CLI::App& verb) {
       ->required()
       ->expected(1, 1'000'000);
   verb.add_option("-o,--output", o.page, "Page (HTML) to write (default: none)");
-  verb.add_flag("--unlike", o.job.unlike,
-                "Compare a calibration, which says where beams truly go, with an estimate of what "
-                "the sensor believes, too");
+  verb.add_flag(
+      "--unlike", o.job.unlike,
+      "Also compare calibrations (where beams truly go) with estimates (what the sensor believes)");
   verb.add_flag("--anywhere", o.job.anywhere,
-                "Open results that a table names outside of its own folder, too");
+                "Also open results outside the folder of the table that names them");
   verb.add_option(
           "--false-alarm", o.job.false_alarm,
           "Probability that chance is taken for a change, or a unit for an outlier, at most")

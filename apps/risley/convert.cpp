@@ -54,7 +54,7 @@ std::map<std::string, std::uint8_t> sensor_types() {
   return types;
 }
 
-/// Somebody who wants points has to take another verb.
+/// Points are written by another verb.
 void refuse_point_clouds(const std::string& output) {
   const std::string name = lower_case(output);
   const auto has_ending = [&name](const auto& format) { return name.ends_with(format.ending); };
@@ -87,11 +87,9 @@ Run declare_convert(CLI::App& verb) {
   add_many_options(verb, options->many,
                    "Recordings or trajectories of any known format, or ROS 2 bag folders (with "
                    "metadata.yaml)");
-  verb.add_option(
-          "-o,--output", options->many.output,
-          "File to write, or a folder for several, which is made where it is missing and in "
-          "which they are placed as the inputs are; the ending chooses the format:" +
-              recording_endings())
+  verb.add_option("-o,--output", options->many.output,
+                  "File to write, or a folder for several; the ending chooses the format:" +
+                      recording_endings())
       ->required();
   verb.add_option(
           "--format", options->format,
@@ -100,13 +98,13 @@ Run declare_convert(CLI::App& verb) {
   std::set<std::string> type_names;
   for (const auto& [name, type] : sensor_types()) type_names.insert(name);
   verb.add_option("--sensor-type", options->sensor_type,
-                  "Type of the sensor, which LVX files state (default: from the recording)")
+                  "Type of the sensor to state in an LVX file (default: from the recording)")
       ->check(CLI::IsMember(type_names));
   verb.add_option("--accuracy", options->accuracy,
                   "Accuracies (SMRMSG file) to store with the records of a trajectory")
       ->type_name("FILE");
   verb.add_option("--trajectory-topic", options->topic,
-                  "Convert a ROS bag as a trajectory: the poses of this topic")
+                  "Read a ROS bag as a trajectory: the poses of this topic")
       ->type_name("NAME");
   add_reading_options(verb, options->reading);
   add_every_device(verb, options->reading);

@@ -77,72 +77,76 @@ void print_emulated(const jobs::EmulatedSensor& truth) {
              grouped(truth.duplicates), grouped(truth.reordered), grouped(truth.sessions)});
   table.print();
   if (truth.lost_at_ends > 0) {
-    say("{} more packets were not sent at the beginning or end, where nobody can miss them\n",
+    say("{} more packets were not sent at the beginning or end, where their loss cannot be "
+        "noticed\n",
         grouped(truth.lost_at_ends));
   }
 }
 
 void declare_clock(CLI::App& verb, EmulateChoices& o) {
   const std::string group = "Clock of the sensor";
-  add_choice(verb, "--time", o.time_source, {"power-on", "ptp", "pps"}, "What its times count from")
+  add_choice(verb, "--time", o.time_source, {"power-on", "ptp", "pps"},
+             "Origin of the sensor's times")
       ->group(group);
   verb.add_option("--time-from-s", o.time_source_from_s,
-                  "When that begins, s after the first start; before, they count from power-on")
+                  "When that origin takes effect, s after the first start; times count from "
+                  "power-on before")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str()
       ->group(group);
   verb.add_option("--clock-drift-ppm", o.clock_drift_ppm,
-                  "By how much its clock is faster than this machine's, ppm")
+                  "How much faster the sensor's clock runs than this machine's, ppm")
       ->check(CLI::Range(-10000.0, 10000.0))
       ->capture_default_str()
       ->group(group);
   verb.add_option("--clock-jump-s", o.clock_jump_s,
-                  "Its clock jumps once, so many s after the first start")
+                  "When the clock jumps once, s after the first start")
       ->group(group);
-  verb.add_option("--clock-jump-by-ms", o.clock_jump_by_ms, "How far it jumps, ms")
+  verb.add_option("--clock-jump-by-ms", o.clock_jump_by_ms, "Size of the jump, ms")
       ->check(CLI::Range(-3.6e6, 3.6e6))
       ->capture_default_str()
       ->group(group);
 }
 
 void declare_faults(CLI::App& verb, EmulateChoices& o) {
-  const std::string group = "Faults to order";
+  const std::string group = "Faults";
   const auto share = [&](const char* name, double& value, const char* description) {
     verb.add_option(name, value, description)
         ->check(CLI::Range(0.0, 1.0))
         ->capture_default_str()
         ->group(group);
   };
-  share("--loss", o.loss, "Share of packets that is not sent");
-  share("--duplication", o.duplication, "Share of packets that is sent twice");
-  share("--disorder", o.disorder, "Share of packets that others overtake");
-  verb.add_option("--disorder-packets", o.farthest, "How many packets overtake one at most")
+  share("--loss", o.loss, "Share of packets that are lost");
+  share("--duplication", o.duplication, "Share of packets that are sent twice");
+  share("--disorder", o.disorder, "Share of packets that are delayed behind later ones");
+  verb.add_option("--disorder-packets", o.farthest, "Most packets that overtake one")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--delay-ms", o.delay_ms, "By how much data come late, ms")
+  verb.add_option("--delay-ms", o.delay_ms, "Delay of all data, ms")
       ->check(CLI::Range(0.0, 60000.0))
       ->capture_default_str()
       ->group(group);
-  share("--wrong-checksums", o.wrong_checksums, "Share of replies and broadcasts that is damaged");
+  share("--wrong-checksums", o.wrong_checksums,
+        "Share of replies and broadcasts with wrong checksums");
   verb.add_option("--heartbeat-dies-s", o.heartbeat_dies_s,
-                  "When heartbeats are no longer answered, s after the first start")
+                  "When the sensor stops answering heartbeats, s after the first start")
       ->check(CLI::NonNegativeNumber)
       ->group(group);
   verb.add_option("--restart-s", o.restart_s,
                   "When the sensor restarts, with its clock at zero, s after the first start")
       ->check(CLI::NonNegativeNumber)
       ->group(group);
-  verb.add_option("--restart-takes-s", o.restart_takes_s, "How long a restart takes, s")
+  verb.add_option("--restart-takes-s", o.restart_takes_s, "Duration of a restart, s")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str()
       ->group(group);
   auto* bend = verb.add_option("--bend", o.bend,
-                               "What is added to a parameter of the true sensor while it runs, in "
-                               "the unit that its name ends with (repeatable)");
+                               "Change a parameter of the true sensor at --bend-s, in the unit "
+                               "that its name ends with (repeatable)");
   bend->type_name("NAME=CHANGE")->expected(1)->allow_extra_args(false)->take_all()->group(group);
   auto* bend_s =
-      verb.add_option("--bend-s", o.bend_s, "When the optics bend so, s after the first start");
+      verb.add_option("--bend-s", o.bend_s, "When --bend takes effect, s after the first start");
   bend_s->check(CLI::NonNegativeNumber)->needs(bend)->group(group);
   bend->needs(bend_s);
 }
@@ -153,17 +157,17 @@ Run declare_emulate(CLI::App& verb) {
   const auto options = std::make_shared<EmulateChoices>();
   EmulateChoices& o = *options;
   verb.add_option("--interface", o.interface,
-                  "IPv4 address of this machine that is to be the sensor's, such as 127.0.0.5")
+                  "IPv4 address of this machine for the sensor to use, such as 127.0.0.5")
       ->type_name("ADDRESS")
       ->required();
   verb.add_option("--serial", o.serial,
                   "Serial number (broadcast code) of the sensor (default: from its optics)");
   verb.add_option("--sensor", o.sensor, "Preset by name, or a preset or calibration file")
       ->capture_default_str();
-  auto* scene =
-      verb.add_option("--scene", o.scene, "Planes or terrain (YAML) around it (default: a room)");
+  auto* scene = verb.add_option("--scene", o.scene,
+                                "Planes or terrain (YAML) around the sensor (default: a room)");
   verb.add_option("--recording", o.recording,
-                  "Recording of one sensor whose shots are sent, with its gaps, over and over")
+                  "Recording of one sensor to send, gaps included, in a loop")
       ->excludes(scene);
   verb.add_option("--station", o.station,
                   "Station of the scene to stand on (default: the scene's origin)");
@@ -174,9 +178,8 @@ Run declare_emulate(CLI::App& verb) {
   verb.add_option("--speed", o.speed, "How many times faster than real time the sensor runs")
       ->check(CLI::Range(0.01, 100.0))
       ->capture_default_str();
-  verb.add_option(
-      "--duration-s", o.duration_s,
-      "How long the sensor is there, s of real time (default: until Ctrl-C or SIGTERM)");
+  verb.add_option("--duration-s", o.duration_s,
+                  "Time to run, s (default: until Ctrl-C or SIGTERM)");
   declare_clock(verb, o);
   declare_faults(verb, o);
   return [options](const CommonOptions& common) {

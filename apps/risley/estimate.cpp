@@ -126,13 +126,12 @@ void print_outcome(const EstimatedRecording& outcome) {
   table.print();
   say("\n");
   Table residuals({"residual", "mean deg", "std deg", "rms deg",
-                   fmt::format("at {:.0f} m, mm", kStatedDistance), "skewness", "excess kurtosis"});
+                   fmt::format("at {:.0f} m, mm", kStatedDistance)});
   const auto add = [&residuals](const char* name, const estimation::Moments& m) {
     residuals.add({name, fmt::format("{:.6f}", degrees_from_radians(m.mean)),
                    fmt::format("{:.6f}", degrees_from_radians(m.std)),
                    fmt::format("{:.6f}", degrees_from_radians(m.rms)),
-                   fmt::format("{:.2f}", 1e3 * offset_at(m.rms)), fmt::format("{:.3f}", m.skewness),
-                   fmt::format("{:.3f}", m.kurtosis)});
+                   fmt::format("{:.2f}", 1e3 * offset_at(m.rms))});
   };
   add("azimuth", e.azimuth_moments);
   add("zenith", e.zenith_moments);
@@ -183,13 +182,10 @@ Run declare_estimate(CLI::App& verb) {
   const auto options = std::make_shared<EstimateCommandOptions>();
   EstimateCommandOptions& o = *options;
   add_many_options(verb, o.many, "Recordings, each of one sensor, of any known format");
-  verb.add_option(
-      "-o,--output", o.many.output,
-      "Folder to write calibration.yaml, states.nc, report.json and report.html to; for "
-      "several inputs a folder of such folders, placed as the inputs are (default: "
-      "none)");
-  verb.add_flag("--no-report", o.no_report,
-                "Write no report.json and report.html, and do not compute what only they show");
+  verb.add_option("-o,--output", o.many.output,
+                  "Folder for calibration.yaml, states.nc, report.json and report.html; for "
+                  "several inputs, a folder of such folders (default: none)");
+  verb.add_flag("--no-report", o.no_report, "Write no report.json and report.html");
   add_choice(
       verb, "--method", o.method, {"map", "ekf"},
       "map: the most probable motion of the rotors, from all shots at once; ekf: the paper's "
@@ -209,15 +205,16 @@ Run declare_estimate(CLI::App& verb) {
       verb, "--states", o.states, {"knots", "all", "none"},
       "Rotor states to write: 'knots': at one shot every 2 ms (ekf: at the shots used); 'all': "
       "at all shots; 'none'");
-  add_choice(verb, "--mirror", o.mirror, {"auto", "yes", "no"},
-             "Whether the elevation in the file has the opposite sign; 'auto' finds out");
+  add_choice(
+      verb, "--mirror", o.mirror, {"auto", "yes", "no"},
+      "Whether the elevation in the file has the opposite sign; 'auto' decides from the data");
   verb.add_option("--process-noise", o.process_noise,
                   "Process noise of the rotors' speed, deg/s per sqrt(s): a number; 'paper' (900); "
                   "'none' (constant acceleration); or 'auto' (random walks of the speed and, with "
                   "map, of the acceleration, found by maximum likelihood)")
       ->capture_default_str();
   verb.add_option("--truth", o.truth,
-                  "OUT.truth.yaml of the simulated recording, to compare the estimate with");
+                  "Truth of a simulated recording (OUT.truth.yaml) to compare the estimate with");
   return [options, &verb](const CommonOptions& common) {
     options->many.into_folder = are_several(options->many);
     const jobs::InputWork work = json::estimate_each(job_of(*options, common), log_words);

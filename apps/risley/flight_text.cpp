@@ -54,7 +54,7 @@ void print_judgement(const calibration::FlightJudgement& judgement) {
       in_degrees(datum.total), in_degrees(datum.rotation), in_degrees(datum.shape),
       offset_text(datum.total, datum.height));
   for (const calibration::NotTold& own : judgement.not_told) {
-    say("not told by this flight: {} (keeps {:.0f} % of its sigma)\n", own.words,
+    say("not determined by this flight: {} (keeps {:.0f} % of its sigma)\n", own.words,
         100 * std::min(1.0, own.sigma));
   }
 }
@@ -69,33 +69,20 @@ void print_flight(const CalibratedFlight& outcome) {
       "{:.2f} s\n\n",
       grouped(c.used), outcome.strips.size(), grouped(c.cells), outcome.reading_time,
       outcome.angles_time, outcome.solving_time);
-  Table table({"unknown", "value", "+- sigma", "unit", "before", "+- sigma", "share", "twin"});
+  Table table({"unknown", "value", "+- sigma", "unit", "before", "+- sigma"});
   for (const FlightUnknown& unknown : c.unknowns) {
     if (unknown.held && !(unknown.sigma > 0)) continue;
     const NumberText text = number_text(calibration::in_file_unit(unknown, unknown.value, shape),
                                         calibration::in_file_unit(unknown, unknown.sigma, shape));
     const double before = calibration::in_file_unit(unknown, unknown.start, shape);
     const double prior = calibration::in_file_unit(unknown, unknown.prior_sigma, shape);
-    std::vector<std::string> row = {
-        unknown.name,
-        text.value,
-        text.sigma,
-        calibration::file_unit(unknown, shape),
-        text_to_place_of(before, calibration::in_file_unit(unknown, unknown.sigma, shape)),
-        std::isfinite(prior) ? fmt::format("{:.2g}", prior) : "none"};
-    if (unknown.held) {
-      row.insert(row.end(), {"held", ""});
-    } else {
-      row.insert(row.end(), {fmt::format("{:.0f} %", 100 * unknown.prior_share),
-                             unknown.twin.empty() ? std::string()
-                                                  : fmt::format("{} {:+.2f}", unknown.twin,
-                                                                unknown.twin_correlation)});
-    }
-    table.add(row);
+    table.add({unknown.name + (unknown.held ? " (held)" : ""), text.value, text.sigma,
+               calibration::file_unit(unknown, shape),
+               text_to_place_of(before, calibration::in_file_unit(unknown, unknown.sigma, shape)),
+               std::isfinite(prior) ? fmt::format("{:.2g}", prior) : "none"});
   }
   table.print();
-  say("\nshare: of the answer that comes from what was known before; twin: the unknown it is tied "
-      "to most\n");
+  say("\n");
   print_judgement(c);
   say("strips apart along the ground's normals: {:.1f} mm before, {:.1f} mm after\n\n",
       1e3 * c.rms_before, 1e3 * c.rms_after);
@@ -107,7 +94,7 @@ void print_flight(const CalibratedFlight& outcome) {
         before == nullptr ? "-" : fmt::format("{:.1f}", 1e3 * before->rms),
         fmt::format("{:.1f}", 1e3 * after.rms)};
     for (Eigen::Index k = 0; k < 3; ++k) {
-      row.push_back(after.sigma[k] >= 1 ? "not told"
+      row.push_back(after.sigma[k] >= 1 ? "not determined"
                                         : fmt::format("{:.1f} +- {:.1f}", 1e3 * after.shift[k],
                                                       1e3 * after.sigma[k]));
     }

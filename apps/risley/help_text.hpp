@@ -13,16 +13,22 @@ namespace risley::app {
 /// Columns of a terminal that help fits into.
 inline constexpr std::size_t kHelpColumns = 100;
 
-/// Breaks lines that are longer at spaces. What follows stands under the line's own beginning, or
-/// under the second column of a table, before which two or more spaces stand.
+/// Heading of the options of every verb that the short help shows.
+inline constexpr const char* kCommonGroup = "Common options";
+
+/// Sorts a verb's options into what --help shows and the headings under which --help-all shows the
+/// rest. Options with a heading of their own keep it.
+/// @param usual  names of the options that --help shows, separated by spaces
+void arrange_options(CLI::App& verb, std::string_view usual);
+
+/// Breaks lines longer than @p columns at spaces and indents the continuation like the line itself.
 std::string wrapped(std::string_view text, std::size_t columns);
 
-/// Help whose lines fit into kHelpColumns.
+/// Examples first, then the usual options; with --help-all every option under its heading.
 class HelpFormatter : public CLI::Formatter {
  public:
-  std::string make_option(const CLI::Option* option, bool positional) const override;
-  std::string make_option_desc(const CLI::Option* option) const override;
-  std::string make_subcommand(const CLI::App* verb) const override;
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override;
 };
 
 }  // namespace risley::app

@@ -77,7 +77,7 @@ void print_outcome(const IdentifiedRecording& outcome) {
   }
   ranking.print();
   say("\n");
-  for (const std::string& words : outcome.unobservable) say("never told: {}.\n", words);
+  for (const std::string& words : outcome.unobservable) say("cannot be determined: {}.\n", words);
   if (!outcome.to_do.empty()) say("what to do: {}.\n", outcome.to_do);
 }
 
@@ -118,7 +118,7 @@ Run declare_identify(CLI::App& verb) {
   verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
   verb.add_option("-o,--output", o.output,
                   "Preset to write (.yaml), which other verbs take as --sensor (default: none)");
-  verb.add_flag("--force", o.force, "Write the preset even if the answer is not certain");
+  verb.add_flag("--force", o.force, "Write the preset even if the answer is uncertain");
   verb.add_option("--most-prisms", o.most_prisms, "Largest number of prisms to try")
       ->check(CLI::Range(1, 3))
       ->capture_default_str();

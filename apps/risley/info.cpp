@@ -46,7 +46,7 @@ std::string range_text(const std::optional<ValueRange>& range, double scale, int
                      decimals, unit);
 }
 
-/// What only a sensor of the second generation tells.
+/// What only sensors of the second generation report.
 void add_numbered(const recordings::RecordingHeader& header, const recordings::Device& device,
                   const recordings::NumberedAudit& audit, Table& table) {
   const auto add_known = [&table](const char* name, const std::string& value) {
@@ -196,17 +196,15 @@ Run declare_info(CLI::App& verb) {
   verb.add_option("--accuracy", options->accuracy, "Accuracies of the trajectory (SMRMSG file)")
       ->type_name("FILE");
   verb.add_option("--trajectory-topic", options->topic,
-                  "Look at a ROS bag as a trajectory: at the poses of this topic")
+                  "Read a ROS bag as a trajectory: the poses of this topic")
       ->type_name("NAME");
-  verb.add_option(
-          "--share", options->share,
-          "Write a small anonymous excerpt (.nc) that can be sent to the developers: at most "
-          "one second, where most shots have a return, without serial number, date, "
-          "intensities and ranges")
+  verb.add_option("--share", options->share,
+                  "Write a small anonymous excerpt (.nc) to send to the developers: at most one "
+                  "second, without serial number, date, intensities and ranges")
       ->type_name("OUT");
   verb.add_flag("--share-ranges", options->share_ranges,
-                "Keep the ranges in the excerpt. They are left out otherwise because they show the "
-                "place of the recording; only calibrations on walls need them");
+                "Keep the ranges in the excerpt, which show the place of the recording; only "
+                "calibrations on walls need them");
   add_reading_options(verb, options->reading);
   return [options, &verb](const CommonOptions& common) {
     require_apart(common, {options->share});

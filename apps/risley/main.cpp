@@ -26,7 +26,7 @@
 namespace risley::app {
 namespace {
 
-/// Tells of an error: words on stderr, and with --json an object on stdout.
+/// Reports an error: a message on stderr, and with --json an object on stdout.
 ExitStatus fail(ExitStatus status, const std::string& message, const CommonOptions& common,
                 const Json& details = {}) {
   spdlog::error(message);
@@ -56,11 +56,11 @@ ExitStatus run_command(const std::vector<std::string>& words) {
   try {
     parsed = line.parse(words);
   } catch (...) {  // a result that an option names is not to be used
-    CommonOptions told = line.common();
-    told.json = std::find(words.begin(), words.end(), "--json") != words.end();
-    if (!words.empty()) told.verb = words.front();
+    CommonOptions common = line.common();
+    common.json = std::find(words.begin(), words.end(), "--json") != words.end();
+    if (!words.empty()) common.verb = words.front();
     const json::Failure failure = json::current_failure();
-    return fail(failure.status, failure.message, told, failure.details);
+    return fail(failure.status, failure.message, common, failure.details);
   }
   const CommonOptions& common = line.common();
   if (parsed.help) {
@@ -69,10 +69,11 @@ ExitStatus run_command(const std::vector<std::string>& words) {
   }
   if (parsed.problem) return fail(kWrongUsage, *parsed.problem, common);
   if (common.quiet) spdlog::set_level(spdlog::level::err);
+  if (common.no_summary) print_no_text();
   if (common.verbose) spdlog::set_level(spdlog::level::debug);
   if (common.threads > 0) {
-    // Never lifted: oneTBB may start threads then, and where there is no memory for them it ends
-    // the process before anybody was told.
+    // Never lifted: oneTBB might then start threads, and without memory for them it ends the
+    // process without a message.
     [[maybe_unused]] static const auto* const limit =
         std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                               static_cast<std::size_t>(common.threads))
@@ -138,7 +139,7 @@ ExitStatus run_on_large_stack(const std::vector<std::string>& words) {
   return task.status;
 }
 
-/// What no handler caught is a bug, or memory that ran out where nobody could say so.
+/// An exception that no handler caught is a bug, or memory ran out where it could not be reported.
 [[noreturn]] void end_by_fault() {
   constexpr std::string_view kWords =
       "risley: error: internal error or no memory: outputs in the making were given up\n";

@@ -23,17 +23,17 @@ using jobs::InputJob;
 using jobs::InputResult;
 using jobs::InputRun;
 
-/// Options that change where and how results are told, not what they are.
-constexpr std::array<std::string_view, 10> kOfTelling = {
-    "INPUT",  "--list",    "--output", "--table",   "--resume",
-    "--json", "--threads", "--quiet",  "--verbose", "--help"};
+/// Options that change where and how results are printed, not what they are.
+constexpr std::array<std::string_view, 12> kOfPrinting = {
+    "INPUT",     "--list",  "--output",      "--table",   "--resume", "--json",
+    "--threads", "--quiet", "--no-progress", "--verbose", "--help",   "--help-all"};
 
 /// All that decides results apart from the inputs.
 std::string settings_text(const CLI::App& verb, const CommonOptions& common) {
   std::vector<std::pair<std::string, std::vector<std::string>>> settings;
   for (const CLI::Option* option : verb.get_options()) {
     const std::string name = option->get_name();
-    if (std::find(kOfTelling.begin(), kOfTelling.end(), name) != kOfTelling.end()) continue;
+    if (std::find(kOfPrinting.begin(), kOfPrinting.end(), name) != kOfPrinting.end()) continue;
     std::vector<std::string> values = option->results();
     if (values.empty()) values.push_back(option->get_default_str());
     if (!values.front().empty()) settings.emplace_back(name, std::move(values));
@@ -53,7 +53,7 @@ std::string summary(const InputRun& run, const jobs::InputPlan& plan, const jobs
 
 /// The object of print_json(), its results one after the other.
 void print_object(const InputRun& run, const jobs::InputWork& work, const std::string& table,
-                  const CommonOptions& told) {
+                  const CommonOptions& typed) {
   jobs::Provenance known;
   for (const auto& [file, hash] : run.hashes()) {
     const std::string name = fmt::format("input_{}", known.size());
@@ -67,7 +67,7 @@ void print_object(const InputRun& run, const jobs::InputWork& work, const std::s
     return json.dump(2, ' ', false, Json::error_handler_t::replace);
   };
   constexpr std::string_view kEnd = "[]\n}";
-  const std::string head = dumped(with_head(told, object, known));
+  const std::string head = dumped(with_head(typed, object, known));
   print_text(std::string_view(head).substr(0, head.size() - kEnd.size()));
   std::string_view before = "[\n    ";
   run.for_each([&](const InputJob& job, const InputResult& result) {
@@ -84,10 +84,10 @@ void print_object(const InputRun& run, const jobs::InputWork& work, const std::s
 
 ExitStatus run_several(const jobs::InputPlan& plan, const jobs::InputWork& work,
                        const jobs::ManyInputsOptions& wishes, const CLI::App& verb,
-                       const CommonOptions& told) {
-  InputRun run(plan, work, plan.journal.empty() ? "" : settings_text(verb, told), wishes);
+                       const CommonOptions& typed) {
+  InputRun run(plan, work, plan.journal.empty() ? "" : settings_text(verb, typed), wishes);
   const bool whole = [&] {
-    ProgressBar bar(work.label, told);
+    ProgressBar bar(work.label, typed);
     return run.run(bar.progress(), [&](std::size_t ended, std::size_t failed) {
       bar.note(fmt::format("{} of {}{}", ended, plan.jobs.size(),
                            failed > 0 ? fmt::format(", {} failed", failed) : ""));
@@ -95,8 +95,8 @@ ExitStatus run_several(const jobs::InputPlan& plan, const jobs::InputWork& work,
   }();
   if (!wishes.table.empty()) {
     json::write_table(wishes.table, run,
-                      {{"title", fmt::format("risley {}, one row per input", told.verb)},
-                       {"command", told.command},
+                      {{"title", fmt::format("risley {}, one row per input", typed.verb)},
+                       {"command", typed.command},
                        {"version", RISLEY_VERSION},
                        {"source", "risley " RISLEY_VERSION}});
   }
@@ -106,8 +106,8 @@ ExitStatus run_several(const jobs::InputPlan& plan, const jobs::InputWork& work,
                                       : "the same command with --resume does the rest");
     throw Cancelled();
   }
-  if (told.json) {
-    print_object(run, work, wishes.table, told);
+  if (typed.json) {
+    print_object(run, work, wishes.table, typed);
   } else {
     run.for_each([](const InputJob&, const InputResult& result) {
       say("{}{}\n", result.outcome.text, result.skipped ? " (done before)" : "");
@@ -130,18 +130,16 @@ CLI::Option* add_many_options(CLI::App& verb, jobs::ManyInputsOptions& wishes,
       what +
           "; folders, for all recordings in and below them; quoted patterns such as '*.lvx' or "
           "'survey/**/*.lvx' (** is any number of folders)");
-  verb.add_option("--list", wishes.list,
-                  "Text file with further inputs, one a line; lines that begin with # do not count")
-      ->type_name("FILE");
   verb.add_option(
-          "--table", wishes.table,
-          "Table to write with one row per input; the ending chooses the format: .csv or .nc "
-          "(NetCDF)")
+          "--list", wishes.list,
+          "Text file with further inputs, one per line; lines that begin with # are ignored")
+      ->type_name("FILE");
+  verb.add_option("--table", wishes.table,
+                  "Table to write, one row per input, as .csv or .nc (NetCDF)")
       ->type_name("FILE");
   verb.add_flag(
       "--resume", wishes.resume,
-      "Skip inputs whose results are whole and were made from the same bytes with the same "
-      "options and version");
+      "Skip inputs whose results are complete and come from the same bytes, options and version");
   return inputs;
 }
 
@@ -162,23 +160,23 @@ void log_words(const std::string& words, bool is_wrong) {
 ExitStatus run_inputs(const jobs::InputPlan& plan, const jobs::InputWork& work,
                       const jobs::ManyInputsOptions& wishes, const CLI::App& verb,
                       const CommonOptions& common) {
-  CommonOptions told = common;  // patterns are names by now
-  told.inputs.clear();
+  CommonOptions typed = common;  // patterns are names by now
+  typed.inputs.clear();
   std::vector<std::string> outputs = {wishes.table};
   for (const InputJob& job : plan.jobs) {
-    add_files(job.input, told.inputs);
+    add_files(job.input, typed.inputs);
     const std::vector<std::string> files = work.files_of(job);
     outputs.insert(outputs.end(), files.begin(), files.end());
   }
-  if (!wishes.list.empty()) told.files.push_back(wishes.list);
-  require_apart(told, outputs);
-  if (plan.many) return run_several(plan, work, wishes, verb, told);
+  if (!wishes.list.empty()) typed.files.push_back(wishes.list);
+  require_apart(typed, outputs);
+  if (plan.many) return run_several(plan, work, wishes, verb, typed);
   jobs::InputOutcome outcome;
   {
     ProgressBar bar(work.label, common);
     outcome = work.run(plan.jobs.front(), bar.progress());
   }
-  common.json ? print_json(told, Json::parse(outcome.json)) : say("{}\n", outcome.text);
+  common.json ? print_json(typed, Json::parse(outcome.json)) : say("{}\n", outcome.text);
   return outcome.status;
 }
 

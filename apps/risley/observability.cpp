@@ -50,7 +50,7 @@ void print_emitters(const estimation::EmitterComparison& emitters, TrainShape sh
   table.print();
   fmt::print("\nalone: as many shots of emitter {}, with what is free for a single one.\n", alone);
   for (const auto& weak : emitters.untold_alone) {
-    fmt::print("not told by emitter {} alone: {}\n", alone, direction_text(weak));
+    fmt::print("not determined by emitter {} alone: {}\n", alone, direction_text(weak));
   }
   fmt::print("\n");
 }
@@ -73,7 +73,7 @@ void print_observability(const JudgedObservability& judged) {
       "freed.\n");
   if (!o.emitters.bounds.empty()) print_emitters(o.emitters, shape);
   for (const auto& weak : o.unobservable) {
-    say("not told by such data: {}\n", direction_text(weak));
+    say("not determined by such data: {}\n", direction_text(weak));
   }
   for (const std::string& words : judged.words) {
     say("{}.\n", words);
@@ -114,18 +114,16 @@ ExitStatus run_observability(const ObservabilityCommandOptions& options,
 Run declare_observability(CLI::App& verb) {
   const auto options = std::make_shared<ObservabilityCommandOptions>();
   ObservabilityCommandOptions& o = *options;
-  verb.add_option("INPUT", o.input,
-                  "Recording to judge; without one a planned recording is judged");
+  verb.add_option("INPUT", o.input, "Recording to judge (default: a planned one)");
   verb.add_option(
       "--sensor", o.sensor,
       "Preset by name, or a preset or calibration file (default: from the recording, or "
       "mid-40)");
   verb.add_option("--duration-s", o.duration_s, "Length of the planned recording, s")
       ->capture_default_str();
-  verb.add_option(
-      "--rate-hz", o.rate_hz,
-      "Shots per second to plan with, Hz (default: the sensor's), or to use of the recording, "
-      "'full' for all");
+  verb.add_option("--rate-hz", o.rate_hz,
+                  "Shots per second, Hz, to plan with (default: the sensor's) or to use of the "
+                  "recording; 'full': all of them");
   verb.add_option("--noise-angle-deg", o.noise_angle_deg,
                   "1 sigma of azimuth and zenith before rounding, deg (default: the sensor's)");
   verb.add_flag("!--no-rounding", o.rounding,

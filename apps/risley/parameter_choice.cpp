@@ -63,10 +63,9 @@ void add_simulated_values(CLI::App& verb, SimulatedValues& values) {
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
-  verb.add_option(
-          "--reported", values.reported,
-          "Set a parameter as the sensor believes it to be, where that differs from the "
-          "truth (repeatable); 'nominal' sets every error parameter to 0 (default: the truth)")
+  verb.add_option("--reported", values.reported,
+                  "Set what the sensor believes a parameter to be, if not the truth (repeatable); "
+                  "'nominal' sets every error parameter to 0 (default: the truth)")
       ->type_name("NAME=VALUE|nominal")
       ->expected(1)
       ->allow_extra_args(false)

@@ -169,7 +169,7 @@ ExitStatus run_pattern(const PatternOptions& options, const CommonOptions& commo
 Run declare_pattern(CLI::App& verb) {
   const auto options = std::make_shared<PatternOptions>();
   PatternOptions& o = *options;
-  verb.add_option("-o,--output", o.output, "File to write, - for standard output");
+  verb.add_option("-o,--output", o.output, "File to write; - is standard output");
   std::set<std::string> names;
   for (const jobs::PatternFormat& format : jobs::pattern_formats()) names.insert(format.name);
   verb.add_option("--format", o.format, "What to write:" + format_list())
@@ -197,7 +197,7 @@ Run declare_pattern(CLI::App& verb) {
       "--coverage", o.coverage,
       "Print how the scan fills the field of view: share of cells with a shot, density, gaps");
   verb.add_option("--integration-s", o.integration_s,
-                  "Times after which --coverage is given, s, as T,T,...")
+                  "Times at which --coverage is evaluated, s, as T,T,...")
       ->delimiter(',')
       ->capture_default_str();
   verb.add_option("--cell-deg", o.cell_deg, "Side of the cells of --coverage, deg")

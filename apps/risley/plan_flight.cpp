@@ -29,21 +29,17 @@ void print_plan(const jobs::PlannedFlightResult& planned) {
   const TrainShape shape = planned.sensor.shape();
   say("sensor {}, {} strips, {} shots at {:g} Hz on {} cells of ground that several strips see\n\n",
       planned.sensor.name, f.strips.size(), grouped(f.used), f.rate, grouped(f.cells));
-  Table table({"unknown", "+- sigma", "unit", "before", "share", "twin"});
+  Table table({"unknown", "+- sigma", "unit", "before"});
   for (const FlightUnknown& unknown : f.unknowns) {
     if (unknown.held) continue;
     table.add(
         {unknown.name,
          fmt::format("{:.2g}", calibration::in_file_unit(unknown, unknown.sigma, shape)),
          calibration::file_unit(unknown, shape),
-         fmt::format("{:.2g}", calibration::in_file_unit(unknown, unknown.prior_sigma, shape)),
-         fmt::format("{:.0f} %", 100 * unknown.prior_share),
-         unknown.twin.empty() ? std::string()
-                              : fmt::format("{} {:+.2f}", unknown.twin, unknown.twin_correlation)});
+         fmt::format("{:.2g}", calibration::in_file_unit(unknown, unknown.prior_sigma, shape))});
   }
   table.print();
-  say("\nshare: of the answer that comes from what was known before; twin: the unknown it is tied "
-      "to most\n");
+  say("\n");
   print_judgement(f);
   const auto& p = f.points;
   if (p.pairs > 0) {

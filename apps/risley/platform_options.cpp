@@ -8,15 +8,14 @@ void add_platform_options(CLI::App& verb, jobs::PlatformFiles& files) {
   verb.add_option("--trajectory", files.trajectory,
                   "Trajectory of a moving sensor: SBET, Inertial Explorer or POSPac text, CSV, or "
                   "the poses in a ROS bag (default: the sensor stands still)");
-  verb.add_option("--trajectory-topic", files.topic,
-                  "Topic of the poses, where a ROS bag has several")
+  verb.add_option("--trajectory-topic", files.topic, "Topic of the poses, if a ROS bag has several")
       ->type_name("NAME");
   verb.add_option("--mount", files.mount,
                   "Mount of the sensor on the moving platform (YAML): axes, lever arm, boresight, "
                   "clock");
   verb.add_option("--accuracy", files.accuracy, "Accuracies of the trajectory (SMRMSG file)");
   verb.add_option("--trajectory-errors", files.errors,
-                  "How large errors of the trajectory may be, and how long they last (YAML)");
+                  "Sizes and correlation times of the trajectory's errors (YAML)");
 }
 
 }  // namespace risley::app

@@ -48,13 +48,13 @@ recordings::Extrinsics extrinsics_from(const std::string& text) {
 
 void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
   verb.add_option("--device", wishes.device,
-                  "One sensor of a recording of several: its serial number, its topic, or its "
-                  "number in the list that info gives, from 0 (default: the only one)")
+                  "One sensor of a recording of several: its serial number, topic, or number in "
+                  "the list of info, from 0 (default: the only one)")
       ->type_name("SERIAL|TOPIC|INDEX");
-  verb.add_option("--shot-rate-hz", wishes.shot_rate_hz,
-                  "Shots per second, Hz, of a recording without times or with bad ones: times are "
-                  "then counted from the shots, and shots without a return keep their places "
-                  "(default: the times in the file)");
+  verb.add_option(
+      "--shot-rate-hz", wishes.shot_rate_hz,
+      "Shots per second, Hz, for recordings without times or with bad ones: times are counted from "
+      "the shots, including those without a return (default: the times in the file)");
   verb.add_option(
           "--extrinsics", wishes.extrinsics_deg,
           "Rotation of the sensor in the recording's frame, deg: recorded = Rz(yaw) "
@@ -64,10 +64,9 @@ void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
 }
 
 void add_every_device(CLI::App& verb, ReadingWishes& wishes) {
-  verb.add_flag(
-          "--every-device", wishes.every_device,
-          "Write one file for each sensor of a recording of several, with the sensor's serial "
-          "number, or its number, added to its name")
+  verb.add_flag("--every-device", wishes.every_device,
+                "Write one file for each sensor of a recording of several, with its serial number "
+                "or number in the name")
       ->excludes("--device");
 }
 

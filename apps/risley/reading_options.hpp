@@ -11,11 +11,11 @@
 
 namespace risley::app {
 
-/// How every verb that reads recordings is told to read them, as typed.
+/// Options of every verb that reads recordings, as typed.
 struct ReadingWishes {
-  std::string device;  ///< SERIAL, TOPIC or INDEX; empty: not told
+  std::string device;  ///< SERIAL, TOPIC or INDEX; empty: not given
   std::optional<double> shot_rate_hz;
-  std::string extrinsics_deg;  ///< YAW,PITCH,ROLL; empty: not told
+  std::string extrinsics_deg;  ///< YAW,PITCH,ROLL; empty: not given
   bool every_device = false;   ///< of a verb that makes one file of each
 };
 

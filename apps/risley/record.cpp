@@ -164,12 +164,10 @@ std::string optics_words(const jobs::OpticsHealth& health) {
   return state.alarm ? "optics: changed before" : "optics: no change seen";
 }
 
-/// What is going on in one line on stderr, only on a terminal and not with --quiet. The line is
-/// gone when the object is.
+/// The state of the recording in one line on stderr, if shows_progress(); the destructor clears it.
 class StatusLine {
  public:
-  explicit StatusLine(const CommonOptions& common)
-      : visible_(!common.quiet && isatty(STDERR_FILENO) != 0) {}
+  explicit StatusLine(const CommonOptions& common) : visible_(shows_progress(common)) {}
   ~StatusLine() { clear(); }
   StatusLine(const StatusLine&) = delete;
   StatusLine& operator=(const StatusLine&) = delete;
@@ -258,9 +256,9 @@ Run declare_record(CLI::App& verb) {
   verb.add_option("--interface", o.interface,
                   "IPv4 address of this machine where the sensors are (default: the only one)")
       ->type_name("ADDRESS");
-  auto* list = verb.add_flag("--list", o.list, "Only show which sensors are there");
+  auto* list = verb.add_flag("--list", o.list, "Only list the sensors that are found");
   verb.add_flag("--passive", o.passive,
-                "Only listen: record what sensors send to this address anyway, and send nothing")
+                "Only listen: send nothing, and record what sensors send to this address")
       ->excludes(list);
   verb.add_option("--data-port", o.data_port, "Port of the data that --passive listens to")
       ->check(CLI::Range(1, 65535))
@@ -270,7 +268,7 @@ Run declare_record(CLI::App& verb) {
       ->expected(1)
       ->allow_extra_args(false)
       ->take_all();
-  verb.add_option("--find-s", o.find_s, "How long sensors are looked for, s")
+  verb.add_option("--find-s", o.find_s, "Time to search for sensors, s")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
   verb.add_option("--duration-s", o.duration_s,
@@ -281,15 +279,15 @@ Run declare_record(CLI::App& verb) {
              "coordinates unless as-is");
   add_choice(verb, "--return-mode", o.return_mode,
              {"first", "strongest", "dual", "triple", "as-is"},
-             "Returns of a shot that the sensors are to send");
+             "Returns per shot to request from the sensors");
   verb.add_option("--optics", o.optics,
-                  "Watch the optics, and tell when they change: 'own' against their beginning; a "
-                  "preset or calibration file also against that")
+                  "Raise an alarm when the optics change: 'own' compares with the first seconds, a "
+                  "preset or calibration also with that")
       ->type_name("own|NAME|FILE")
       ->excludes(list);
   verb.add_option("--watch", o.watch,
-                  "Show the recording and its optics on a page while it runs, at this port of "
-                  "127.0.0.1, or at an address and port of this machine")
+                  "Serve a page that shows the recording and its optics while it runs, at this "
+                  "port of 127.0.0.1 or at an address and port of this machine")
       ->type_name("[ADDRESS:]PORT")
       ->excludes(list);
   add_choice(verb, "--imu", o.imu, {"yes", "no"}, "Inertial samples, of sensors that have them");

@@ -131,7 +131,7 @@ Run declare_simulate(CLI::App& verb) {
   auto* trajectory =
       verb.add_option("--trajectory", o.trajectory,
                       "True trajectory along which the sensor moves (default: it stands still)");
-  verb.add_option("--trajectory-topic", o.topic, "Topic of the poses, where a ROS bag has several")
+  verb.add_option("--trajectory-topic", o.topic, "Topic of the poses, if a ROS bag has several")
       ->type_name("NAME")
       ->needs(trajectory);
   verb.add_option("--flight", o.flight, "Flight plan (YAML) to make the true trajectory from")
@@ -139,15 +139,15 @@ Run declare_simulate(CLI::App& verb) {
   verb.add_option("--mount", o.mount, "True mount of the moving sensor (YAML)");
   verb.add_option(
       "--trajectory-errors", o.trajectory_errors,
-      "Errors (YAML) of the trajectory file that is written beside the recording (default: "
-      "none)");
+      "Errors (YAML) of the trajectory file written beside the recording (default: none)");
   verb.add_option("--trajectory-format", o.trajectory_format, "Format of that trajectory file")
       ->check(CLI::IsMember(trajectory_formats()))
       ->capture_default_str();
   verb.add_option("--start-s", o.start_s,
                   "Start of the recording, s after the trajectory's first record (default: 0)");
-  verb.add_option("--clock-drift-ppm", o.clock_drift_ppm,
-                  "How fast the trajectory's time gains on the sensor's clock, ppm (default: 0)");
+  verb.add_option(
+      "--clock-drift-ppm", o.clock_drift_ppm,
+      "How much faster the trajectory's clock runs than the sensor's, ppm (default: 0)");
   verb.add_option(
           "--start-angles-deg", o.start_angles_deg,
           "Rotation angles of the prisms at the start, deg, as A,B or A,B,C (default: random)")

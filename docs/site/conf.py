@@ -75,7 +75,7 @@ def mend_links(app, document, source):
 
 
 def take_signature(app, what, name, obj, options, signature, result):
-    """The signature of a method in C++, which does not tell it itself."""
+    """The signature of a method in C++, which does not show it."""
     return SIGNATURES.get(name.partition(".")[2]) if what == "method" else None
 
 

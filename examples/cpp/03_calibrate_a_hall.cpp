@@ -45,7 +45,7 @@ int calibrate_a_hall(const Arguments& arguments) {
   fmt::print("before: {}\n{}\nwhat to do: {}\n", to_string(verdict.code), verdict.words,
              verdict.to_do);
 
-  // The same unit after somebody has told it its calibration.
+  // The same unit after it was given its calibration.
   unit.reported_nominal = false;
   for (const estimation::FreeParameter& one : found.calibration.free) {
     unit.reported.emplace_back(one.name, found.calibration.sensor.get(one.name));

@@ -25,7 +25,7 @@ int pattern_for_a_simulator(const Arguments& arguments) {
   const jobs::WrittenPattern made = jobs::write_pattern(options);
 
   // The same shots as columns in memory.
-  const sensors::Sensor sensor = sensors::load_sensor(options.sensor);
+  const sensors::Sensor sensor = sensors::load_sensor(options.sensor.name());
   const sensors::ScanPattern shots = sensors::scan_pattern(sensor, 0, made.rows);
   const auto [left, right] = std::minmax_element(shots.azimuth.begin(), shots.azimuth.end());
   const auto [high, low] = std::minmax_element(shots.zenith.begin(), shots.zenith.end());

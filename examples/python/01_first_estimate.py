@@ -3,7 +3,7 @@
 # %% [markdown]
 # # First estimate
 #
-# What does a sensor believe about its optics? A recording tells: `estimate` finds the parameters with which the sensor
+# What does a sensor believe about its optics? A recording shows it: `estimate` finds the parameters with which the sensor
 # computed the directions that it reports. The recording is one of your own or, without one, a simulated second of a
 # Mid-40 whose prisms are a little tilted.
 #

@@ -36,7 +36,7 @@ found = risley.calibrate(bent, truth=bent, output=folder / "calibration")
 print("before:", found)
 
 # %% [markdown]
-# The same hall with the same unit after somebody has told it its calibration: now the walls confirm what it believes.
+# The same hall with the same unit after it was given its calibration: now the walls confirm what it believes.
 
 # %%
 calibrated = {name: one["value"] for name, one in found.to_dict()["parameters"].items()}

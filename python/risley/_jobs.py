@@ -4,12 +4,10 @@
 import os
 from typing import Any, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union, overload
 
-import numpy as np
-
 from risley import _risley
 from risley._progress import Progress, telling
 from risley._results import (Answer, Calibration, Cloud, Estimate, FlightCalibration,
-                             Identification, Pattern, Plan, Scan, Simulation)
+                             Identification, Pattern, Plan, Scan, Simulation, needed)
 from risley._units import (AnyMount, AnySensor, AnyTrajectory, Fixed, Path, Rate, Source, Truth,
                            YawPitchRoll, listed, options_of, suggesting)
 
@@ -492,7 +490,8 @@ def pattern(sensor: AnySensor, format: str = "", output: Path = "", *, start: fl
     FileError, ValueError
         For files that cannot be written, and for options that make no sense.
     """
-    dtype = np.dtype(dtype).name
+    if not isinstance(dtype, str) or dtype not in ("float64", "float32"):
+        dtype = needed("numpy", f"dtype = {dtype!r}").dtype(dtype).name
     options = options_of(locals())
     with telling(progress) as tell:
         if not output:

@@ -2,17 +2,17 @@
 # SPDX-License-Identifier: MIT
 """Jobs on many recordings in one call, as the command does them for folders, patterns and lists."""
 import os
-from typing import Any, Callable, Dict, Iterator, List, Sequence, Union
+from typing import Any, Callable, Dict, Iterator, List, Sequence, Tuple, Union
 
 from risley import _risley
 from risley._jobs import calibrate, cloud, estimate, info
 from risley._progress import Progress, telling
-from risley._results import needed
+from risley._results import _Shown, needed
 from risley._units import (AnySensor, Path, keyword_defaults, listed, options_of,
                            unknown_keyword)
 
 
-class ManyResults(Sequence[Dict[str, Any]]):
+class ManyResults(_Shown, Sequence[Dict[str, Any]]):
     """What came of many inputs: a sequence of dictionaries, one per input, in their order.
 
     Each has the keys of the job's own result, ``input``, ``status`` (0: it went well, otherwise the
@@ -49,10 +49,9 @@ class ManyResults(Sequence[Dict[str, Any]]):
                    for name in (self.rows[0] if self.rows else {})}
         return needed("xarray", "to_xarray()").Dataset(columns)
 
-    def __str__(self) -> str:
-        return "\n".join([repr(self)] + [
-            f"{one['input']}: {one['message'] or one.get('verdict', {}).get('code', 'done')}"
-            for one in self])
+    def _lines(self) -> List[Tuple[str, str]]:
+        return [(one["input"], one["message"] or one.get("verdict", {}).get("code", "done"))
+                for one in self]
 
 
 def _many(verb: str, job: Callable[..., Any], wanted: Dict[str, Any], options: Dict[str, Any],

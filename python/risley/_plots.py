@@ -3,8 +3,6 @@
 """What the plot() of results draws, where matplotlib is installed."""
 from typing import Any, Mapping, Sequence
 
-import numpy as np
-
 
 def _axes(axes: Any) -> Any:
     if axes is not None:
@@ -36,6 +34,7 @@ def sigmas(found: Any, axes: Any) -> Any:
 
 def residuals(found: Any, axes: Any) -> Any:
     """Histograms of azimuth and zenith residuals."""
+    import numpy as np  # pylint: disable=import-outside-toplevel
     axes = _axes(axes)
     for name, values in (("azimuth", found.azimuth_residual), ("zenith", found.zenith_residual)):
         shown = np.degrees(values[np.isfinite(values)])
@@ -49,6 +48,7 @@ def residuals(found: Any, axes: Any) -> Any:
 
 def scan(found: Any, axes: Any) -> Any:
     """Azimuth and elevation of directions; left is left."""
+    import numpy as np  # pylint: disable=import-outside-toplevel
     axes = _axes(axes)
     x, y, z = found.directions.T
     axes.plot(np.degrees(np.arctan2(y, x)), np.degrees(np.arcsin(z)), ",")

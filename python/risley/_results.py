@@ -183,7 +183,7 @@ class _Answer(_Shown):
 
 
 class _Columns(_Answer):
-    """Quantities by name, in SI units."""
+    """Quantities by name, in SI units. Where numpy is not installed, their arrays are lists."""
 
     def __init__(self, found: Dict[str, Any], table: _risley.ValueTable) -> None:
         super().__init__(found)

@@ -124,7 +124,7 @@ class BagFolder final : public Bag {
         }
       } catch (const FileError&) {
         if (&file == &files_.front()) throw;
-        break;  // told when reading comes to it, behind the sound files
+        break;  // reported once the sound files before it are read
       }
     }
     std::ranges::sort(topics_,

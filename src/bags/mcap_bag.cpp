@@ -286,7 +286,7 @@ class McapBag final : public Bag {
     return false;
   }
 
-  /// Reads all records for their channels, up to the first damage, which is told by who reads.
+  /// Reads all records for their channels, up to the first damage, which reading reports later.
   void look_for_channels() {
     looking_ = true;
     begin_pass();

@@ -55,7 +55,7 @@ struct DeleteInRosbag {
   }
 };
 
-/// What tells one topic from another.
+/// What distinguishes topics.
 struct TopicKey {
   std::string name, md5, type;
 

@@ -29,7 +29,7 @@ class Unpacker {
               std::span<std::uint8_t> room);
 
   /// A message of ROS 2 as it was before rosbag2 compressed it by Zstandard (compression_mode:
-  /// MESSAGE), told by its first bytes, with which plain CDR never begins; others as they are.
+  /// MESSAGE), recognised by first bytes with which plain CDR never begins; others as they are.
   /// @return bytes that are valid until the next call
   /// @throws BadMessage as unpack()
   std::span<const std::uint8_t> message(std::span<const std::uint8_t> bytes);

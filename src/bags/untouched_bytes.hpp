@@ -22,7 +22,7 @@ class UntouchedBytes {
   bool empty() const { return size_ == 0; }
   std::uint8_t* data() { return bytes_.get(); }
   const std::uint8_t* data() const { return bytes_.get(); }
-  /// Makes room for so many bytes; what stood here is lost where it has to grow.
+  /// Makes room for this many bytes; the content is lost if it has to grow.
   void make_room(std::size_t count) {
     if (count > size_) *this = UntouchedBytes(count);
   }

@@ -10,7 +10,7 @@
 
 namespace risley::calibration {
 
-/// The believed parameters as all recordings together tell them: what the sensor computes its
+/// The believed parameters as all recordings together determine them: what the sensor computes its
 /// directions with.
 struct Belief {
   sensors::Sensor sensor;

@@ -10,7 +10,7 @@
 namespace risley::calibration {
 
 /// The sensor as a calibration knows it: adjusted optics with the joint covariance of what was
-/// adjusted and what was held, and what the recordings tell of the rotors and of what the prisms
+/// adjusted and what was held, and what the recordings show of the rotors and of what the prisms
 /// are made of. All but its serial number.
 /// @param result  with free parameters, covariance, range offset sigma, variance factor and changes
 ///                by what was held

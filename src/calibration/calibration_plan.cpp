@@ -30,7 +30,7 @@ constexpr double kWorthRolling = 0.8;
 /// Shots of every recording that stand for all of them: their own share of a wall is then known to
 /// 0.4 %, sqrt(0.25 / 20000).
 constexpr std::size_t kSampleShots = 20000;
-/// Walls that stand steeper tell the common direction 20 times as well as one that is met face on:
+/// Steeper walls determine the common direction 20 times as well as one that is met face on:
 /// table in docs/theory/calibration.md, section Datum.
 constexpr double kUsefulIncidence = radians_from_degrees(30.0);
 
@@ -235,7 +235,7 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
                               seen.incidence[w] / n, seen.range[w] / n});
       result.shots += n * weight;
       auto shots = std::make_shared<RangedShots>(rows_of(all, seen.rows[w]));
-      // Intensities as of one matt material: walls of one colour do not tell the walk error.
+      // Intensities as of one matt material: walls of one colour do not determine the walk error.
       shots->intensity.assign(shots->size(), static_cast<std::uint8_t>(sensors::kWalkIntensity));
       // The plane in the sensor's frame: R^T n, and nearer by what the station stands towards it.
       const Vector3<double>& n_scene = plane.plane.normal;

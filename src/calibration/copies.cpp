@@ -105,7 +105,7 @@ void require_no_copies(const std::vector<RangedRecording>& recordings) {
       }
       const auto [first, second] = std::minmax(r, other);
       throw InvalidArgument(fmt::format(
-          "{} and {} hold the same shots, and a copy tells nothing new: leave one of them out",
+          "{} and {} hold the same shots, and a copy adds nothing: leave one of them out",
           recordings[first].name, recordings[second].name));
     }
   }

@@ -24,7 +24,7 @@ class DirectionGrid {
   std::size_t cells() const { return static_cast<std::size_t>(size_[0] * size_[1]); }
   std::size_t cell(std::size_t beam) const { return static_cast<std::size_t>(cell_[beam]); }
   std::span<const std::size_t> beams_in(std::size_t cell) const { return beams_.of(cell); }
-  /// The cell so many columns and rows away, or none outside the field of view.
+  /// The cell that is these columns and rows away, or none outside the field of view.
   std::optional<std::size_t> shifted(std::size_t cell, int columns, int rows) const {
     const int column = static_cast<int>(cell) % size_[0] + columns;
     const int row = static_cast<int>(cell) / size_[0] + rows;

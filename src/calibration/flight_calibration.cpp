@@ -47,14 +47,14 @@ constexpr double kPoseMargin = 5;       // sigmas of the clock offset
 constexpr double kSettled = 0.1;
 /// What is tested is known before to no better than these: drift, s/s, delay, s, and what is held.
 constexpr double kDriftPrior = 1e-3, kDelayPrior = 1, kHeldPrior = 1e-2;
-/// From so many sigmas of a delay on, and where the clock offset is so far from what is stated,
+/// Beyond this many sigmas of a delay, and where the clock offset is this far from what is stated,
 /// what a delay would do counts as an error of everything else.
 constexpr double kDelayConsidered = 2;
-/// A trajectory that jumps more often does not fit, nor does one that so many repetitions do not
+/// A trajectory that jumps more often does not fit, nor does one that this many repetitions do not
 /// mend.
 constexpr std::size_t kMostJumps = 8;
 constexpr int kMendings = 8;
-/// A jump may be as large as this many sigmas of the process, and as many times what is seen of it.
+/// A jump may be this many sigmas of the process, and this many times what is seen of it.
 constexpr double kBreakSigmas = 3;
 /// A process that grows counts as found when its corrections ask for no more than this factor.
 constexpr double kProcessRatio = 1.1;
@@ -147,7 +147,7 @@ class FlightCalibrator {
     coarse_.shots = sample_of_all(options_.coarse_shots);
   }
 
-  /// About so many shots at random: every n-th one would beat with the rotors.
+  /// About this many shots at random: every n-th one would beat with the rotors.
   FlightShots sample_of_all(std::size_t count) const {
     const FlightShots& all = full_.shots;
     const double share = static_cast<double>(count) / static_cast<double>(all.size());
@@ -200,7 +200,7 @@ class FlightCalibrator {
     model_.planes = flight.cells.planes;
   }
 
-  /// Shots between two knots that a jump is between tell nothing: corrections are linear there.
+  /// Shots between two knots with a jump between them are left out: corrections are linear there.
   void leave_out_jumps(LabelledFlight& flight) const {
     for (const ProcessBreak& one : priors_.breaks) {
       for (const TrajectoryKnots::Interval& interval : model_.knots.intervals) {

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 /// Parts of an interval within which the trajectory's process counts as one value.
 constexpr int kIntervalParts = 8;
-/// Of a shot's variance, so much stays its own, however rough the ground is.
+/// Share of a shot's variance that stays its own, however rough the ground is.
 constexpr double kLeastOwnShare = 0.25;
 
 /// What the shots of a cell that counts do to the functions, patch by patch, weighted.

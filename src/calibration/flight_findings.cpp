@@ -19,9 +19,9 @@ namespace {
 
 using Eigen::Index;
 
-/// Attitudes count as late from so many sigmas on, since few flights tell a delay well.
+/// Attitudes count as late beyond this many sigmas, since few flights determine a delay well.
 constexpr double kDelaySigmas = 3;
-/// The clock offset contradicts what is stated of it from so many sigmas on.
+/// The clock offset contradicts its statement beyond this many sigmas.
 constexpr double kClockSigmas = 4;
 
 /// What sigmas of corrections are in the words of a trajectory.

@@ -10,12 +10,12 @@
 
 namespace risley::calibration {
 
-/// A drift of the clock, or what is held or known and is off, counts from so many sigmas on.
+/// A drift of the clock, or an error of a held or known value, counts beyond this many sigmas.
 constexpr double kTestedSigmas = 5;
 
 /// Mount and sensor with the unknowns that were found. Unknowns and their covariance are known.
 /// @param held        [globals]
-/// @param considered  last so many globals: held, and may be off
+/// @param considered  number of the last globals: held, and may be off
 void fill_mount_and_sensor(const FlightCalibrationOptions& options, const FlightModel& model,
                            const std::vector<bool>& held, std::size_t considered,
                            FlightCalibration& c);

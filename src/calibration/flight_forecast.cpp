@@ -72,7 +72,7 @@ void append(const FlightShots& more, FlightShots& shots) {
 }
 
 /// Gives cells that were found with noise the planes of those that were found without: normals that
-/// lean by chance seem to tell of what they cannot tell.
+/// lean by chance seem to determine what they cannot.
 void take_true_planes(const GroundCells& truth, GroundCells& cells) {
   std::vector<std::vector<std::int32_t>> seen(cells.planes.size());
   for (std::size_t i = 0; i < cells.plane.size(); ++i) {

@@ -74,7 +74,8 @@ void set_model(const FlightCalibrationOptions& options, FlightStart& start) {
     }
   }
   // What is held and may be off is carried along: indices above all. Air and wedges are held by
-  // convention, and the index that a recording tells belongs to them; the beam sees them together.
+  // convention, and the index that a recording determines belongs to them; the beam sees them
+  // together.
   for (estimation::FreeParameter& held : estimation::uncertain_held(sensor, start.model.free)) {
     if (held.name.starts_with("wedge_angle") || held.name == "refractive_index_air") continue;
     start.model.free.push_back(std::move(held));

@@ -11,7 +11,7 @@
 
 namespace risley::calibration {
 
-/// Residuals beyond so many sigmas do not count in the end.
+/// Residuals beyond this many sigmas do not count in the end.
 inline constexpr double kGateSigmas = 3;
 inline constexpr std::size_t kFewestCells = 20;
 
@@ -20,7 +20,7 @@ struct FlightStart {
   FlightModel model;  ///< without knots and planes
   FlightPriors priors;
   Eigen::VectorXd prior_sigma;  ///< [globals]
-  std::size_t considered = 0;   ///< last so many free parameters: held, and may be off
+  std::size_t considered = 0;   ///< number of the last free parameters: held, and may be off
 };
 
 /// @param local  the trajectory in a local frame

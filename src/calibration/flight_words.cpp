@@ -13,7 +13,7 @@
 namespace risley::calibration {
 namespace {
 
-/// Parts of a jump are named from so many of their sigmas on.
+/// Parts of a jump are named if they exceed this many of their sigmas.
 constexpr double kNamedSigmas = 3;
 
 const FlightUnknown& clock_of(const FlightCalibration& c) {
@@ -51,7 +51,8 @@ std::string in_words(const TrajectoryJump& jump, std::int64_t begin_ns) {
   return fmt::format(
       "the trajectory jumps{} {:.2f} to {:.2f} s after the first shot ({} {}), {:.0f} "
       "sigmas beyond what is stated of its errors",
-      sizes.empty() ? std::string(", in a direction that the strips hardly tell,") : " by " + sizes,
+      sizes.empty() ? std::string(", in a direction that the strips hardly determine,")
+                    : " by " + sizes,
       since(jump.begin_ns), since(jump.end_ns), jump.between_strips ? "after strip" : "strip",
       jump.strip + 1, jump.score);
 }

@@ -35,7 +35,7 @@ constexpr int kFits = 8;
 constexpr double kUnevenness = 1.1, kScatterSigmas = 3;
 /// Points of a cell that its plane is fitted to: the adjustment takes all.
 constexpr std::size_t kFittedPoints = 512;
-/// Nobody's terrain: an unknown that a pair of strips does not tell keeps this, m.
+/// Sigma of an unknown that a pair of strips does not determine, m: far beyond any terrain.
 constexpr double kShiftPrior = 1;
 constexpr double kLeastSlope = 0.02;  // RMS over the cells
 
@@ -104,7 +104,7 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
       hessian += weight[i] * row * row.transpose();
       right += weight[i] * some(2, i) * row;
     }
-    // Points of a line tell no slope across it: a level plane then.
+    // Points of a line do not determine the slope across it: a level plane then.
     hessian.diagonal().head<2>().array() += 1e-4 * hessian(2, 2);
     solution = Eigen::LDLT<Eigen::Matrix3d>(hessian).solve(right);
     const Vector3d normal(-solution[0] / extent, -solution[1] / extent, 1);
@@ -378,7 +378,7 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
   std::vector<StripPair> pairs;
   for (Sums& own : sums) {
     const auto count = static_cast<double>(own.pair.cells);
-    // Slopes that are no more than the noise of the normals tell no horizontal shift.
+    // Slopes within the noise of the normals do not determine a horizontal shift.
     for (Index axis = 0; axis < 2; ++axis) {
       if (own.hessian(axis, axis) > count * kLeastSlope * kLeastSlope) continue;
       own.hessian.row(axis).setZero();

@@ -26,15 +26,16 @@ struct MovedParameter {
 struct Held {
   std::vector<std::string> names;  ///< [held]
   HeldQuantities quantities;
-  /// Whether a quantity moves the optics themselves. The sensor's own tilts do not: who uses the
-  /// calibration computes rotation angles with the same errors again, which cancel what these did.
+  /// Whether a quantity moves the optics themselves. The sensor's own tilts do not: whoever uses
+  /// the calibration computes rotation angles with the same errors again, which cancel what these
+  /// did.
   std::vector<bool> moves_optics;  ///< [held]
   std::vector<MovedParameter> moved;
 };
 
 /// The sensor's own computations hold what the estimates of the directions held, wedges before all:
 /// that moves rotation angles and the indices found with them. The true prisms have those indices
-/// and wedges, and tilts of their own that no wall tells. docs/theory/calibration.md
+/// and wedges, and tilts of their own that no wall determines. docs/theory/calibration.md
 /// @param sensor  the preset, with what is known of its parameters
 Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarProblem& problem);
 

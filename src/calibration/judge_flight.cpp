@@ -21,10 +21,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Combinations that the flight tells less of than what was known before are named.
+/// Combinations that the flight determines less well than prior knowledge are named.
 constexpr double kUntold = 1;
 /// A mean error of the trajectory that keeps this part of its sigma and goes with a boresight angle
-/// by this correlation is told as a sum with it only.
+/// by this correlation is determined only as a sum with it.
 constexpr double kKeptSigma = 0.6, kTiedCorrelation = 0.8;
 constexpr std::size_t kDatumBeams = 4000;
 

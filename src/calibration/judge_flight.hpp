@@ -20,7 +20,7 @@ struct FlightEvidence {
   const FlightWeights& weights;
   const FlightPriors& priors;
   const Eigen::VectorXd& prior_sigma;  ///< [globals]
-  std::size_t considered = 0;          ///< last so many free parameters: held, and may be off
+  std::size_t considered = 0;          ///< number of the last free parameters: held, and may be off
   const FlightSystem& system;
   const Eigen::VectorXd* inverse_diagonal = nullptr;  ///< of the system, where it is known already
   /// [globals, errors]: what unstated errors, one sigma each, do to the globals; or none.
@@ -28,7 +28,7 @@ struct FlightEvidence {
   const RoughGround* ground = nullptr;  ///< or none: planes
 };
 
-/// What the evidence tells: of a calibration that was made, or of one that is planned.
+/// What the evidence shows: of a calibration that was made, or of one that is planned.
 FlightJudgement judge_flight(const FlightEvidence& evidence);
 
 }  // namespace risley::calibration

@@ -10,7 +10,7 @@ namespace risley::calibration {
 
 /// All shots of one recording and where the adjustment has them.
 struct LabelledShots {
-  RangedShots shots;    ///< at rotation angles that all recordings together tell
+  RangedShots shots;    ///< at rotation angles from all recordings together
   double pointing = 0;  ///< pointing_of_angles()
   Labels labels;
 };

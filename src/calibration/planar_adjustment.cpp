@@ -41,7 +41,7 @@ constexpr double kSmallPromise = 1e-2;
 constexpr int kMostShapeSteps = 6;
 constexpr double kSmallShapeStep = 1e-2;
 
-/// Chi-square that a sound sample with so many degrees of freedom exceeds once in 10,000.
+/// Chi-square that a sound sample with these degrees of freedom exceeds once in 10,000.
 double critical_chi2(int degrees_of_freedom) {
   constexpr double kCritical[] = {0.0, 15.137, 18.421, 21.108};
   return kCritical[std::clamp(degrees_of_freedom, 0, 3)];
@@ -142,7 +142,7 @@ FlatSolution solve_flat(const ShapeProblem& problem, double damping = 0) {
 }
 
 /// Information on the free parameters when everything else is unknown. Directions without any
-/// information come out as zero, also where the others cannot be told apart.
+/// information come out as zero, also where the others cannot be separated.
 Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
   const Index rest = hessian.rows() - free;
   if (rest <= 0) return hessian;

@@ -57,7 +57,7 @@ struct Chunk {
   std::size_t begin = 0, end = 0, first_cell = 0;
 };
 
-/// Of about as many shots, divided where a cell ends if there are any.
+/// Of about equal numbers of shots, divided where a cell ends if there are any.
 std::vector<Chunk> chunks_of(std::size_t shots, std::span<const std::uint32_t> cell_begin) {
   std::vector<Chunk> chunks;
   if (cell_begin.empty()) {

@@ -33,7 +33,7 @@ constexpr double kFartherTriple = 0.105, kNearTriple = 0.035;
 constexpr double kWorthPolishing = 0.4;
 constexpr int kMostPolished = 40;
 /// Candidates set aside for filling no area: each takes its points out of the search, and what is
-/// left of a scan after so many rows of points is no wall either.
+/// left of a scan after this many rows of points is no wall either.
 constexpr int kMostRejected = 4;
 
 /// Support of a candidate among the points it was scored on.
@@ -98,7 +98,7 @@ class Search {
     return std::min(static_cast<std::size_t>(at), size - 1);
   }
 
-  /// A beam that is still free within so many cells of another one, or any when none is found.
+  /// A beam that is still free within some cells of another one, or any if there is none.
   std::size_t neighbour(std::size_t beam, int reach, const std::vector<std::size_t>& rest) {
     const auto side = static_cast<std::size_t>(2 * reach + 1);
     for (int attempt = 0; attempt < 8; ++attempt) {

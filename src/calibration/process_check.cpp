@@ -13,21 +13,21 @@ namespace {
 
 using Eigen::Index;
 
-/// A jump counts from so many sigmas on: there are thousands of steps.
+/// A jump counts beyond this many sigmas: there are thousands of steps.
 constexpr double kJumpSigmas = 5;
 /// One jump also shows in the steps beside it, up to here.
 constexpr double kJumpsApart = 4;  // s
-/// Of a step's variance, the flight has to tell so much.
+/// Share of a step's variance that the flight has to determine.
 constexpr double kLeastTold = 1e-3;
-/// The process counts as larger than stated from so many sigmas of chi2 on, if it is so many times
-/// as large. Where one error is, nothing vouches for the others.
+/// The process counts as larger than stated beyond this many sigmas of chi2, if it is this many
+/// times as large. Where one error is, nothing vouches for the others.
 constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
 constexpr double kOthersSigmas = 1, kOthersRatio = 1.1;
 /// Nothing is concluded from less, and little from less than the second number.
 constexpr double kLeastExpected = 1, kHardlyTold = 15;
 
-/// Of what all steps tell, so much is to be left away from jumps. Median of chi2 with one degree of
-/// freedom.
+/// Share of what all steps determine that is to be left away from jumps. Median of chi2 with one
+/// degree of freedom.
 constexpr double kLeastLeft = 0.15, kMedianOfChi2 = 0.4549;
 
 /// Between two steps, s; 0 for neighbours.
@@ -104,7 +104,7 @@ Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck
     chi2 += check.score.col(k).cwiseAbs2().cwiseProduct(check.told.col(k));
     expected += check.told.col(k);
   }
-  // Where jumps are everywhere, the middle of all steps tells more than what is left.
+  // Where jumps are everywhere, the middle of all steps says more than what is left.
   const Eigen::VectorXd of_all = check.told.rowwise().sum();
   if (expected.sum() < kLeastLeft * of_all.sum()) {
     expected = of_all;

@@ -16,11 +16,12 @@ namespace risley::calibration {
 ///     e = (x_next - d x) / sqrt(1 - d^2),   d = exp(-dt / T),
 ///
 /// has a variance of 1 before the flight and v after it. What the flight moved it by then has the
-/// variance 1 - v, and a jump of the process between the knots is best told by e / (1 - v).
+/// variance 1 - v, and e / (1 - v) is the best estimate of a jump of the process between the knots.
 struct ProcessCheck {
-  Eigen::MatrixXd score;  ///< [6, knots - 1]: e / sqrt(1 - v); 0 where the flight tells nothing
-  Eigen::MatrixXd told;   ///< [6, knots - 1]: 1 - v
-  Eigen::MatrixXd jump;   ///< [6, knots - 1]: a jump that explains it, m and rad
+  Eigen::MatrixXd
+      score;             ///< [6, knots - 1]: e / sqrt(1 - v); 0 where the flight determines nothing
+  Eigen::MatrixXd told;  ///< [6, knots - 1]: 1 - v
+  Eigen::MatrixXd jump;  ///< [6, knots - 1]: a jump that explains it, m and rad
   /// [6]: sums of e^2 over all steps, the first value included, and what is expected of them.
   Eigen::VectorXd chi2, expected;
 };
@@ -33,8 +34,8 @@ ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& 
 std::vector<std::size_t> jumps_of(const TrajectoryKnots& knots, const ProcessCheck& check);
 
 /// Factors [6] on the sigmas of the process that its corrections ask for, away from jumps; 1 where
-/// they fit. Where one error is larger than stated, those that the flight hardly tells count as
-/// larger, too.
+/// they fit. Where one error is larger than stated, those that the flight hardly determines count
+/// as larger, too.
 /// @param alerted  the process is known to be larger than stated: smaller misfits count
 Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck& check,
                                 bool alerted = false);

@@ -14,9 +14,9 @@ namespace {
 using Eigen::Index;
 constexpr int kPatches = RoughGround::kPatches;
 
-/// Shots that tell, at most: more hardly tell more.
+/// Most shots that are used: more hardly add anything.
 constexpr std::size_t kRoughShots = 400'000;
-/// Ground counts as rough from so many sigmas of the chance on.
+/// Ground counts as rough beyond this many sigmas.
 constexpr double kRoughSigmas = 5;
 
 std::int8_t patch_of(const std::array<float, 3>& point, const GroundCellOptions& grid) {

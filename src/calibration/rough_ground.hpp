@@ -11,7 +11,7 @@ namespace risley::calibration {
 
 /// How the ground departs from its planes: the mean product of two residuals for every two patches
 /// of a cell, over some cells. Nothing where chance explains all of it.
-/// @param points  of the shots; with `grid`, they tell the patches
+/// @param points  of the shots; with `grid`, they define the patches
 std::optional<RoughGround> rough_ground(const FlightShots& shots, const ShotPoses& poses,
                                         const PlaneOfShot& plane, const ShotPoints& points,
                                         const GroundCellOptions& grid, const FlightModel& model,

@@ -33,7 +33,7 @@ constexpr double kSteepest = radians_from_degrees(20.0);
 /// Part of the points of a recording that must lie on walls of the other.
 constexpr double kLeastShared = 0.7;
 /// Another turn fits as well when it explains as many points, and a shift shorter by this, m, does
-/// not tell them apart.
+/// not distinguish them.
 constexpr double kAsWell = 0.95, kShorterShift = 0.3, kOtherTurn = radians_from_degrees(10.0);
 
 struct Pose {
@@ -76,7 +76,8 @@ std::optional<Pose> checked(const Planes& own, const Planes& reference, const Ma
     }
     if (best != nullptr) pairs.emplace_back(plane, best);
   }
-  // n . shift = distance in the reference less the own one; along what no wall tells there is none.
+  // n . shift = distance in the reference less the own one; along what no wall determines there is
+  // none.
   Matrix3d normal = 1e-6 * Matrix3d::Identity();
   Vector3d right = Vector3d::Zero();
   for (const auto& [plane, other] : pairs) {

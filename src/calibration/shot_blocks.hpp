@@ -17,7 +17,7 @@ inline std::size_t block_count(std::size_t shots) {
   return (shots + kBlockShots - 1) / kBlockShots;
 }
 
-/// Calls function(begin, end) for blocks of so many shots, in parallel.
+/// Calls function(begin, end) for blocks of shots, in parallel.
 template <class Function>
 void for_each_block(std::size_t shots, const Function& function) {
   parallel::for_each(block_count(shots), [&](std::size_t block) {

@@ -20,8 +20,8 @@ namespace {
 /// Part of the rotation angles' sigma that a direction has: the sine of a prism's deflection. Two
 /// of a Mid-40 reach 19.2 degrees, one half of it.
 constexpr double kAngleLever = 0.17;
-/// A beam that meets a plane at a flatter angle, as the cosine of incidence, tells nothing of it:
-/// the pointing's share of its range would explain any range.
+/// A beam that meets a plane at a flatter angle, as the cosine of incidence, does not help to place
+/// it: the pointing's share of its range would explain any range.
 constexpr double kFlattestApproach = 0.01;
 
 }  // namespace

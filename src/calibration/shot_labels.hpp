@@ -10,10 +10,10 @@
 
 namespace risley::calibration {
 
-/// A shot belongs to a plane within so many sigmas: 3 of 1000 with normal noise do not.
+/// A shot belongs to a plane within this many sigmas: 3 of 1000 with normal noise do not.
 inline constexpr double kGate = 3.0;
-/// What lies beyond the gate and within so many sigmas is an outlier of its plane. Steps of it are
-/// looked for as far: docs/theory/calibration.md
+/// What lies beyond the gate and within this many sigmas is an outlier of its plane. Steps of it
+/// are looked for as far: docs/theory/calibration.md
 inline constexpr double kNearby = 10.0;
 
 /// A view of fewer shots is none: its range variance would be known to no better than a quarter,
@@ -31,7 +31,7 @@ struct Labels {
 };
 
 /// Every shot to the plane that explains its range best, in sigmas. Where two planes meet no range
-/// can tell them apart; shots there go to neither, and that is decided by the predicted ranges
+/// can separate them; shots there go to neither, and that is decided by the predicted ranges
 /// alone: a choice by the measured one would keep those whose noise points away from the other
 /// plane.
 /// @param pointing  1 sigma of the directions, rad

@@ -26,7 +26,7 @@ using Eigen::Vector2d;
 
 /// A lean counts from this chi2 of its two tilts on: chance reaches it once in 20,000 cells.
 constexpr double kLeaningChi2 = 20;
-/// Surroundings are squares of this size, and count from so many cells on.
+/// Surroundings are squares of this size, and count with at least this many cells.
 constexpr double kSurroundings = 20;  // m
 constexpr std::size_t kFewestNeighbours = 20;
 constexpr int kMeanRounds = 2;

@@ -17,7 +17,7 @@ struct SortedRows {
   std::vector<Row> rows;
 
   SortedRows() = default;
-  /// @param number_of  of each of so many rows
+  /// @param number_of  of each row
   template <class NumberOf>
   SortedRows(std::size_t count, std::size_t size, const NumberOf& number_of) : begin(count + 1) {
     const auto for_each = [&](const auto& function) {

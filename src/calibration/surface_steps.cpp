@@ -34,7 +34,7 @@ constexpr double kLeastHeight = 0.005;  ///< of a step, m
 constexpr double kAboveWaves = 3.0;     ///< least height in robust sigmas of the surface's waves
 constexpr double kCore = 0.7;           ///< of its height: cells that lie wholly within a step
 constexpr double kInside = 0.5;         ///< of its height: cells that lie mostly within a step
-constexpr double kSeparable = 4.0;      ///< sigmas of one point: height that tells its side
+constexpr double kSeparable = 4.0;      ///< sigmas of one point: height that decides its side
 
 /// Means over one cell.
 struct Cell {
@@ -120,7 +120,7 @@ class SmoothSurface {
           }
         }
       }
-      // What cells in one row do not tell is zero.
+      // What cells in one row do not determine is zero.
       const Eigen::VectorXd solution = algebra::times(algebra::pseudo_inverse(normal), right);
       double change = 0;
       for (std::size_t j = 0; j < terms; ++j) {
@@ -346,7 +346,7 @@ class StepSearch {
   }
 
   /// Claims the cells of a step and those around it that share in it, and their rows. A high step
-  /// tells by itself which rows of a cell on its border are its own.
+  /// decides by itself which rows of a cell on its border are its own.
   void take(std::vector<std::size_t> region, int place, StepRegion& step) {
     const double sign = step.height > 0 ? 1.0 : -1.0;
     for (std::size_t c : region) grid_.cells[c].region = place;

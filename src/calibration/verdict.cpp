@@ -63,7 +63,7 @@ std::string tolerance_words(const JudgedError& error, double tolerance) {
   return words;
 }
 
-/// Which recording would tell what these walls do not.
+/// Which recording would determine what these walls do not.
 std::string better_scan() {
   return fmt::format(
       "scan walls that are tilted steeply against the sensor's axis and fill its field of view, or "

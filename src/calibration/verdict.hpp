@@ -11,7 +11,8 @@
 namespace risley::calibration {
 
 /// Why a calibration is none, in words: the adjustment failed, a direction of the parameter space
-/// that the walls do not tell, a station or plane that contradicts the data. Empty for a sound one.
+/// that the walls do not determine, a station or plane that contradicts the data. Empty for a sound
+/// one.
 std::string reason_of_failure(const Calibration& c, const PlanarSolution& solution);
 
 /// Why the ranges are probably not in the unit that they were taken in, where none is stated: they
@@ -36,7 +37,8 @@ PointingError pointing_error_of(const FlightCalibration& c);
 /// How wrong reported directions are: "reported directions are off by 0.4029 ± 0.0013 degree ...".
 std::string in_words(const PointingError& error);
 
-/// What is held and what the flight tells of it: "refractive_index is held at 1.51 +- 1e-06, ...".
+/// What is held and what the flight says about it: "refractive_index is held at 1.51 +- 1e-06,
+/// ...".
 std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor);
 
 /// What a user should know of a calibration beside its numbers.

@@ -129,8 +129,8 @@ void lay_grid(PlanarProblem& problem, std::size_t wall, const std::vector<std::s
   problem.walls[wall].grid = std::move(grid);
 }
 
-/// Where recordings stood to each other, as the distances of walls that they share tell it; along
-/// what no wall tells they stay where they were said to be.
+/// How recordings were placed, from the distances of walls that they share; along what no wall
+/// determines they keep their stated places.
 void find_positions(PlanarProblem& problem) {
   constexpr double kDistanceSigma = 0.002, kPositionSigma = 0.3;  // m
   if (!problem.stations_known || problem.stations.size() < 2) return;

@@ -145,7 +145,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
         fmt::format("none of the known planes is seen: the largest plane of {} is at {}",
                     recordings[found.front().recording], normal_text(first)));
   }
-  // A station that shares no wall with another one tells nothing of the datum, or is not where it
+  // A station that shares no wall with another one says nothing about the datum, or is not where it
   // is said to be.
   if (!stations.empty() && recordings.size() > 1) {
     for (std::size_t r = 0; r < recordings.size(); ++r) {
@@ -173,7 +173,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
       throw EstimationError(message);
     }
   }
-  // Walls that nobody saw are no unknowns.
+  // Walls without shots are no unknowns.
   std::vector<std::size_t> row(result.walls.size());
   std::vector<Wall> seen;
   for (std::size_t w = 0; w < result.walls.size(); ++w) {

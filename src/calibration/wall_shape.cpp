@@ -456,7 +456,7 @@ class ShapeSearch {
   std::vector<Tried> tried_;                              // [parameters]
 };
 
-/// Sums of one length, at columns that the system of so many has.
+/// Sums of one length, at the system's columns.
 void require_wall(const WallSums& wall, Index columns) {
   const auto size = static_cast<std::size_t>(wall.own) + wall.places.size();
   for (const Index place : wall.places) {

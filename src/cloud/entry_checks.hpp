@@ -20,7 +20,7 @@ inline void require_poses(const SensorPoses& poses, std::size_t shots) {
   }
 }
 
-/// All columns are as a header announces them, with so many rows or none.
+/// All columns are as a header announces them, with this many rows or none.
 inline void require_columns(const Points& points, const CloudHeader& header, std::size_t rows) {
   require_length("rotation_angle", points.rotation_angle.size(),
                  header.has_rotation_angles ? header.prisms : 0);

@@ -16,7 +16,7 @@
 
 namespace risley::cloud {
 
-/// Cells of the counts, in squares of so many.
+/// Cells of the counts along the side of a square.
 inline constexpr std::int32_t kTileCells = 16;
 inline constexpr std::size_t kMostTiles = 100'000;
 inline constexpr std::int32_t kTilePixels = 64;

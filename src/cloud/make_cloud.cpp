@@ -449,7 +449,7 @@ class CloudMaker::Work {
   void no_distribution(std::string_view why) {
     distribution_.reset();
     warn(summary_.warnings, kWarning.distribution_unknown,
-         "how points lie on the ground is not told: {}", why);
+         "how points lie on the ground is not reported: {}", why);
   }
 
   void count_on_ground(const Points& points) {
@@ -484,7 +484,7 @@ class CloudMaker::Work {
   /// How far the calibration moves the beams, together and against each other, seen on shots of the
   /// first piece.
   void find_repointing() {
-    constexpr std::size_t kBeams = 2000;  // tell a root mean square to 2 %, 1 / sqrt(2 * 2000)
+    constexpr std::size_t kBeams = 2000;  // give a root mean square to 2 %, 1 / sqrt(2 * 2000)
     std::vector<std::size_t> rows;
     const std::size_t stride = std::max<std::size_t>(1, piece_->rows.size() / kBeams);
     for (std::size_t row = 0; row < piece_->rows.size(); row += stride) rows.push_back(row);

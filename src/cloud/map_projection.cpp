@@ -6,9 +6,14 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <mutex>
+#include <sstream>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 #include <proj.h>
 #include <proj_experimental.h>
@@ -35,6 +40,25 @@ struct FreeContext {
 };
 using Object = std::unique_ptr<PJ, FreeObject>;
 using Context = std::unique_ptr<PJ_CONTEXT, FreeContext>;
+
+/// Has the library take its data from beside itself, where they came together, as in a wheel: its
+/// database is of its own version, and what PROJ_DATA names belongs to the library of some other
+/// program. Grids may still lie there.
+void use_own_data(PJ_CONTEXT* context) {
+  Dl_info library;
+  if (dladdr(reinterpret_cast<const void*>(&proj_context_create), &library) == 0) return;
+  const std::filesystem::path folder =
+      std::filesystem::path(library.dli_fname).parent_path().parent_path() / "share" / "proj";
+  std::error_code none;
+  if (!std::filesystem::exists(folder / "proj.db", none)) return;
+  std::vector<std::string> folders = {folder.string()};
+  const char* given = std::getenv("PROJ_DATA");
+  std::istringstream others(given == nullptr ? "" : given);
+  for (std::string other; std::getline(others, other, ':');) folders.push_back(other);
+  std::vector<const char*> names;
+  for (const std::string& name : folders) names.push_back(name.c_str());
+  proj_context_set_search_paths(context, static_cast<int>(names.size()), names.data());
+}
 
 /// The last thing that the library has to say, instead of its printing it.
 void keep_message(void* where, int /*level*/, const char* message) {
@@ -139,6 +163,7 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
   state_->context.reset(proj_context_create());
   PJ_CONTEXT* context = state_->context.get();
   proj_log_func(context, &state_->message, keep_message);
+  use_own_data(context);
   proj_context_set_enable_network(context, 0);  // what is computed does not depend on a connection
   const auto create = [&](const char* what, const std::string& text) {
     Object object(proj_create(context, text.c_str()));

@@ -10,7 +10,7 @@
 
 namespace risley::cloud {
 
-/// Pieces of a recording overlap by so much, because rotation angles are less certain at the end of
+/// Overlap of the pieces of a recording, because rotation angles are less certain at the end of
 /// one.
 inline constexpr std::int64_t kOverlapNs = 100'000'000;
 /// The most rows that any sensor gives in that time: three returns of 240 kHz (Avia). More are

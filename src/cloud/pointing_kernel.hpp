@@ -93,7 +93,7 @@ struct PointArguments {
 
   double* point[3] = {};       ///< [shots], m; NaN where the beam does not get through
   double* covariance[6] = {};  ///< upper triangle [shots], m^2, or nullptr
-  /// The same without the common factors; nullptr as a whole where nobody asks.
+  /// The same without the common factors; nullptr as a whole if not wanted.
   double* own_covariance[6] = {};
   double* corrected_range = nullptr;
   double* incidence = nullptr;  ///< [shots], rad

@@ -44,7 +44,7 @@ double knot_interval(const std::vector<estimation::RotorProcess>& process) {
   return longest;
 }
 
-/// What the belief leaves free: the parameters whose covariance the calibration tells, where it is
+/// What the belief leaves free: the parameters whose covariance the calibration has, where it is
 /// one against directions, otherwise the default ones.
 void choose_parameters(const sensors::Sensor& calibration, estimation::EstimateOptions& options) {
   if (calibration.reference != CalibrationReference::directions) return;

@@ -21,8 +21,8 @@ constexpr std::int64_t kSurfaceNs = 1'000'000'000;
 /// The same for a moving sensor, whose shots are put together as if it stood still.
 constexpr std::int64_t kMovingSurfaceNs = 200'000'000;
 constexpr std::size_t kMovingSurfaceShots = 4000;
-/// Shots of it that tell a surface: on the 1160 cells of a Mid-40's field of view, a circle of 38.4
-/// degrees, 14 each and 120 in a block of nine.
+/// Shots of it that determine a surface: on the 1160 cells of a Mid-40's field of view, a circle
+/// of 38.4 degrees, 14 each and 120 in a block of nine.
 constexpr std::size_t kSurfaceShots = 16000;
 /// For telling surfaces: the step in which these sensors give ranges, m.
 constexpr double kLeastRangeNoise = 1e-3;

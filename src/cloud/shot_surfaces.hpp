@@ -41,7 +41,7 @@ class ShotSurfaces {
   ShotSurfaces(const sensors::Sensor& calibration, double angle_noise, bool has_intensity,
                const Georeference* georeference);
 
-  /// Surfaces are told from directions as the sensor reports them.
+  /// Surfaces are found from directions as the sensor reports them.
   /// @param distortion  of these against each other, rms, rad
   void expect_distortion(double distortion);
 

@@ -12,9 +12,9 @@
 namespace risley::cloud {
 namespace {
 
-/// Of a fit: nine degrees of freedom tell its roughness to a quarter, 1 / sqrt(2 * 9).
+/// Of a fit: nine degrees of freedom give its roughness to a quarter, 1 / sqrt(2 * 9).
 constexpr double kLeastShots = 12;
-/// X of the directions that are looked at: sine of the six degrees that SurfaceNormals tells of.
+/// X of the directions that are looked at: sine of the six degrees that SurfaceNormals documents.
 constexpr double kLeastForward = 0.1;
 /// Part of the squared spread across that shots along one line lack: 1 - correlation^2.
 /// SurfaceNormals.ShotsAlongALineHaveNone
@@ -22,7 +22,7 @@ constexpr double kLeastSpread = 1e-3;
 /// Cells between a cell without a fit and those that it looks at: an edge in one cell spoils the
 /// fits of all eight around it.
 constexpr int kReach = 2;
-/// A shot is on a surface nearby that leads to its range within so many sigmas.
+/// A shot is on a surface nearby that predicts its range within this many sigmas.
 constexpr double kNearEnough = 3;
 /// Surfaces that differ by less, in sigmas and as the cosine between normals, are one: 3 degrees.
 constexpr double kSameRange = 1, kSameNormal = 0.9986;
@@ -158,7 +158,7 @@ SurfaceNormals::FittedPlane SurfaceNormals::fitted(const Moments& m) const {
   const double uu = m.uu - m.n * u * u, uv = m.uv - m.n * u * v, vv = m.vv - m.n * v * v;
   const double qu = m.qu - m.n * q * u, qv = m.qv - m.n * q * v;
   const double determinant = uu * vv - uv * uv;
-  // Shots along one line tell a slope in one direction only.
+  // Shots along one line determine a slope in one direction only.
   if (!(determinant > kLeastSpread * uu * vv)) return kNoPlane;
   const double slope_u = (qu * vv - qv * uv) / determinant;
   const double slope_v = (qv * uu - qu * uv) / determinant;

@@ -18,7 +18,7 @@
 namespace risley::cloud {
 namespace {
 
-/// A scan has reached its whole field of view after so many seconds; so many of its shots tell.
+/// Seconds after which a scan has reached its whole field of view, and shots that show this.
 constexpr double kFieldAfter = 30, kFieldShots = 300'000;
 constexpr double kLowestBeam = 0.17364817766693033;  // sine of 10 degrees
 

@@ -38,7 +38,7 @@ constexpr double kSmallStep = 0.1;
 constexpr int kMostFullPasses = 8;
 /// Where there are more than this many shots to one of the coarse pass, a step with this share of
 /// them comes between: near the optical axis angles are far from linear in what the coarse pass
-/// does not tell, and a further pass over all shots would cost more.
+/// does not show, and a further pass over all shots would cost more.
 constexpr double kStrongThinning = 16.0, kSomeShots = 0.25;
 /// Residuals are correlated where that multiplies variances by more than the second; rotors that
 /// were let free to follow explain it where they leave at most the first of the factor.
@@ -149,7 +149,7 @@ class Iteration {
                                        windows_->outlier);
   }
 
-  /// Normal equations at the present state, and what the residuals there tell.
+  /// Normal equations at the present state, and statistics of the residuals there.
   void evaluate() {
     squares_ = {};
     ShotLooks looks;
@@ -321,7 +321,7 @@ double coarse_rate(const PackedSeries& series, const std::vector<ShotRange>& ran
   return std::max(kCoarseRate, kFewestCoarseShots / std::max(duration, 1e-3));
 }
 
-/// Sum over the knots of what their shots tell of the angles [prisms, prisms].
+/// Sum over the knots of their shots' information about the angles [prisms, prisms].
 Eigen::MatrixXd shared_angle_information(const NormalEquations& equations) {
   const auto prisms = static_cast<Eigen::Index>(equations.prisms);
   const std::size_t pairs = equations.curvature.size() / equations.knots() / kTimePowers;
@@ -424,7 +424,7 @@ void refine(Iteration& full, const BatchMapOptions& options, const Constants& co
     const bool noise_is_coloured =
         pass == 1 && !stiff_process.empty() && factor > kWhitened * first_factor;
     if (noise_is_coloured) process = stiff_process;
-    // The first step goes from what the thinned shots tell to what all tell, the second should be
+    // The first step goes from the solution of thinned shots to that of all, the second should be
     // one of rounding.
     SmootherSolution solution = full.solve(process, true);
     const std::size_t angles = 2 * (full.equations().shots - full.equations().outliers);

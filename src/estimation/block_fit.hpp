@@ -30,7 +30,7 @@ struct RotorState {
   KnotSquare<Eigen::Dynamic> covariance;
 };
 
-/// A start as a state that may be off by so much, rad and, of a speed, what a function says, rad/s.
+/// A start as a state with these sigmas, rad and, of speeds, what a function says, rad/s.
 template <class SpeedSigma>
 RotorState state_of(const Start& start, double angle_sigma, const SpeedSigma& speed_sigma) {
   const auto prisms = static_cast<Eigen::Index>(start.rotation_angle.size());
@@ -50,7 +50,7 @@ RotorState state_of(const Start& start, double angle_sigma, const SpeedSigma& sp
   return state;
 }
 
-/// A start as a state that may be off by so much, rad and a share of the speeds.
+/// A start as a state with these sigmas, rad and a share of the speeds.
 inline RotorState loose_state(const Start& start, double angle_sigma, double speed_share) {
   return state_of(start, angle_sigma, [&](double speed) {
     return std::max(speed_share * std::abs(speed), kStraightSigma);

@@ -18,7 +18,7 @@ namespace risley::estimation {
 
 namespace {
 
-/// Fewer shots in a row tell nothing of how they hang together.
+/// Fewer shots in a row do not show their correlation.
 constexpr std::size_t kFewestInARow = 100;
 
 /// Moments about the mean.
@@ -133,7 +133,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   Autocorrelation result;
   if (time_ns.size() < kFewestInARow) return result;
   const std::int64_t step = median_step_ns(time_ns);
-  if (step <= 0) return result;  // a clock that stands still tells no lags
+  if (step <= 0) return result;  // a clock that stands still has no lags
   // Blocks spread over the recording, left-out shots as zeros with weight zero.
   struct EvenRun {
     std::vector<double> azimuth, zenith, weight;
@@ -200,7 +200,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     result.rho.insert(result.rho.end(), rho.begin(), rho.end());
     all_pairs = fewest_pairs;
   }
-  // Few shots do not tell the factor well; its own standard deviation goes on top.
+  // Few shots do not determine the factor well; its own standard deviation goes on top.
   if (!result.rho.empty()) {
     const double lags = static_cast<double>(result.rho.size());
     result.factor += 2.0 * result.factor * std::sqrt(lags / (2.0 * all_pairs));

@@ -19,12 +19,13 @@
 namespace risley::estimation {
 namespace {
 
-/// A sigma that is so many times another is worth a word.
+/// Ratio of two sigmas from which it is reported.
 constexpr double kNotable = 2.0;
 
 bool is_beam(int place, int prisms) { return place::emitter(place, prisms) >= 0; }
 
-/// Every parameter of a single prism and every beam: each place of the flat vector that data tell.
+/// Every parameter of a single prism and every beam: each place of the flat vector that data
+/// determine.
 std::vector<FreeParameter> single_parameters(TrainShape shape) {
   std::vector<std::string> names;
   for (const ParameterInfo& info : parameter_list(shape)) {
@@ -194,12 +195,12 @@ std::vector<std::string> emitter_words(const EmitterComparison& comparison) {
   std::vector<std::string> words;
   if (!untold.empty()) {
     words.push_back(
-        fmt::format("only the {} emitters together tell {}: emitter {} alone never does",
+        fmt::format("only the {} emitters together determine {}: emitter {} alone never does",
                     comparison.emitters, fmt::join(untold, ", "), comparison.alone + 1));
   }
   if (!better.empty()) {
     words.push_back(
-        fmt::format("the {} emitters together tell better than as many shots of emitter "
+        fmt::format("the {} emitters together determine better than as many shots of emitter "
                     "{} alone: {}",
                     comparison.emitters, comparison.alone + 1, fmt::join(better, ", ")));
   }

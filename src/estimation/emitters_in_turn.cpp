@@ -14,7 +14,7 @@
 namespace risley::estimation {
 namespace {
 
-/// Angles between shots that stand so many rows apart, rad.
+/// Angles between shots that are a number of rows apart, rad.
 std::vector<double> steps_over(const CountedShots& shots, std::size_t rows) {
   constexpr std::size_t kMost = 100'000;
   std::vector<double> steps;

@@ -18,7 +18,7 @@ namespace {
 
 using recordings::kNoPlace;
 
-/// Shots of a run that are looked at on either side of a border, and from how many on they tell.
+/// Shots of a run that are examined on either side of a border, and the fewest that are enough.
 constexpr std::size_t kArm = 8, kFewestOfArm = 5;
 /// A curve goes on smoothly when it leaves less than this share of the step from shot to shot, and
 /// no more than half of what one missing shot would leave.
@@ -93,7 +93,7 @@ class RunFinder {
     return (direction_.row(at) - direction_.row(far)).norm() / static_cast<double>(arm - 1);
   }
 
-  /// What a cubic leaves of the shots about a border if so many are missing at it, rms per axis.
+  /// Residual of a cubic through the shots about a border if some are missing there, rms per axis.
   double roughness(std::size_t last, std::size_t before, std::size_t after, int missing) const {
     std::vector<double> places;
     for (std::size_t i = 0; i < before + after; ++i) {

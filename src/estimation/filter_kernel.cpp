@@ -36,7 +36,7 @@ template <TrainLayout N>
 constexpr auto kMostFree = static_cast<std::size_t>(parameter_count(TrainShape{N, kMaxEmitters}));
 
 /// The paper's choice of free parameters for one emitter and one glass, default_free_names(). A
-/// number of states that the compiler knows, and derivatives of which it knows that nobody wants
+/// number of states that the compiler knows, and derivatives that it knows are not needed
 /// them, take 12 % off a step, the latter 7 % of these.
 template <TrainLayout N>
 struct UsualParameters {

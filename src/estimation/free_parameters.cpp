@@ -32,7 +32,7 @@ std::vector<std::string> default_free_names(TrainShape shape, bool one_glass) {
   }
   if (shape.prisms.reflects()) {
     // A row of emitters determines every angle but one: the vertical tilt of the reflector cannot
-    // be told from glass, mirror and entrance face.
+    // be separated from glass, mirror and entrance face.
     const std::string held = fmt::format("prism_tilt_{}_vertical_deg", prism_letter(prisms - 1));
     for (const ParameterInfo& info : parameter_list(shape)) {
       const bool is_angle = info.kind == ParameterKind::train && info.unit == "deg";

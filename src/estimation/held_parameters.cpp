@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Index;
 
-/// So many shots tell how answers hang on held parameters: shares of them do, not sigmas.
+/// Shots that show how answers depend on held parameters: shares of them do, not sigmas.
 constexpr double kSampleShots = 20000;
 
 /// What was estimated: the free parameters, and the frame's turn where that was free.

@@ -32,7 +32,7 @@ namespace {
 
 /// Slowest change of a speed that a fit over the first shots leaves to the rotors, rad/s^2.
 constexpr double kAccelerationSigma = radians_from_degrees(200.0);
-/// Shots that a start is fitted to, at first and where answers have to be told apart.
+/// Shots that a start is fitted to, at first and where answers have to be distinguished.
 constexpr std::size_t kEnoughShots = 1000, kManyShots = 20000;
 /// Speeds of a sensor whose clock or rotors are further off than is usual are found among all
 /// pairs, within this share of the sensor's.
@@ -43,7 +43,7 @@ constexpr double kHopeless = 4.0, kSecondOrder = 3e-5;
 /// Residual of a fit that no other pair of speeds needs to compete with, rad: rotors that wander
 /// and noise of any usual size leave less, a wrong pair more.
 constexpr double kGoodResidual = radians_from_degrees(0.08);
-/// Two answers are told apart when their chi2 differ by this.
+/// Two answers are distinct if their chi2 differ by this.
 constexpr double kDecisive = 25.0;
 /// A turn that leaves all shots in the field of view is believed from this angle on, rad, where it
 /// takes this share of the residuals away. Where the last axis may lean, it explains a turn as
@@ -101,7 +101,7 @@ class WindowFitter {
   }
 
   /// Moves the rotation angles to the best of a grid over whole turns, with the fit's speeds and
-  /// parameters: where shots in a corner of the field told little of the lines' phases.
+  /// parameters: where shots in a corner of the field said little about the lines' phases.
   void look_around(WindowFit& fit) {
     constexpr int kSteps = 24;
     constexpr double kMiss = radians_from_degrees(2.0);  // of a grid's angles
@@ -240,7 +240,7 @@ class WindowFitter {
   std::vector<double> azimuth_, zenith_;
 };
 
-/// One way the recording may have come about.
+/// One hypothesis of how the recording was made.
 struct Hypothesis {
   bool mirrored = false;
   sensors::Sensor sensor;  // in one of its speed combinations

@@ -281,7 +281,7 @@ struct KnotSums {
     }
   }
 
-  /// Sums stay in registers over all groups: curvature pair by pair, coupling in so many columns as
+  /// Sums stay in registers over all groups: curvature pair by pair, coupling in as many columns as
   /// the registers allow.
   void add(const Rows<N>& rows, const Times* times, std::size_t groups, const OwnColumns<N>& own) {
     std::size_t pair = 0;

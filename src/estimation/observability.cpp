@@ -30,7 +30,7 @@ namespace {
 constexpr double kShotsShare = 0.5;
 constexpr std::size_t kMostPlannedShots = 600000;
 constexpr double kMostDuration = 2000.0;
-/// Correlations from here on make two quantities hard to tell apart.
+/// Correlations from here on make two quantities hard to separate.
 constexpr double kStrong = 0.9;
 /// From here on one is as good as the other.
 constexpr double kTwin = 0.98;
@@ -183,7 +183,7 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
         bound_covariance(information(rows, rows), scale(rows));
     if (!covariance) {
       found.sigma = std::numeric_limits<double>::infinity();
-      // Whom it cannot be told from shows under the wide priors.
+      // What it cannot be separated from shows under the wide priors.
       for (Eigen::Index j = 0; j < result.correlation.rows(); ++j) {
         if (j == quantity) continue;
         found.twins.emplace_back(result.correlation_names[static_cast<std::size_t>(j)],
@@ -323,7 +323,7 @@ std::vector<std::string> observability_words(const Observability& observability,
       if (!twins.empty()) twins += " or ";
       twins += std::abs(rho) < kStrong ? name : fmt::format("{} (rho = {:.4f})", name, rho);
     }
-    const std::string twin = fmt::format("{} cannot be told from {}", quantity.name, twins);
+    const std::string twin = fmt::format("{} cannot be separated from {}", quantity.name, twins);
     if (!std::isfinite(sigma)) {
       words.push_back(twin +
                       ", however long a sensor with these parameters records: keep it fixed");
@@ -337,7 +337,7 @@ std::vector<std::string> observability_words(const Observability& observability,
         needed < 1000 ? fmt::format("{:.3g}", needed) : fmt::format("{:.0f}", needed);
     if (needed <= observability.duration) {
       words.push_back(fmt::format(
-          "{} acts nearly like {}, but this recording tells them apart: freed, its sigma "
+          "{} acts nearly like {}, but this recording separates them: freed, its sigma "
           "is {:.2g}{}, and {} s at {:.6g} Hz reach {}{}",
           quantity.name, twins, sigma, unit, seconds, observability.rate, target, unit));
     } else {

@@ -89,7 +89,7 @@ ConstantsDifference difference_of(const ConstantsEstimate& a, const ConstantsEst
   result.chi2 = off.dot(weighted);
   result.combinations = static_cast<int>(measured.cols());
   result.joint_p_value = tail(result.chi2, result.combinations, scatter);
-  // Of the constant i alone, the measured combinations tell u = row i of them: off = change u +
+  // About constant i alone, the measured combinations say u = row i of them: off = change u +
   // noise.
   result.change = result.change_sigma =
       Eigen::VectorXd::Constant(measured.rows(), std::numeric_limits<double>::quiet_NaN());

@@ -13,7 +13,7 @@
 
 namespace risley::estimation {
 
-/// Constants as shots tell them: a posterior mean and its covariance, the prior counted once.
+/// Constants as shots determine them: a posterior mean and its covariance, the prior counted once.
 struct ConstantsEstimate {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;

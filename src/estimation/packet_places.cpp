@@ -36,7 +36,7 @@ constexpr double kSurePlace = 12.0;
 constexpr double kPlaceSoftening = softening_at(1.5);
 /// Noise is not taken below this share of the step from shot to shot.
 constexpr double kLeastPlaceNoise = 0.2;
-/// A packet of more noise than so many times the usual one does not fit.
+/// A packet whose noise exceeds the usual one by this factor does not fit.
 constexpr double kPoorPacket = 4.0;
 
 /// What one packet says of the rotors.
@@ -362,7 +362,7 @@ bool refit(const PacketShots& shots, const AngleSeries& series,
   return fitted.has_value();
 }
 
-/// Rotors and optics that the shots of evident places tell, at one of their packets.
+/// Rotors and optics from the shots of evident places, at one of their packets.
 std::optional<PacketAnchor> find_evident_anchor(const PacketShots& shots,
                                                 const std::vector<std::uint8_t>& evident,
                                                 double rate, const sensors::Sensor& sensor,
@@ -427,7 +427,7 @@ struct FollowedPackets {
   RotorState anchor;
   std::size_t evident = 0, contradicting = 0;  // packets
 
-  /// Whether the rotors went along with what is evident, and told most of the rest.
+  /// Whether the rotors agreed with what is evident, and placed most of the rest.
   bool is_sound() const {
     constexpr double kMostContradicting = 0.05;
     return 2 * placed > place.size() &&
@@ -597,7 +597,7 @@ ShotPlaces find_places(const PacketShots& shots, double shot_rate, const sensors
   result.place = evident;
   std::optional<PacketAnchor> anchor =
       find_evident_anchor(shots, evident, shot_rate, sensor, progress);
-  // A packet of a single emitter does not tell which of its places are missing.
+  // A packet of a single emitter does not show which of its places are missing.
   if (!anchor && sensor.train.emitters() > 1) {
     anchor = find_packet_anchor(shots, shot_rate, sensor, progress);
   }

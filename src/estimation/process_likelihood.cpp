@@ -16,7 +16,7 @@
 namespace risley::estimation {
 namespace {
 
-/// Short recordings are cut into so many windows that their rotors' wander shows.
+/// Short recordings are cut into enough windows for their rotors' wander to show.
 constexpr double kFewestWindows = 50.0;
 constexpr std::size_t kFewestWindowShots = 8;
 /// How far the other rotors may be from the linearisation within a window, before its data.
@@ -41,7 +41,7 @@ constexpr double kNone = -std::numeric_limits<double>::infinity();
 /// The decade that minimises a cost: steps of one decade, then a golden section around the best.
 template <class Cost>
 double best_decade(const Cost& cost, double lowest, double highest) {
-  constexpr double kTolerance = 0.12;  // far below what the data tell
+  constexpr double kTolerance = 0.12;  // far below what the data resolve
   double best = highest, best_cost = std::numeric_limits<double>::infinity();
   for (double decade = highest; decade >= lowest - 1e-9; decade -= 1.0) {
     const double value = cost(decade);
@@ -191,7 +191,7 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
                                           kLowestAcceleration, kHighestAcceleration);
     const double jerk_alone =
         best_decade([&](double j) { return cost(kNone, j); }, kLowestJerk, kHighestJerk);
-    // More numbers only where the data are so much likelier with them.
+    // More numbers only if the data are this much likelier with them.
     RotorProcess best = process_of(walk_alone, kNone);
     double best_cost = cost(walk_alone, kNone);
     if (const double value = cost(kNone, jerk_alone); value + kWorthIt < best_cost) {

@@ -29,7 +29,7 @@ constexpr double kLostSigma = radians_from_degrees(8.0);
 constexpr int kGridHalf = 12;  // steps to half a turn
 constexpr double kGridStep = radians_from_degrees(15.0);
 
-/// Shots of a window that tell a scale of residuals.
+/// Fewest shots of a window for a scale of residuals.
 constexpr std::size_t kFewestShots = 12;
 
 class Tracker {
@@ -104,7 +104,7 @@ class Tracker {
                         {residuals_.data() + series_.size() + rows_.begin, rows_.size()});
   }
 
-  /// Scale of the residuals over the noise; that of the start where few shots tell.
+  /// Scale of the residuals over the noise; that of the start where shots are few.
   double level() const {
     if (rows_.size() < kFewestShots) return usual_level_;
     return std::clamp(scale() / weights_.angle_noise.rms(), 1.0, 1e6);

@@ -224,7 +224,7 @@ void RunningEstimate::Watcher::prepare(const Estimate& first) {
   const HeldChanges& changes = first.held_changes;
   held_sigma_ = changes.values.topRows(n).rowwise().norm();
   // A piece that holds the sensor's values h differs from what it would say at the true ones by
-  // G (h - true). Where the sensor's covariance tells of them, it tells how they go with the
+  // G (h - true). Where the sensor's covariance has them, it has their correlation with the
   // others.
   const auto held = static_cast<Index>(changes.held.size());
   Eigen::MatrixXd from(n, n + held);

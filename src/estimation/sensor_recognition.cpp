@@ -37,7 +37,7 @@ constexpr double kMostMisfit = radians_from_degrees(4.0);
 constexpr double kFarWorse = 3.0;
 /// Optics are tried of sensors whose lines leave up to so many times as much as the best.
 constexpr double kWorthATrial = 3.0;
-/// Emitters tell the roll when what their constants leave is below this share of how far they
+/// Emitters show the roll when what their constants leave is below this share of how far they
 /// stand apart.
 constexpr double kEmittersFit = 0.25;
 
@@ -51,7 +51,7 @@ NominalLines nominal_lines(const PrismTrain& train) {
   const int steps = train.prisms() <= 2 ? 24 : 12;
   const auto prisms = static_cast<std::size_t>(train.prisms());
   NominalLines result;
-  // A line turns with so many times each rotor's angle.
+  // A line turns with these multiples of the rotors' angles.
   std::vector<std::vector<double>> turns(prisms, std::vector<double>(prisms, 0.0));
   for (std::size_t k = 0; k < prisms; ++k) turns[k][k] = 1.0;
   if (train.layout().reflects()) turns.push_back({-1.0, 2.0});

@@ -31,7 +31,7 @@ constexpr std::size_t kFittedShots = 40000, kTriedShots = 12000;
 constexpr std::size_t kDoubledCost = 1000;
 /// Which emitter fired which shot, from the steps between neighbouring shots: all are equal, but
 /// for the one from the last emitter back to the first.
-/// @param[out] order  emitter of shots 0, 1, ... @return whether there were shots to tell it from
+/// @param[out] order  emitter of shots 0, 1, ... @return whether there were shots to find it from
 bool find_firing_order(const NumberedShots& shots, ShotRange range, const PrismTrain& train,
                        bool mirrored, std::vector<std::uint8_t>& order) {
   const auto emitters = static_cast<std::size_t>(train.emitters());
@@ -112,7 +112,7 @@ double usual_noise(const NumberedShots& shots, ShotRange rows, const sensors::Se
                    rounding / static_cast<double>(std::max<std::size_t>(1, rows.size())));
 }
 
-/// A start from windows long enough to tell all rotors apart. Slips within them bend it by degrees.
+/// A start from windows long enough to separate all rotors. Slips within them bend it by degrees.
 std::optional<Start> coarse_start(NumberedShots& shots, ShotRange range,
                                   const sensors::Sensor& sensor, bool in_turn,
                                   std::optional<bool> decided, const Progress& progress) {
@@ -398,7 +398,7 @@ ShotCount find_slips(const CountedShots& counted, const sensors::Sensor& sensor,
   require_above("shot rate", counted.shot_rate, 0, "Hz");
   constexpr double kOtherRate = 0.05;
   ShotCount result;
-  // Of a recording that was thinned nobody knows what a row is worth.
+  // In a thinned recording, the value of a row is unknown.
   if (std::abs(counted.shot_rate / sensor.shot_rate - 1.0) > kOtherRate) return result;
   NumberedShots shots;
   shots.series = counted.series;

@@ -21,7 +21,7 @@ namespace {
 
 /// Shots that are predicted and tested together.
 constexpr std::size_t kTestedShots = 96;
-/// Blocks behind a suspicious one that may be needed to tell what happened there.
+/// Blocks after a suspicious one that may be needed to find out what happened there.
 constexpr std::size_t kMostBlocksAhead = 8;
 /// Time over which a prediction is held against shots, s: rotors hardly bend in it.
 constexpr double kLongestTest = 0.012;
@@ -30,7 +30,7 @@ constexpr double kLongestTest = 0.012;
 constexpr std::int64_t kDoubledShots = 96, kUsualSlip = 120, kNearSlip = 200, kFarSlip = 2000;
 /// A slip, and its size, are believed from this difference of chi2 on.
 constexpr double kSure = 30.0;
-/// Residuals that hang together count for less; by so much at most.
+/// Largest factor by which correlated residuals count for less.
 constexpr double kMostCorrelation = 10.0;
 /// Losses of single shots end at 1 / softening: mean losses near it say that nothing fits.
 constexpr double kSoftening = softening_at(1.0);
@@ -42,8 +42,8 @@ constexpr double kLostSteps = 8.0;
 constexpr double kLooseShots = 0.15;
 /// Of the start about the truth.
 constexpr double kAnchorAngleSigma = radians_from_degrees(0.5), kAnchorSpeedShare = 1e-3;
-/// Packets of the formats hold so many shots. Recorders lose some at their borders: so many slips,
-/// and such a share of them, tell where in the count the borders are.
+/// Shots in packets of the formats. Recorders lose some at their borders: so many slips,
+/// and such a share of them, show where in the count the borders are.
 constexpr std::int64_t kPacketShots[] = {96, 100};
 constexpr std::size_t kFewestAtBorders = 5;
 constexpr double kShareAtBorders = 0.7;
@@ -65,7 +65,7 @@ class Follower : private BlockFit {
   }
 
   /// Fits a state to all places, as if they were free of slips.
-  /// @param from  noise with which that begins: by so much directions may be missed at first, rad
+  /// @param from  initial noise: how far directions may be off at first, rad
   /// @return scale of the residuals, rad
   double settle(RotorState& state, double from) {
     load(0, count_, 0);
@@ -461,7 +461,7 @@ class Follower : private BlockFit {
 };
 
 /// Moves slips to the borders of packets where most are there: at some rotation angles rotors that
-/// turn against each other do not tell by some dozens of shots where it was.
+/// turn against each other leave it open by some dozens of shots where it was.
 void move_to_borders(const NumberedShots& shots, ShotRange range, std::vector<FoundSlip>& slips) {
   if (slips.size() < kFewestAtBorders) return;
   const auto past = [](std::int64_t number, std::int64_t border, std::int64_t packet) {

@@ -14,7 +14,7 @@
 
 namespace risley::estimation {
 
-/// Noise is not taken below this share of the step from shot to shot: nobody needs it better.
+/// Noise is not taken below this share of the step from shot to shot: better is not needed.
 inline constexpr double kLeastNoiseSteps = 0.2;
 /// The valid shots of a recording by their numbers in the count.
 struct NumberedShots {
@@ -33,7 +33,7 @@ struct NumberedShots {
     return firing_order[static_cast<std::size_t>(((number[i] + lag) % emitters + emitters) %
                                                  emitters)];
   }
-  /// Shot i as it is where so many shots are missing before it.
+  /// Shot i if this many shots are missing before it.
   void append_to(AngleSeries& to, std::size_t i, std::int64_t lag) const {
     to.append(time_ns(i, lag), series.azimuth[i], series.zenith[i], beam(i, lag),
               series.azimuth_rounding_variance[i], series.zenith_rounding_variance[i]);
@@ -63,7 +63,7 @@ struct Anchor {
 
 /// Fits a state to all of some shots, as if they were free of slips.
 /// @param noise  of the shots about the fit, rad; more than kLeastNoiseSteps is taken
-/// @param from   noise with which that begins: by so much directions may be missed at first, rad
+/// @param from   initial noise: how far directions may be off at first, rad
 /// @return scale of the residuals, rad
 double settle(const NumberedShots& shots, ShotRange rows, const Start& start, double noise,
               double from, RotorState& state);

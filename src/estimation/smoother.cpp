@@ -60,7 +60,7 @@ class Smoother {
       Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::ColMajor, kMostKnotStates<N>, kMostFree + 1>;
   using AffineMap = Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic>>;
   using Coupling = Eigen::Map<const Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>;
-  /// Knots on their way forward, with their rows of what they tell of the parameters.
+  /// Knots on their way forward, with their rows of information about the parameters.
   struct AheadBlock {
     std::size_t begin = 0, end = 0;
     std::array<Eigen::MatrixXd, kStageKnots / kStackedKnots> left, right;
@@ -194,7 +194,7 @@ class Smoother {
   Eigen::Index stacked_row(std::size_t place) const {
     return static_cast<Eigen::Index>(place % kStackedKnots) * 3 * d();
   }
-  /// The right side of what a knot tells of the parameters, see share().
+  /// The right side of a knot's information about the parameters, see share().
   void keep_for_sharing(std::size_t place, const Affine& x, const Affine& e, const Affine& moved,
                         AheadBlock& block) const {
     Eigen::MatrixXd& rows = block.right[place / kStackedKnots];
@@ -207,8 +207,8 @@ class Smoother {
       }
     }
   }
-  /// What knots tell of the parameters: (gradient, information) -= X^T (E, e) - C^T (X, x) +
-  /// E^T P (E, e), as one product of many knots' rows.
+  /// The knots' information about the parameters: (gradient, information) -= X^T (E, e) - C^T (X,
+  /// x) + E^T P (E, e), as one product of many knots' rows.
   void share(AheadBlock& block) {
     for (std::size_t first = block.begin, part = 0; first < block.end;
          first += kStackedKnots, ++part) {
@@ -400,7 +400,7 @@ class Smoother {
   Eigen::Index free_;
   /// After each knot's shots, then after all shots.
   std::vector<double> filtered_, covariances_;
-  Eigen::MatrixXd shared_;  ///< what the knots tell of the parameters
+  Eigen::MatrixXd shared_;  ///< the knots' information about the parameters
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
 };

@@ -26,8 +26,8 @@ constexpr std::size_t kFewestLineShots = 40;
 constexpr std::size_t kEnoughLineShots = 1000;
 /// Steps of the frequency grid per resolved frequency, 1 / duration.
 constexpr double kOversampling = 8.0;
-/// What holds constant and lines back where shots in a corner of the field tell little of them, as
-/// shares of the shots. Lines of higher order, which the fit leaves out, are a tenth of the two.
+/// What holds constant and lines back where shots in a corner of the field say little about them,
+/// as shares of the shots. Lines of higher order, which the fit leaves out, are a tenth of the two.
 constexpr double kConstantRidge = 1e-4, kLineRidge = 1e-5;
 
 /// The stretch of about a window's length that holds most shots; the earliest of similar ones.
@@ -120,7 +120,7 @@ LineSearch::LineSearch(const AngleSeries& series) {
   if (series.size() < kFewestLineShots || series.duration() < kShortestStart) {
     throw EstimationError(
         fmt::format("the recording holds {} valid shots over {:.4f} s, at least {} shots over {} s "
-                    "are needed to tell the rotors apart",
+                    "are needed to separate the rotors",
                     series.size(), series.duration(), kFewestLineShots, kShortestStart));
   }
   // A short window keeps the drift of the speeds small; slow recordings need a longer one.
@@ -133,7 +133,7 @@ LineSearch::LineSearch(const AngleSeries& series) {
   if (shots_.size() < kFewestLineShots || duration_ < 0.999 * kShortestStart) {
     throw EstimationError(fmt::format(
         "the best {:.4f} s of the recording's start hold {} valid shots, at least {} over {} s are "
-        "needed to tell the rotors apart",
+        "needed to separate the rotors",
         duration_, shots_.size(), kFewestLineShots, kShortestStart));
   }
   time_ns_ = first + (last - first) / 2;

@@ -3,8 +3,11 @@
 #include "risley/hashes/sha256.hpp"
 
 #include <memory>
+#include <mutex>
+#include <shared_mutex>
 
 #include <fmt/format.h>
+#include <openssl/crypto.h>
 #include <openssl/evp.h>
 
 #include "risley/core/error.hpp"
@@ -14,6 +17,21 @@
 namespace risley::hashes {
 
 namespace {
+
+/// A call of the library, during which nobody forks (see ForkLock). The library keeps data of each
+/// thread that has called it. It frees them when the thread ends, by tables that it frees itself
+/// when the process ends, which is when oneTBB's threads end: whichever came second would use freed
+/// memory. So no data stay.
+class LibraryCall {
+ public:
+  LibraryCall() = default;
+  ~LibraryCall() { ::OPENSSL_thread_stop(); }
+  LibraryCall(const LibraryCall&) = delete;
+  LibraryCall& operator=(const LibraryCall&) = delete;
+
+ private:
+  std::shared_lock<std::shared_mutex> lock_ = io::ForkLock::instance().share();
+};
 
 void require_done(bool done) {
   if (!done) throw Error("SHA-256 is not available in the cryptographic library (OpenSSL)");
@@ -28,17 +46,18 @@ std::string hexadecimal(const unsigned char* digest, unsigned int length) {
 }  // namespace
 
 std::string sha256_of_file(const io::InputFile& file, const Progress& progress) {
-  auto in_library = io::ForkLock::instance().share();
-  const std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(EVP_MD_CTX_new(),
-                                                                   EVP_MD_CTX_free);
-  require_done(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
-  in_library.unlock();
+  std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)> context(nullptr, EVP_MD_CTX_free);
+  {
+    const LibraryCall call;
+    context.reset(EVP_MD_CTX_new());
+    require_done(context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1);
+  }
   io::read_bytes(file, [&](std::span<const char> bytes) {
     progress.check();
-    const auto again = io::ForkLock::instance().share();
+    const LibraryCall call;
     require_done(EVP_DigestUpdate(context.get(), bytes.data(), bytes.size()) == 1);
   });
-  in_library = io::ForkLock::instance().share();
+  const LibraryCall call;
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_DigestFinal_ex(context.get(), digest, &length) == 1);
@@ -46,7 +65,7 @@ std::string sha256_of_file(const io::InputFile& file, const Progress& progress) 
 }
 
 std::string sha256(std::string_view text) {
-  const auto in_library = io::ForkLock::instance().share();
+  const LibraryCall call;
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);
@@ -54,7 +73,7 @@ std::string sha256(std::string_view text) {
 }
 
 std::string sha256_base64(std::string_view text) {
-  const auto in_library = io::ForkLock::instance().share();
+  const LibraryCall call;
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);

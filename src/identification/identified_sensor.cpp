@@ -132,7 +132,7 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
     widest = std::max(widest, std::acos(std::cos(azimuth) * std::cos(elevation)));
   }
   sensor.field_of_view = 2 * widest;
-  sensor.pointing_tolerance = 0;  // nobody has specified this one
+  sensor.pointing_tolerance = 0;  // none is specified
   sensor.angle_noise = best.fit.rms;
 
   const auto sigma_of = [&](const std::string& parameter) -> std::optional<double> {

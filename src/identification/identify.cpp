@@ -23,15 +23,15 @@
 namespace risley::identification {
 namespace {
 
-/// Lines are looked for in so much of a scan, s, or in so many shots if that is longer; where no
-/// train fits, rotors may turn nearly alike, and longer windows tell their lines apart.
+/// Part of a scan in which lines are searched, s, or number of shots if that is longer; where no
+/// train fits, rotors may turn nearly alike, and longer windows separate their lines.
 constexpr double kLineWindow = 1.0;
 constexpr double kLineShots = 4096;
 constexpr double kLongerWindow = 4;
-/// Trains are tried on a window of about so long, s, with so many shots.
+/// Window on which trains are tried, s, and its number of shots.
 constexpr double kTrialWindow = 0.15;
 constexpr std::size_t kTrialShots = 600;
-/// Before that, all arrangements are tried roughly; so many of them go on, and of those so many.
+/// Before that, all arrangements are tried roughly; numbers of those that go on in two steps.
 constexpr std::size_t kRoughShots = 150;
 constexpr double kRoughTolerance = 1e-3, kHopelessSet = 4;
 constexpr std::size_t kPromising = 96, kTriedInFull = 16;
@@ -41,21 +41,21 @@ constexpr double kHopeless = 10;
 constexpr std::size_t kFewestRivals = 3;
 /// A further prism must bring what is left down to this share: one that moves the beam does.
 constexpr double kFurtherPrism = 0.5;
-/// No more than so much of a recording is looked at, s.
+/// Longest part of a recording that is used, s.
 constexpr double kLongest = 10;
-/// Trains are compared on so many shots of the whole stretch.
+/// Shots of the whole stretch on which trains are compared.
 constexpr std::size_t kComparedShots = 12'000;
-/// The best and its close rivals are fitted to so many.
+/// Shots to which the best and its close rivals are fitted.
 constexpr std::size_t kMostShots = 1'500'000;
 /// The strongest lines, of which some are the rotors' own.
 constexpr std::size_t kOwnLines = 5;
 /// Wedges and indices from which a fit starts: the deviation is that of the line.
 constexpr std::array<double, 3> kStartIndex{1.45, 1.6, 1.85};
-/// A wedge and a reflector are tried with so many angles between them, each with the speeds of any
-/// two of so many lines.
+/// Angles between a wedge and a reflector that are tried, each with the speeds of any two of this
+/// many lines.
 constexpr int kReflectorPhases = 12;
 constexpr std::size_t kReflectorLines = 4;
-/// A scan reaches all around where each of so many sectors about Z holds a tenth of its share.
+/// A scan reaches all around if each of these sectors about Z holds a tenth of its share.
 constexpr std::size_t kSectors = 36;
 constexpr double kFewestInSector = 0.1;
 /// A frame that is turned by more than an emitter can lean is a turned frame.
@@ -99,7 +99,7 @@ std::vector<Arrangement> arrangements(std::vector<std::size_t> lines) {
   return all;
 }
 
-/// Sets of so many of the first lines, those of the strongest lines first.
+/// Sets of a number of the first lines, those of the strongest lines first.
 std::vector<std::vector<std::size_t>> line_sets(std::size_t lines, std::size_t size) {
   std::vector<std::vector<std::size_t>> sets;
   for (unsigned bits = 0; bits < (1U << lines); ++bits) {
@@ -116,7 +116,7 @@ std::vector<std::vector<std::size_t>> line_sets(std::size_t lines, std::size_t s
   return sets;
 }
 
-/// About so many shots, in whole rounds of the emitters.
+/// About this many shots, in whole rounds of the emitters.
 ShotGrid thinned(const ShotGrid& grid, std::size_t begin, std::size_t end, std::size_t most) {
   const std::size_t every = std::max<std::size_t>(1, (end - begin + most - 1) / most);
   const auto round = static_cast<std::size_t>(grid.emitters);
@@ -220,7 +220,7 @@ class TrainSearch {
     for (int k = 0; k < prisms; ++k) {
       const Line& own = spectrum_.lines[arrangement.lines[static_cast<std::size_t>(k)]];
       model.train.set_place(place::refractive_index(k), index);
-      // A beam that meets the perpendicular face upright leaves the other one so much aside.
+      // Deviation of a beam that meets the perpendicular face upright.
       const double aside = std::asin(std::min(0.95, std::abs(own.amplitude)));
       model.train.set_place(place::wedge_angle(k),
                             thinner * std::atan2(std::sin(aside), index - std::cos(aside)));
@@ -663,7 +663,7 @@ class TrainSearch {
       if (rival.excess > kFairLead) break;
       const TrainFit fit =
           fit_train(scan, rival.fit.model, result.freedom, {.iterations = 25}, progress_.silent());
-      // Of a single emitter's first prism only tilts tell the faces, and barely.
+      // Only tilts reveal the faces of a single emitter's first prism, and barely.
       if (fit.rms < most ||
           (grid_.emitters == 1 && only_first_faces_differ(rival, result.hypotheses.front()))) {
         same.push_back(h);

@@ -18,14 +18,14 @@ namespace risley::identification {
 namespace {
 
 /// Shots are averaged over cells of whole turns of any number of emitters up to six, as long as
-/// there are so many cells per second left.
+/// this many cells per second are left.
 constexpr double kFewestCellsPerSecond = 1500;
-/// A line is one where its power stands out of the mean power of the spectrum by so much.
+/// Least power of a line over the mean power of the spectrum.
 constexpr double kLinePower = 30;
 /// A rotor that does not turn evenly has a wide line: nothing is looked for so near to one that was
 /// found, in widths of a line.
 constexpr double kLineWidths = 2.5;
-/// A pattern of the emitters is one where the means of its places stand out of chance by so much.
+/// Least significance of the means of places for a pattern of emitters.
 constexpr double kPatternPower = 50;
 /// A shorter period explains as much as any where it explains this share.
 constexpr double kPatternShare = 0.97;
@@ -71,7 +71,7 @@ Cells cells_of(const ShotGrid& grid, const std::vector<Complex>& value) {
   return cells;
 }
 
-/// Least squares of a constant and lines, whose speeds are improved by as many steps as asked for.
+/// Least squares of a constant and lines, whose speeds are improved in the given number of steps.
 class JointFit {
  public:
   explicit JointFit(const Cells& cells) : cells_(cells), middle_(middle_of(cells)) {}

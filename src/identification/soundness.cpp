@@ -12,7 +12,7 @@
 namespace risley::identification {
 namespace {
 
-/// A wedge of fewer sigmas is one that nobody saw.
+/// A wedge of fewer sigmas has not been seen.
 constexpr double kSeenSigmas = 3.0;
 /// Neighbouring residuals of noise are as good as independent. Of a train that leaves as much as
 /// the noise again, three hang together.

@@ -18,7 +18,7 @@ std::size_t row_at(const ShotGrid& grid, double time);
 /// Shots that count as one: neighbouring residuals that hang together.
 double correlation_factor(const TrainFit& fit);
 
-/// Chi squared by which the worse fit is worse, in units of what the better one leaves.
+/// Difference of the two fits' chi squared, in units of the better one's residual.
 double chi2_excess(const TrainFit& worse, const TrainFit& better);
 
 /// A model of part of a grid, fitted to all of it with that description of the rotors' motion.

@@ -17,7 +17,7 @@
 namespace risley::io {
 namespace {
 
-/// The disk gets so many bytes at once.
+/// Bytes that are written to the disk at once.
 constexpr std::uint64_t kDiskBytes = std::uint64_t{1} << 22;
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 using namespace std::string_view_literals;
 
-/// A program that packs files, told by how its files begin.
+/// A program that packs files, recognised by how its files begin.
 struct Packing {
   std::string_view signature, name, command;
 };

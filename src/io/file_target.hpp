@@ -15,7 +15,7 @@ namespace risley::io {
 struct FileTarget {
   std::string path;     ///< behind symbolic links
   bool copied = false;  ///< no regular file, or the name of an open one: bytes are copied into it
-  mode_t mode = 0666;   ///< of the temporary; nobody else reads it meanwhile
+  mode_t mode = 0666;   ///< of the temporary, which only this process reads
 };
 
 /// @throws FileError that names a path and a system's error

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kMemory = "/dev/shm";
-/// Others want memory, too, and there may be as many such folders as there are threads.
+/// Others need memory, too, and every thread may have such a folder.
 constexpr double kPlenty = 50.0;
 
 bool has_room(const char* folder, double bytes) {

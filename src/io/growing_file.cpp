@@ -151,7 +151,7 @@ void GrowingFile::hand_to_disk() {
   begun_ = written_;
   if (begun_ - on_disk_ <= kMostOnTheWay) return;
   const std::uint64_t settled = begun_ - kMostOnTheWay;
-  // Who waits is told of a disk that failed, and nobody after him: commit() would not be.
+  // A failed write is reported once; a later commit() does not repeat it.
   if (sync(on_disk_, settled,
            SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER) != 0 &&
       (errno == EIO || errno == ENOSPC || errno == EDQUOT)) {

@@ -67,7 +67,7 @@ bool locks_are_shared(int file) {
 
 /// Marks an open file as one that somebody is writing. The kernel takes the lock back when its
 /// owner ends in whatever way; numbers of processes, which containers share, play no part.
-/// @return whether this is its only owner; nobody is where there are no such locks
+/// @return whether this is its only owner; false without such locks
 bool lock(int file) {
   if (locks_are_shared(file)) return false;
   struct flock whole_file {};
@@ -163,7 +163,7 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
       if (temporary_ < 0 && error != EEXIST) refuse(path_, error);
       if (temporary_ < 0) continue;
       lock(temporary_);
-      if (is_named(temporary_, temporary_path_)) continue;  // nobody took it for an orphan
+      if (is_named(temporary_, temporary_path_)) continue;  // it was not taken for an orphan
       forget_temporary(temporary_path_);
       ::close(temporary_);
       temporary_ = -1;

@@ -61,7 +61,7 @@ std::string canonical(const YamlNode& node) {
   return fmt::format("{{{}}}", fmt::join(parts, ","));
 }
 
-/// How a value is told: as it is written.
+/// A value as text: as it is written.
 std::string shown(const YamlNode& node) {
   return node.kind == YamlNode::Kind::scalar ? node.scalar : canonical(node);
 }
@@ -273,7 +273,7 @@ class PlanReader {
         job.additional.push_back(io::yaml_text(item, path_, "a name in " + map.field("free")));
       }
     }
-    // Unknown names and values out of bounds are told before the first cell.
+    // Unknown names and values out of bounds are refused before the first cell.
     sensors::Sensor held = believed;
     hold(job.fixed, held);
     estimation::free_parameters(job.additional, shape);
@@ -351,9 +351,9 @@ std::uint64_t count_of(const std::vector<GridAxis>& axes, const std::string& pat
   for (const GridAxis& axis : axes) {
     count *= axis.values.size();
     if (count > kMostSettings) {
-      fail_at(path, axis.line,
-              fmt::format("grid: more than {} combinations, at most so many are allowed",
-                          kMostSettings));
+      fail_at(
+          path, axis.line,
+          fmt::format("grid: more than {} combinations, which is the most allowed", kMostSettings));
     }
   }
   return count;

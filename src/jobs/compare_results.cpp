@@ -32,7 +32,7 @@ namespace {
 using algebra::NamedCovariance;
 using sensors::Sensor;
 
-constexpr std::size_t kBeams = 2000;  // over all rotation angles; tell a mean square to 3 %
+constexpr std::size_t kBeams = 2000;  // over all rotation angles; give a mean square to 3 %
 
 double sigma_of(const NamedCovariance& known, const std::string& name) {
   const Eigen::Index at = known.find(name);

@@ -14,7 +14,7 @@
 namespace risley::jobs {
 namespace {
 
-/// The header to write, with a type of sensor where the recording does not tell it.
+/// The header to write, with a type of sensor where the recording does not state it.
 recordings::RecordingHeader header_of(PreparedRecording& input,
                                       const ConvertRecordingOptions& options,
                                       ConvertedRecording& result, const Progress& progress) {
@@ -32,7 +32,7 @@ recordings::RecordingHeader header_of(PreparedRecording& input,
     return header;
   }
   recordings::Device& device = header.devices.front();
-  // What has no preset cannot be told from others by its scan.
+  // A type without a preset cannot be recognised by its scan.
   const bool named = device.type != recordings::kUnknownDeviceType &&
                      (!device.type_inferred || !preset_of_type(device.type));
   if (named || header.devices.size() > 1) return header;

@@ -56,7 +56,7 @@ class Chance {
   Chance(std::uint64_t seed, std::uint64_t purpose, double share)
       : random_(seed, purpose), share_(share) {}
   bool falls() { return share_ > 0 && random_.uniform(index_++) < share_; }
-  /// A whole number from 1 to most.
+  /// A whole number from 1 to the largest.
   int count(int most) {
     return 1 + std::min(most - 1, static_cast<int>(random_.uniform(index_++) * most));
   }

@@ -23,7 +23,7 @@ namespace {
 using algebra::NamedCovariance;
 using sensors::Sensor;
 
-/// Of Student's distribution that robust z has among so many units; docs/theory/fleet.md
+/// Of the Student's distribution of robust z among this many units; docs/theory/fleet.md
 double degrees_of_freedom(std::size_t units) {
   const auto n = static_cast<double>(units);
   return std::min(0.5 * (n - 1), 0.37 * n + 0.7);

@@ -38,7 +38,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
       reading.report(reader->fraction_read());
     }
   } catch (const FileError& error) {
-    result.damage = error;  // what was sound before is still told
+    result.damage = error;  // what was sound before is still reported
   }
   result.header = reader->header();
   result.audit = audit.result();

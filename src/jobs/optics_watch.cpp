@@ -25,7 +25,7 @@ namespace {
 using recordings::livox::PacketDecoder;
 using recordings::livox::ShotGrid;
 
-/// What the thread has of a sensor, and nobody else.
+/// What only the thread has of a sensor.
 struct Followed {
   std::optional<PacketDecoder> decoder;  // of the first generation
   std::optional<estimation::RunningEstimate> estimate;
@@ -143,7 +143,7 @@ class OpticsWatch::Work {
       follow(one);
     } catch (const Cancelled&) {
       throw;
-    } catch (const recordings::livox::BadPacket&) {  // who writes the file counts it
+    } catch (const recordings::livox::BadPacket&) {  // counted by the writer of the file
     } catch (const std::exception& error) {          // such as no memory: the recording goes on
       const std::scoped_lock lock(mutex_);
       health_[one.sensor].words = error.what();

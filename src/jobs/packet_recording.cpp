@@ -15,7 +15,7 @@ namespace {
 
 using recordings::kNoPlace;
 
-/// Shots of fewer packets tell nothing of rotors.
+/// Shots of fewer packets do not show the rotors.
 constexpr std::size_t kFewestPackets = 10;
 
 }  // namespace

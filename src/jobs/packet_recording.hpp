@@ -37,7 +37,7 @@ class PacketRecording {
 
   /// Follows the rotors to find when each shot was fired.
   /// @param shot_rate  within packets, Hz, if it was given
-  /// @throws EstimationError when untold shots are left out and next to nothing is left
+  /// @throws EstimationError when shots without a time are left out and hardly any remain
   PlacedRows place_rows(const sensors::Sensor& sensor, std::optional<double> shot_rate,
                         UntoldShots untold, const Progress& progress) const;
 

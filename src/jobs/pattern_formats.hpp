@@ -33,7 +33,7 @@ class PatternStream {
   void put(const std::string& text);
 
   /// Puts what `text` makes of every piece of the pattern, in its order.
-  /// @param pass  of so many over the whole pattern, counted from 0
+  /// @param pass  number of the pass over the whole pattern, from 0
   void put_rows(const std::function<std::string(const sensors::ScanPattern&)>& text, int pass = 0,
                 int passes = 1);
 

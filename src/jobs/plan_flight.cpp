@@ -21,7 +21,7 @@
 namespace risley::jobs {
 namespace {
 
-/// What a minute of any recording tells of an index: docs/theory/flight.md
+/// Sigma of an index from a minute of any recording: docs/theory/flight.md
 constexpr double kToldIndex = 1e-5;
 
 std::vector<cloud::StripLine> lines_of(const calibration::PlannedFlight& planned) {
@@ -119,13 +119,13 @@ PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress
   own.knot_spacing = options.knot_spacing;
   own.cell_size = options.cell_size;
   own.seed = options.seed;
-  // A recording tells the indices by itself, before strips are compared.
+  // A recording determines the indices by itself, before strips are compared.
   for (const sensors::Knowledge& known : std::vector(own.sensor.knowledge)) {
     if (!known.name.starts_with("refractive_index") || known.name == "refractive_index_air" ||
         known.sigma <= kToldIndex) {
       continue;
     }
-    own.sensor.set_knowledge({known.name, kToldIndex, "a recording tells it", 0});
+    own.sensor.set_knowledge({known.name, kToldIndex, "determined by a recording", 0});
   }
   calibration::PlannedFlight planned{own.sensor, options.mount, options.plan, {}};
   if (options.terrain) {

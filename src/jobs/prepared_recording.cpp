@@ -153,7 +153,7 @@ std::optional<estimation::CountedShots> counted_shots(const recordings::Source& 
 estimation::ShotCount count_of(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
                                const Progress& progress) {
   for (const std::uint8_t beam : shots.series.beam) {
-    if (beam >= sensor.train.emitters()) return {};  // who estimates refuses it
+    if (beam >= sensor.train.emitters()) return {};  // the estimator refuses it
   }
   return estimation::find_slips(shots, sensor, progress);
 }
@@ -340,7 +340,7 @@ void mend_count(PreparedRecording& recording, const Progress& progress) {
   recordings::ReadOptions& reading = recording.reading;
   const int emitters = sensor.train.emitters();
   const bool given = reading.shot_rate.has_value();
-  if (recording.reader->header().devices.size() != 1) {  // nobody knows whose shots are missing
+  if (recording.reader->header().devices.size() != 1) {  // it is unknown whose shots are missing
     if (!given || emitters == 1) return;
     reading.emitters = emitters;
     reading.firing_order = estimation::emitters_in_order(choice.order, emitters);

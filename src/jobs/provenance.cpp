@@ -15,7 +15,7 @@ namespace risley::jobs {
 
 namespace {
 
-/// Pipes and the like: who reads them again waits forever, or finds nothing.
+/// Pipes and the like: reading them again waits forever, or finds nothing.
 bool is_read_once(const std::string& path) {
   const auto type = std::filesystem::status(path).type();
   using Type = std::filesystem::file_type;

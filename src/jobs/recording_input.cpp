@@ -80,7 +80,7 @@ void warn_of_left_out(const estimation::SelectionCounts& counts, std::vector<War
   }
   if (counts.equal_times > 0) {
     warn(warnings, kWarning.shots_unused,
-         "{} of {} shots have the time of the shot before, so that nobody knows when they were "
+         "{} of {} shots have the time of the shot before, so that it is unknown when they were "
          "fired, and were left out: {} counts shots, where none is missing",
          counts.equal_times, counts.rows, name_of(kSetting.shot_rate));
   }

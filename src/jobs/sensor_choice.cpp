@@ -32,7 +32,7 @@ using estimation::SensorMatch;
 using estimation::SensorRecognition;
 using sensors::Sensor;
 
-/// A variant of a sensor's optics is tried where the residuals of its own are so many times what
+/// A variant of a sensor's optics is tried if the residuals of its own are this many times what
 /// its noise and the recording's rounding leave, and taken where it leaves this share of them.
 constexpr double kPoorOptics = 3.0, kBetterOptics = 0.5;
 /// Times are at fault where counted shots leave this share of what the times do.
@@ -195,7 +195,7 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
     choice.sensor = sensors::load_sensor(kUsualSensor);
     if (!found) {
       choice.fits = false;
-      call_it_a_guess(choice, "because nothing tells");
+      call_it_a_guess(choice, "because the scan does not show it");
       return;
     }
   }
@@ -561,7 +561,7 @@ AngleSeries first_second(const recordings::Source& source, const recordings::Rea
 std::optional<Sensor> preset_of_type(int device_type) {
   const auto* type = recordings::livox_type(static_cast<std::uint8_t>(device_type));
   if (type == nullptr) return std::nullopt;
-  // Of some types nobody knows the optics.
+  // The optics of some types are unknown.
   const std::string name = lower_case(std::string(type->name));
   const auto known = sensors::builtin_preset_names();
   if (std::find(known.begin(), known.end(), name) == known.end()) return std::nullopt;
@@ -587,7 +587,7 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
   choice.beyond_reach =
       recordings::beyond_reach(shots.head.range, reach, choice.sensor.name).value_or("");
   if (choice.beyond_reach.empty()) choice.beyond_reach = too_near_words(shots.head, choice.sensor);
-  // What no sensor reaches the reader tells.
+  // The reader reports what no sensor reaches.
   if (!choice.beyond_reach.empty() &&
       !recordings::beyond_reach(shots.head.range, recordings::kFarthestReach, "")) {
     choice.warnings.push_back({kWarning.implausible_values, choice.beyond_reach});

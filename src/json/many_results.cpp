@@ -219,7 +219,7 @@ std::string calibration_text(const jobs::RecordingCloud& made) {
   return fmt::format("{} ({})", made.calibration,
                      made.calibrated_against == CalibrationReference::none ? "a preset"
                      : made.calibrated_against == CalibrationReference::directions
-                         ? "an estimate; only walls tell whether it is true"
+                         ? "an estimate; only walls show whether it is true"
                          : "a calibration");
 }
 

@@ -36,7 +36,7 @@ Json verdict_json(const Verdict& verdict) {
   return {{"code", to_string(verdict.code)}, {"words", verdict.words}, {"to_do", verdict.to_do}};
 }
 
-/// Which sensor it was and who says so: sensor, preset, sensor_chosen_by, sensor_choice.
+/// Which sensor it was and how that is known: sensor, preset, sensor_chosen_by, sensor_choice.
 Json choice_json(const jobs::SensorChoice& choice);
 
 /// A turn of a frame by the names of its angles, of which a sensor about Z has a roll, too.
@@ -52,7 +52,7 @@ Json slips_json(const std::vector<recordings::ShotSlip>& slips);
 /// Slips of all recordings, each with the name of its own.
 Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings);
 
-/// A combination of parameters that data do not tell.
+/// A combination of parameters that data do not determine.
 Json weak_direction_json(const estimation::WeakDirection& direction);
 
 /// Those of a job, then those of what it computed.

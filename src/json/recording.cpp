@@ -28,7 +28,7 @@ std::array<double, 3> yaw_pitch_roll_deg(const recordings::Extrinsics& pose) {
   return {deg(pose.yaw), deg(pose.pitch), deg(pose.roll)};
 }
 
-/// What only sensors of the second generation tell.
+/// What only sensors of the second generation report.
 Json numbered_json(const recordings::RecordingHeader& header, const recordings::Device& device,
                    const recordings::NumberedAudit& audit) {
   Json tags = Json::array();
@@ -93,7 +93,7 @@ Json excerpt_json(const recordings::Excerpt& excerpt) {
           {"does_not_hold", contents.lacks}};
 }
 
-/// What a reader tells of a recording, and how sound its times are.
+/// What a reader found in a recording, and how sound its times are.
 Json audit_json(const recordings::RecordingHeader& header, const TimeAuditResult& audit,
                 std::optional<double> time_uncertainty = {}) {
   const auto if_times = [&header](auto value) { return header.has_times ? Json(value) : Json(); };

@@ -60,6 +60,26 @@ const auto& solution_of(const Found& found) {
   }
 }
 
+py::list list_of(const std::vector<double>& numbers) { return py::cast(numbers); }
+py::list list_of(const Eigen::MatrixXd& matrix) {
+  py::list rows;
+  for (const auto& row : matrix.rowwise()) {
+    rows.append(std::vector<double>(row.begin(), row.end()));
+  }
+  return rows;
+}
+
+/// An array; where numpy is not installed, a list.
+template <auto column>
+py::object numbers_of(const ValueTable& table) {
+  try {
+    return array_of(table.*column);
+  } catch (const py::error_already_set& error) {
+    if (!error.matches(PyExc_ImportError)) throw;
+    return list_of(table.*column);
+  }
+}
+
 /// Columns with the covariance, which JSON does not have.
 template <class Found>
 ValueTable table_with_covariance(const Found& found) {
@@ -571,16 +591,11 @@ void bind_jobs(py::module_& module) {
   py::class_<ValueTable>(module, "ValueTable")
       .def_readonly("names", &ValueTable::names)
       .def_readonly("units", &ValueTable::units)
-      .def_property_readonly("values",
-                             [](const ValueTable& table) { return array_of(table.values); })
-      .def_property_readonly("sigmas",
-                             [](const ValueTable& table) { return array_of(table.sigmas); })
-      .def_property_readonly(
-          "sigmas_given_held",
-          [](const ValueTable& table) { return array_of(table.sigmas_given_held); })
+      .def_property_readonly("values", &numbers_of<&ValueTable::values>)
+      .def_property_readonly("sigmas", &numbers_of<&ValueTable::sigmas>)
+      .def_property_readonly("sigmas_given_held", &numbers_of<&ValueTable::sigmas_given_held>)
       .def_readonly("covariance_names", &ValueTable::covariance_names)
-      .def_property_readonly("covariance",
-                             [](const ValueTable& table) { return array_of(table.covariance); });
+      .def_property_readonly("covariance", &numbers_of<&ValueTable::covariance>);
   bind_found<EstimatedRecording>(module, "EstimatedRecording")
       .def_property_readonly("residuals",
                              [](const EstimatedRecording& found) {

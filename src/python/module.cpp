@@ -17,8 +17,12 @@ PYBIND11_MODULE(_risley, module) {
   module.def("radians", &risley::radians_from_degrees, py::arg("degrees"),
              "An angle in degrees as the libraries convert it, rad.");
   // pybind11 looks for numpy once, at its first array; two threads that made theirs at a time would
-  // wait for each other for ever.
-  py::dtype::of<double>();
+  // wait for each other for ever. Without numpy all works that makes no arrays.
+  try {
+    py::dtype::of<double>();
+  } catch (const py::error_already_set& error) {
+    if (!error.matches(PyExc_ImportError)) throw;
+  }
   bind_errors(module);
   bind_calls(module);
   bind_recordings(module);

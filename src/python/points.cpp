@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <memory>
 #include <new>
@@ -15,7 +14,6 @@
 
 #include <nlohmann/json.hpp>
 #include <pybind11/stl.h>
-#include <sys/mman.h>
 
 #include "risley/jobs/cloud_of_recording.hpp"
 #include "risley/json/results.hpp"
@@ -33,7 +31,8 @@ using cloud::CloudHeader;
 using cloud::PointColumn;
 using cloud::Points;
 
-/// Memory that grows at its end: of much of it the system moves the pages and copies nothing.
+/// Memory that grows at its end: of much of it the system moves the pages and copies nothing. Large
+/// pages would take it longer to clear than to give small ones it has cleared lately.
 class GrowingMemory {
  public:
   std::byte* end_of(std::size_t more) {
@@ -43,7 +42,6 @@ class GrowingMemory {
       if (grown == nullptr) throw std::bad_alloc();
       static_cast<void>(memory_.release());
       memory_.reset(static_cast<std::byte*>(grown));
-      ask_for_large_pages();
     }
     std::byte* end = memory_.get() + used_;
     used_ += more;
@@ -59,15 +57,6 @@ class GrowingMemory {
   }
 
  private:
-  /// Small pages take the system as long to give as points to compute; it may refuse.
-  void ask_for_large_pages() {
-    constexpr std::uintptr_t kPage = 4096, kLarge = std::uintptr_t{1} << 22;
-    if (capacity_ < kLarge) return;
-    const auto begin = (reinterpret_cast<std::uintptr_t>(memory_.get()) + kPage - 1) & ~(kPage - 1);
-    const auto end = reinterpret_cast<std::uintptr_t>(memory_.get()) + capacity_;
-    static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
-  }
-
   static constexpr std::size_t kLeast = 1;
   struct Free {
     void operator()(std::byte* memory) const { std::free(memory); }
@@ -184,9 +173,31 @@ class PointArrays {
                   GrowingMemory& memory) {
     const std::size_t width = columns.size();
     auto* to = reinterpret_cast<Number*>(memory.end_of(rows * width * sizeof(Number)));
-    for (std::size_t i = 0; i < width; ++i) {
-      const Number* from = columns[i];
-      for (std::size_t row = 0; row < rows; ++row) to[row * width + i] = from[row];
+    switch (width) {
+      case 1:
+        std::copy_n(columns.front(), rows, to);
+        break;
+      case 2:
+        interleave<2>(columns, rows, to);
+        break;
+      case 3:
+        interleave<3>(columns, rows, to);
+        break;
+      case 9:
+        interleave<9>(columns, rows, to);
+        break;
+      default:
+        interleave<0>(columns, rows, to);
+    }
+  }
+
+  /// Memory is written once, from its begin to its end. @tparam width  0: known only at run time
+  template <std::size_t width, class Number>
+  static void interleave(const std::vector<const Number*>& columns, std::size_t rows, Number* to) {
+    const std::size_t count = width == 0 ? columns.size() : width;
+    const Number* const* const from = columns.data();
+    for (std::size_t row = 0; row < rows; ++row) {
+      for (std::size_t i = 0; i < count; ++i) *to++ = from[i][row];
     }
   }
 

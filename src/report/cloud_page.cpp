@@ -22,7 +22,7 @@ using cloud::RangeClass;
 
 constexpr double kLowShare = 0.02, kHighShare = 0.98;  // where colours end
 
-/// Values as a page draws them, whose digits beyond a step nobody sees.
+/// Values as a page draws them: digits beyond a step are invisible.
 std::vector<double> stepped(const std::vector<double>& values, double scale, double step) {
   std::vector<double> result(values.size());
   std::transform(values.begin(), values.end(), result.begin(),

@@ -19,7 +19,7 @@ using cloud::DensitySquare;
 using cloud::PointDistributionSummary;
 using cloud::StripDistribution;
 
-/// Profiles that are told apart by their colours.
+/// Profiles that their colours distinguish.
 constexpr std::size_t kMostProfiles = 6;
 constexpr std::size_t kMostStripRows = 200;
 

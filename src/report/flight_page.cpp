@@ -25,7 +25,7 @@ using json::Json;
 
 /// Pairs of strips in the table, those with the most ground in common.
 constexpr std::size_t kMostPairs = 200;
-/// A pair of strips keeps this sigma of a shift that its ground does not tell, m.
+/// A pair of strips keeps this sigma of a shift that its ground does not determine, m.
 constexpr double kUntoldShift = 0.99;
 /// Component of a sensor's axis along the vertical from which on it counts as vertical.
 constexpr double kUpright = 0.8;
@@ -246,7 +246,8 @@ std::string mount_html(const View& r) {
 std::string prisms_html(const View& r) {
   return unknowns_table(r, true) +
          "<p class=\"note\">Nominal: the preset. A pitch or yaw that all beams share can hardly "
-         "be told from the boresight, so single angles may be known less well than the directions "
+         "be separated from the boresight, so single angles may be known less well than the "
+         "directions "
          "of the beams.</p>\n";
 }
 
@@ -292,7 +293,7 @@ std::string directions_html(const View& r) {
                     finite_text("{:.0f}", height));
 }
 
-/// What a combination that is not told means to somebody who flies.
+/// What an undetermined combination means for a flight.
 std::string advice_of(const Axes& axes, const std::string& combination) {
   const auto has = [&](std::string_view name) {
     return combination.find(name) != std::string::npos;
@@ -303,7 +304,7 @@ std::string advice_of(const Axes& axes, const std::string& combination) {
   }
   if (has("lever_arm") && has("clock_offset")) {
     return "At one speed, a sensor that sits further ahead and one whose clock is late look the "
-           "same. Strips at two speeds tell them apart.";
+           "same. Strips at two speeds separate them.";
   }
   if (has("lever_arm_z") && has("range_offset")) {
     return "Both raise or lower all ground. Points of known height determine them.";

@@ -42,7 +42,7 @@
   const least = (values) => finite(values).reduce((a, b) => Math.min(a, b), Infinity);
   const most = (values) => finite(values).reduce((a, b) => Math.max(a, b), -Infinity);
   const every = (one, key) => one.series.flatMap((series) => series[key]);
-  // Digits that tell values from each other: more than six where they differ little.
+  // Digits that distinguish values: more than six where they differ little.
   const digitsOf = (values) => {
     const from = least(values), to = most(values), size = Math.max(Math.abs(from), Math.abs(to));
     if (!(to > from) || !Number.isFinite(size)) return 6;
@@ -642,7 +642,7 @@
     if (window.risley) page.dataset.drawn = String(drawn.length);
   }
 
-  // Diagrams that nobody has unfolded have no room, and are made when somebody does.
+  // Folded diagrams have no room; they are made when they are unfolded.
   const isFolded = ({ id }) => document.getElementById(id).closest('details:not([open])') !== null;
   const isDrawn = (one) => drawn.some((entry) => entry.data === one);
 

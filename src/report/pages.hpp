@@ -54,7 +54,7 @@ bool any_held_parameter(const View& parameters);
 /// NaN where a list by name does not have it.
 double number_of(const View& by_name, const std::string& name);
 
-/// Combinations that data do not tell, in words.
+/// Combinations that data do not determine, in words.
 std::vector<std::string> weak_directions(const View& unobservable);
 /// The box at the top of a page, as far as all results have it.
 Verdict verdict_of(const View& report);

@@ -23,7 +23,7 @@ using jobs::ComparedUnit;
 using jobs::ComparedUnits;
 using jobs::ParameterDifference;
 
-/// More than so many are no help to a reader.
+/// More do not help a reader.
 constexpr std::size_t kMostPairsShown = 500;
 
 std::size_t changes_of(const ComparedUnits& compared) {

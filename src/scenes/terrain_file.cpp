@@ -164,7 +164,7 @@ Terrain read_terrain(const YamlMap& map, Names& names) {
   try {
     if (has("village")) add_village(read_village(map.section("village")), parts);
     return Terrain(std::move(parts));
-  } catch (const InvalidArgument& error) {  // what no single field tells
+  } catch (const InvalidArgument& error) {  // what no single field shows
     fail_at(map.path(), map.line(), fmt::format("terrain: {}", error.what()));
   }
 }

@@ -108,7 +108,7 @@ class WallRay {
 
  private:
   /// The first root of a ray that may meet the surface several times. As long as
-  /// f + f' s - bend s^2 / 2 > 0 or f - slope s > 0 it has not met it.
+  /// f + f' s - bend s^2 / 2 > 0 or f - slope s > 0 the wall has not been met.
   Root first_root(double begin, double end, double depth, double side, bool crosses) const {
     const double bend = wall_.shape.strongest_bend() * tangent_ * tangent_;
     const double slope = std::abs(along_.height) + wall_.shape.steepest() * tangent_;

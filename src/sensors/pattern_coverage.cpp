@@ -69,7 +69,7 @@ class Grid {
     return {coordinate(column, columns_), coordinate(row, rows_)};
   }
   /// The least chord across one of many cells side by side over its edge, where none of them is
-  /// farther than so much from the horizon; of the azimuthal map within the half sphere.
+  /// farther than this from the horizon; of the azimuthal map within the half sphere.
   double narrowest(double greatest_elevation) const {
     if (!all_around_) return 0.5;
     return 2 / kPi * std::min(scale_, std::cos(greatest_elevation) / scale_);

@@ -30,7 +30,7 @@ const trajectories::Trajectory& checked_trajectory(const Platform& platform) {
   return *platform.trajectory;
 }
 
-/// Time of the trajectory in s, with as many decimals as tell.
+/// Time of the trajectory in s, with as many decimals as are significant.
 std::string time_text(std::int64_t time_ns) {
   return fmt::format("{:.6f} s", static_cast<long double>(time_ns) * 1e-9L);
 }

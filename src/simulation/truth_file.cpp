@@ -20,7 +20,7 @@
 namespace risley::simulation {
 namespace {
 
-/// Files that are removed again unless all is well.
+/// Files that are removed again unless everything succeeds.
 class FilesInProgress {
  public:
   FilesInProgress() = default;

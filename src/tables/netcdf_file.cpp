@@ -41,7 +41,7 @@ std::string shape_of(std::span<const NetcdfDimension> dimensions) {
 /// Whether values of a dataset lie in other files.
 bool lies_elsewhere(hid_t group, const char* name) {
   const hid_t object = H5Oopen(group, name, H5P_DEFAULT);
-  if (object < 0) return false;  // who reads it is told
+  if (object < 0) return false;  // reading it fails
   bool elsewhere = false;
   if (H5Iget_type(object) == H5I_DATASET) {
     const hid_t properties = H5Dget_create_plist(object);

@@ -46,7 +46,7 @@ class Parcel {
     bytes_.append(text);
     return *this;
   }
-  /// Room for so many bytes at the end.
+  /// Makes room for more bytes at the end.
   char* extend(std::size_t size) {
     bytes_.resize(bytes_.size() + size);
     return bytes_.data() + bytes_.size() - size;

@@ -422,7 +422,7 @@ FlightPlan parse_flight_plan(const std::string& text, const std::string& path) {
   }
   try {
     require_flight_plan(plan);
-  } catch (const InvalidArgument& error) {  // what no single field tells
+  } catch (const InvalidArgument& error) {  // what no single field shows
     fail_at(path, root.line(), error.what());
   }
   return plan;

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""tools/check_simd_symbols.py tells harmless symbols from functions that could leak."""
+"""tools/check_simd_symbols.py separates harmless symbols from functions that could leak."""
 import os
 import pathlib
 import subprocess

@@ -53,7 +53,7 @@ const extents = (tab, { index }) => tab.evaluate((k) => window.looking.extents(k
 const frames = (tab) => tab.evaluate(() => new Promise((done) =>
   requestAnimationFrame(() => requestAnimationFrame(done))));
 
-// What is read when it is good, or at last, for those who tell why it is not.
+// The last value read, whether or not it became good, for the message of a failure.
 async function whenGood(tab, read, good, patience = longestReaction) {
   const last = performance.now() + patience;
   for (;;) {
@@ -96,7 +96,7 @@ export function checkFile(file) {
   return size > largestFile ? [`${size} bytes, allowed ${largestFile}`] : [];
 }
 
-// Every figure stands in the page, is named for those who do not see it, and shows its data.
+// Every figure stands in the page, has a name for screen readers, and shows its data.
 export async function checkDrawn(tab) {
   await look(tab);
   const complaints = [];
@@ -314,7 +314,7 @@ export async function checkRotation(tab) {
 }
 
 // The button changes the colours, everything is drawn in both, and the way back is the way back.
-// Colours that stand for different things in one diagram are told apart by those who see fewer, and
+// Colours that stand for different things in one diagram stay distinct with colour blindness, and
 // scales run from dark to light or have their middle at one end of it, light and dark.
 export async function checkColours(tab) {
   const complaints = [];

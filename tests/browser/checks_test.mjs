@@ -76,7 +76,7 @@ async function withPage(html, visit, viewport = usualView, unfolded = true) {
   try {
     return await visit(opened.tab, opened.complaints, file);
   } catch (error) {
-    await opened.context.close(); // nobody knows in which state it is
+    await opened.context.close(); // its state is unknown
     opened = undefined;
     throw error;
   }
@@ -101,7 +101,7 @@ test('no values at all', () => withPage(
   page.replace(/"(x|y|value)":\[[^\]]*\]/g, '"$1":[]'),
   async (tab) => complains(await checks.checkDrawn(tab), /holds no values/)));
 
-test('values that nobody sees', () => withPage(
+test('invisible values', () => withPage(
   replaced('const tone = colour(series.colour);', "const tone = 'transparent';"),
   async (tab) => {
     const complaints = await checks.checkDrawn(tab);
@@ -126,7 +126,7 @@ test('a warning on the console', () => withPage(
   addScript("console.warn('take care')"),
   async (tab, said) => complains(said, /warning on the console: take care/)));
 
-test('an error that nobody caught', () => withPage(
+test('an uncaught error', () => withPage(
   addScript("setTimeout(() => { throw new Error('oh') })"),
   async (tab, said) => {
     if (said.length === 0) await tab.waitForEvent('pageerror'); // it may be still to come

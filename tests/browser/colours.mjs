@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// How colours look to those who see fewer of them. Colours are texts such as "#0b76e0".
+// How colours look with colour blindness. Colours are texts such as "#0b76e0".
 
 // Linear RGB as dichromats see it: Machado, Oliveira, Fernandes 2009, severity 1.
 export const eyes = {

@@ -105,7 +105,7 @@ function install() {
     const way = tone.map((v, i) => v - panel[i]);
     const from = panel.map((v, i) => pixel[i] - v);
     const square = way.reduce((sum, v) => sum + v * v, 0);
-    if (square < 400) return false; // nobody could see it
+    if (square < 400) return false; // too small to see
     const share = way.reduce((sum, v, i) => sum + v * from[i], 0) / square;
     if (share < thinnest || share > 1.1) return false;
     return Math.hypot(...way.map((v, i) => from[i] - Math.min(share, 1) * v)) < tolerance;
@@ -237,7 +237,7 @@ function install() {
       style.display !== 'none' && tip.textContent.length > 0;
     const text = visible ? tip.textContent : '';
     const numbers = visible ? [...tip.querySelectorAll('b')].map((one) => Number(one.textContent)) : [];
-    // As far as a value can be told from the others along its axis, whichever series they are of.
+    // As far as a value differs visibly from the others along its axis, whichever series they are of.
     const spread = (axis) => {
       const known = one.data.series.flatMap((series) => series[axis]).filter((v) => v !== null);
       return known.reduce((a, v) => Math.max(a, Math.abs(v - known[0])), 0);

@@ -42,7 +42,7 @@ after(() => browser?.close());
 export function inspect(name, make, says, whole = true) {
   const testScript = whole ? test : () => undefined;
   const making = made.then(make);
-  made = making.catch(() => {}); // the tests of this page tell
+  made = making.catch(() => {}); // reported by the tests of this page
   describe(name, () => {
     let page, file;
     const good = async (complaints) => assert.deepEqual(await complaints, []);
@@ -91,7 +91,7 @@ export function inspect(name, make, says, whole = true) {
     });
     testScript('prints', () => good(checks.checkPrint(page.tab, artefact('.pdf'))));
     testScript('changes its colours', () => good(checks.checkTheme(page.tab)));
-    test('has colours that everybody tells apart', () => good(checks.checkColours(page.tab)));
+    test('has colours that stay distinct with colour blindness', () => good(checks.checkColours(page.tab)));
     test('shows values under the mouse', () => good(checks.checkHover(page.tab)));
     testScript('zooms and moves with the mouse', () => good(checks.checkMouse(page.tab)));
     testScript('rotates what has three dimensions', () => good(checks.checkRotation(page.tab)));

@@ -1,7 +1,7 @@
 #!/usr/bin/env node
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The page of a recording that runs, in a browser: it follows, tells of a bend, and keeps its policy.
+// The page of a recording that runs, in a browser: it follows, reports a bend, and keeps its policy.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { once } from 'node:events';
@@ -52,7 +52,7 @@ test('it shows what comes, and names from the network as text', async () => {
   await sees(/Rotors: .*deg\/s/);
 });
 
-test('it tells of a bend', async () => {
+test('it reports a bend', async () => {
   await sees(/Alarm: the optics have changed: prism_tilt_b_vertical_deg by \+0\.0(1[89]|2[01])/);
   assert.ok(await opened.tab.locator('tr').filter({ hasText: 'prism_tilt_b_vertical_deg' }).count() > 0);
 });

@@ -141,7 +141,7 @@ TEST(Forecast, IsItWithStationsAndKnownPlanesToo) {
   expect_adjustment(plan);
 }
 
-/// A prior of the angles that is narrow against what the shots tell, and no word of the index.
+/// A prior of the angles that is narrow beside what the shots determine, and none of the index.
 TEST(Forecast, PriorsAreOfAngles) {
   CalibrationPlan plan = plan_of(corner());
   plan.duration = 40;
@@ -366,7 +366,7 @@ TEST(CalibrationParameters, AreTheTiltsThatWallsTell) {
   EXPECT_THROW(calibration_parameters({2}, {"bearing_tilt_c_vertical_deg"}, {}), InvalidArgument);
 }
 
-// What the preset states of a tilt that directions do not tell is its prior; wedges stay held.
+// What the preset states of a tilt that directions do not determine is its prior; wedges stay held.
 TEST(AdjustedParameters, AreThoseAndTheTiltsWithAPrior) {
   const sensors::Sensor sensor = sensors::load_sensor("mid-40");
   const AdjustedParameters all = adjusted_parameters(sensor, {}, {}, std::nullopt);

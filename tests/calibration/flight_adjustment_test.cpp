@@ -169,7 +169,7 @@ TEST(FlightAdjustment, RecoversTheTrajectorysCorrections) {
                 .model;
     known.poses = poses_of(known.flight.shots, known.interpolation, model.clock_offset);
   }
-  // Differences between strips are told, what they have in common is not.
+  // Differences between strips are determined, what they have in common is not.
   VectorXd before = VectorXd::Zero(6), after = VectorXd::Zero(6);
   const auto& knots = model.knots;
   for (std::size_t k = 0; k < knots.size(); ++k) {

@@ -126,8 +126,8 @@ TEST(FlightCalibration, CorrectsTheTrajectory) {
   EXPECT_FALSE(found.piece_rms.empty());
 }
 
-/// Whether nothing that was not told has the word.
-bool told(const FlightCalibration& found, const std::string& word) {
+/// Whether nothing undetermined contains the word.
+bool determined(const FlightCalibration& found, const std::string& word) {
   return std::ranges::none_of(found.not_told, [&](const NotTold& own) {
     return own.words.find(word) != std::string::npos;
   });
@@ -144,10 +144,10 @@ TEST(FlightCalibration, NamesWhatALevelFlightDoesNotTell) {
     options.coarse_shots = 40000;
     options.knot_spacing = 2;
     const FlightCalibration found = calibrate_flight(flight.shots, flight.trajectory, options);
-    EXPECT_FALSE(told(found, "lever_arm_z_m"));
-    EXPECT_FALSE(told(found, "clock_offset_s"));  // against lever_arm_x_m
-    EXPECT_TRUE(told(found, "boresight_y_deg"));
-    EXPECT_TRUE(told(found, "boresight_z_deg"));
+    EXPECT_FALSE(determined(found, "lever_arm_z_m"));
+    EXPECT_FALSE(determined(found, "clock_offset_s"));  // against lever_arm_x_m
+    EXPECT_TRUE(determined(found, "boresight_y_deg"));
+    EXPECT_TRUE(determined(found, "boresight_z_deg"));
     EXPECT_GT(found.unknowns[FlightUnknowns::lever_arm(2)].prior_share, 0.8);
     EXPECT_LT(found.unknowns[1].prior_share, 0.01);
     const double off = flight_errors(flight, settings, found).error[0];
@@ -156,12 +156,12 @@ TEST(FlightCalibration, NamesWhatALevelFlightDoesNotTell) {
     if (flat) {
       EXPECT_GT(found.unknowns[0].sigma, 0.3 * found.unknowns[0].prior_sigma);
     } else {
-      EXPECT_FALSE(told(found, "heading"));
+      EXPECT_FALSE(determined(found, "heading"));
     }
   }
 }
 
-// Cells that lean by chance seem to tell of shifts across them, and of the yaw to 0.3 degree.
+// Cells that lean by chance seem to determine shifts across them, and the yaw to 0.3 degree.
 TEST(FlightCalibration, FlatGroundTellsOfTheYawWhatItStates) {
   const int seeds = testing::seeds_or(4);
   double squares = 0;
@@ -232,7 +232,7 @@ double seen_height(const FlightCalibration& found) {
   return sum / count;
 }
 
-// Nothing else tells the mean height of a flight, nor the lever arm's.
+// Nothing else determines the mean height of a flight, nor the lever arm's.
 TEST(FlightCalibration, KnownGroundFixesTheHeight) {
   FlightSettings settings = short_flight();
   settings.seed = 5;

@@ -108,25 +108,25 @@ TEST(FlightForecast, SaysWhatACalibrationStates) {
     PlannedFlight planned;
     planned.plan = plan_of(settings.headings_deg, settings.strip_length, settings.attitude_rms_deg);
     planned.terrain = terrain_of(flight);
-    const FlightForecast told = forecast(planned, options);
-    EXPECT_NEAR(told.datum.total, made.datum.total, 0.1 * made.datum.total);
-    EXPECT_NEAR(told.datum.shape, made.datum.shape, 0.1 * made.datum.shape);
-    EXPECT_NEAR(told.datum.height, made.datum.height, 1);
-    ASSERT_EQ(told.unknowns.size(), made.unknowns.size());
-    for (std::size_t i = 0; i < told.unknowns.size(); ++i) {
-      EXPECT_EQ(told.unknowns[i].name, made.unknowns[i].name);
-      EXPECT_EQ(told.unknowns[i].held, made.unknowns[i].held);
-      EXPECT_NEAR(told.unknowns[i].sigma, made.unknowns[i].sigma, 0.35 * made.unknowns[i].sigma)
-          << told.unknowns[i].name;
+    const FlightForecast promised = forecast(planned, options);
+    EXPECT_NEAR(promised.datum.total, made.datum.total, 0.1 * made.datum.total);
+    EXPECT_NEAR(promised.datum.shape, made.datum.shape, 0.1 * made.datum.shape);
+    EXPECT_NEAR(promised.datum.height, made.datum.height, 1);
+    ASSERT_EQ(promised.unknowns.size(), made.unknowns.size());
+    for (std::size_t i = 0; i < promised.unknowns.size(); ++i) {
+      EXPECT_EQ(promised.unknowns[i].name, made.unknowns[i].name);
+      EXPECT_EQ(promised.unknowns[i].held, made.unknowns[i].held);
+      EXPECT_NEAR(promised.unknowns[i].sigma, made.unknowns[i].sigma, 0.35 * made.unknowns[i].sigma)
+          << promised.unknowns[i].name;
     }
     RecordProperty(still ? "still" : "swaying",
-                   std::to_string(told.datum.total / made.datum.total) + " " +
-                       std::to_string(told.datum.shape / made.datum.shape));
+                   std::to_string(promised.datum.total / made.datum.total) + " " +
+                       std::to_string(promised.datum.shape / made.datum.shape));
   }
 }
 
-/// Whether nothing that is not told has the word.
-bool told(const FlightForecast& found, const std::string& word) {
+/// Whether nothing undetermined contains the word.
+bool determined(const FlightForecast& found, const std::string& word) {
   return std::ranges::none_of(found.not_told, [&](const NotTold& own) {
     return own.words.find(word) != std::string::npos;
   });
@@ -136,14 +136,14 @@ TEST(FlightForecast, NamesWhatALevelFlightWillNotTell) {
   FlightForecastOptions options = options_for(2000);
   options.calibration.knot_spacing = 2;
   const FlightForecast level = forecast(flat_flight({90, 270}, 60, 0.01), options);
-  EXPECT_FALSE(told(level, "lever_arm_z_m"));
-  EXPECT_FALSE(told(level, "clock_offset_s"));
+  EXPECT_FALSE(determined(level, "lever_arm_z_m"));
+  EXPECT_FALSE(determined(level, "clock_offset_s"));
   // The little that it sways leaves the yaw a third of what was known before.
   EXPECT_GT(level.unknowns[0].sigma, 0.3 * level.unknowns[0].prior_sigma);
-  EXPECT_TRUE(told(level, "boresight_y_deg"));
-  EXPECT_TRUE(told(level, "boresight_z_deg"));
+  EXPECT_TRUE(determined(level, "boresight_y_deg"));
+  EXPECT_TRUE(determined(level, "boresight_z_deg"));
   const FlightForecast swaying = forecast(flat_flight({90, 270, 0, 180}, 60, 2), options);
-  EXPECT_TRUE(told(swaying, "boresight_x_deg"));
+  EXPECT_TRUE(determined(swaying, "boresight_x_deg"));
   EXPECT_LT(swaying.datum.total, 0.5 * level.datum.total);
 }
 
@@ -207,7 +207,7 @@ TEST(FlightForecast, FailsInWords) {
               HasSubstr("nonsense"));
   EXPECT_NE(refused([](auto&, auto& p) { p.plan.strips.clear(); }), "");
   EXPECT_NE(refused([](auto&, auto& p) { p.terrain.ground.reset(); }), "");
-  // Errors of the trajectory that only its accuracies could tell, and a plan has none.
+  // Errors of the trajectory are known only from its accuracies, and a plan has none.
   EXPECT_NE(
       refused([](auto& o, auto&) { o.calibration.errors = trajectories::assumed_error_model(); }),
       "");

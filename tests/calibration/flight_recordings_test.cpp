@@ -54,7 +54,7 @@ TEST(FlightRecordings, AreTheShotsOfTheStripsInTheOrderOfTime) {
   EXPECT_NEAR(flight.rotation_angle_sigma, std::sqrt(3e-6), 1e-9);
   EXPECT_DOUBLE_EQ(flight.shots.rotation_angle[1][0], -0.05);
   require_flight_shots(flight.shots);
-  // What the sensor says of itself counts, where nobody knows better.
+  // What the sensor states counts, unless something better is known.
   EXPECT_EQ(flight.sensor.get("refractive_index"), 1.5123);
   EXPECT_EQ(flight.sensor.find_knowledge("refractive_index")->sigma, 2e-6);
   sensors::Sensor calibrated = nominal;

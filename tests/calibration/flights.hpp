@@ -229,7 +229,7 @@ class SimulatedFlight {
   calibration::FlightCalibrationOptions options() const {
     calibration::FlightCalibrationOptions options;
     options.sensor = sensors::load_sensor("mid-40");
-    // What a recording tells by itself.
+    // What a recording determines by itself.
     options.sensor.set("refractive_index", sensor.get("refractive_index"));
     options.sensor.set_knowledge({"refractive_index", 1e-5, "its own estimate", 0});
     options.errors = settings_.errors;

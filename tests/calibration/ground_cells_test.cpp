@@ -160,7 +160,7 @@ TEST(GroundCells, TellTheShiftBetweenStrips) {
     EXPECT_NEAR(pairs[0].shift[k], shift[k], std::max(4 * pairs[0].sigma[k], 0.003));
     EXPECT_LT(pairs[0].sigma[k], 0.005);
   }
-  // Flat ground tells nothing but heights.
+  // Flat ground determines only heights.
   const TwoStrips flat([](double, double) { return 0; }, shift, 0.001, 200000);
   const GroundCells level = ground_cells(flat.points, flat.strip, {});
   const auto heights = strip_pairs(flat.points, flat.strip, level.plane, level.planes, 1);

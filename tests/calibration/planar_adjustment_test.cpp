@@ -521,7 +521,7 @@ TEST(PlanarAdjustment, EveryUnknownTakesAShot) {
               static_cast<double>(solution.shots) - 7 - 4 - 2, 1e-6);
 }
 
-/// An emitter whose shots met no wall is not known, and nobody else is the worse for it.
+/// An emitter whose shots met no wall stays unknown and does not harm the others.
 TEST(PlanarAdjustment, AParameterThatNoShotTellsLeavesTheOthersAlone) {
   const scenes::Scene scene = corner();
   PlanarProblem one =
@@ -569,7 +569,7 @@ TEST(PlanarAdjustment, InformationLeavesOutThePriorsOfParameters) {
   }
 }
 
-/// A plane across the beam tells the shape of the bundle of beams and not where it points.
+/// A plane across the beam determines the shape of the bundle of beams, not where it points.
 TEST(PlanarAdjustment, APlaneAcrossTheBeamLeavesDirectionsUnknown) {
   PlanarProblem p = planar_problem(some_train(), kGeometry, {{wall("across", 0, 90, 30)}, {}},
                                    kRangeNoise, {5000, kRangeNoise, 0, 0, 14});

@@ -124,7 +124,7 @@ TEST(WallMatching, AWallSeenFromBehindIsTheSame) {
   EXPECT_NEAR(dot(view.tangent_2, view.plane.normal), 0.0, 1e-15);
 }
 
-/// Parallel walls are told apart by their distances in the scene.
+/// Parallel walls are distinguished by their distances in the scene.
 TEST(WallMatching, PositionsShiftDistances) {
   const scenes::ScenePlane near = wall("near", 0, 90, 8), far = wall("far", 0, 90, 14);
   const scenes::Station back = station("back", 0, 0, 0, 0.05),
@@ -238,7 +238,7 @@ TEST(WallMatching, NamesAStationThatSharesNothing) {
   found = {found_from(0, kUpright, kLeft), found_from(1, third, kLeft),
            found_from(2, kFlipped, scene.planes[1])};
   EXPECT_NO_THROW(match_walls(found, {"one", "two", "three"}, scene, {kUpright, third, kFlipped}));
-  // A station that found no plane at all says nothing wrong, and one alone has nobody to share
+  // A station that found no plane at all does no harm, and one alone has no other to share
   // with.
   found = {found_from(0, kUpright, kLeft), found_from(1, third, kLeft)};
   EXPECT_NO_THROW(

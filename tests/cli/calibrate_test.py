@@ -276,7 +276,7 @@ class CalibrateTest(CommandTest):
         self.assertNotIn("range_offset_m", self.calibration_of("held"))
 
     def test_prior(self):
-        """A wall that faces the sensor tells nothing of the direction that all beams share."""
+        """A wall that faces the sensor does not determine the direction that all beams share."""
         self.simulate("facing.nc", self.write("facing.yaml", wall(30, 0)), seconds=10)
         result = self.refused(1, ("incident_beam", "--prior-sigma-deg"), "facing.nc")
         self.assertTrue(result["unobservable"])
@@ -329,7 +329,7 @@ class CalibrateTest(CommandTest):
             self.assertTrue(any(word in text for text in poor["advice"]), word)
         text = self.expect(0, *arguments).stdout
         self.assertIn("advice: ", text)
-        self.assertIn("not told by these walls: ", text)
+        self.assertIn("not determined by these walls: ", text)
         self.assertIn("share %", text)
         kept = self.expect_json(0, *arguments, "--prior-sigma-deg", "0.1")
         self.assertLess(kept["parameters"]["incident_beam_vertical_deg"]["sigma"], 0.1)
@@ -383,7 +383,7 @@ class CalibrateTest(CommandTest):
     def test_recordings_of_different_sensors(self):
         self.simulate("other.nc", HALL, "--set", "incident_beam_vertical_deg=0.3")
         self.refused(2, ("hall.nc", "other.nc", "serial number"), "hall.nc", "other.nc")
-        # Without serial numbers the believed parameters tell.
+        # Without serial numbers the believed parameters decide.
         self.simulate("other.csv", HALL, "--set", "incident_beam_vertical_deg=0.3", "--reported",
                       "incident_beam_vertical_deg=0.3")
         self.refused(1, ("hall.csv", "incident_beam_vertical_deg"), "hall.csv", "other.csv")

@@ -125,7 +125,7 @@ class ChainTest(CommandTest):
         self.assertIn("prism_tilt_a_horizontal_deg", result["parameters"])
         self.assertEqual(result["fixed"]["refractive_index_a"], 1.51)
         self.expect(2, "estimate", "fix.csv", "--fix", "no_such_parameter")
-        # The batch estimator knows that this data cannot tell the tilt, and names it.
+        # The batch estimator notices that these data do not determine the tilt, and names it.
         result = self.expect_json(1, "estimate", "fix.csv", "--noise-angle-deg", "0.01",
                                   "--free", "prism_tilt_a_horizontal_deg")
         self.assertFalse(result["converged"])
@@ -198,8 +198,8 @@ class ChainTest(CommandTest):
             if name.startswith("incident_beam"):
                 self.assertLess(seen["parameters"][name]["sigma"], 0.001)
         text = self.expect(0, *plan).stdout
-        self.assertIn("only the 6 emitters together tell", text)
-        self.assertIn("not told by emitter", text)
+        self.assertIn("only the 6 emitters together determine", text)
+        self.assertIn("not determined by emitter", text)
 
     def test_reported_nominal(self):
         arguments = ("--sensor", "mid-40-table3", "--rate-hz", "1000", "--duration-s", "0.2",

@@ -4,6 +4,7 @@
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,11 @@ def run(*arguments, folder=None):
     if "--json" in arguments:
         schemas.check_output(arguments, done.stdout)
     return done
+
+
+def verbs():
+    """The verbs that --help lists."""
+    return re.findall(r"^  ([a-z]+) ", run("--help").stdout, re.MULTILINE)
 
 
 def codes_of(result):
@@ -81,7 +87,7 @@ class ProcessTest(CommandTest):
         return process
 
     def skip_where_the_kernel_drops(self, recorded):
-        """What a sensor that waits for nobody sends cannot be kept where the kernel grants too little memory for it."""
+        """A sensor does not wait: without enough memory from the kernel, its packets cannot all be kept."""
         buffer = recorded["receive_buffer_bytes"]
         drops = sum(one["kernel_drops"] for one in recorded["sensors"])
         if drops > 0 and buffer["granted"] < buffer["asked"]:

@@ -10,7 +10,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from command import COMMAND, SOURCE, CommandTest
+from command import COMMAND, SOURCE, CommandTest, verbs
 
 FOLDER = tempfile.TemporaryDirectory()
 COMPLETIONS = Path(FOLDER.name) / "completions"
@@ -68,28 +68,28 @@ zpty -d shell
 
 
 class CommandWithVerbs(CommandTest):
-    def verbs(self):
-        text = self.expect(0, "--help").stdout
-        after = re.split("subcommands:", text, flags=re.IGNORECASE)[1]
-        return re.findall(r"^  ([a-z]+) ", after, re.MULTILINE)
-
     def declared(self, *verb):
         """The options of a verb. Descriptions may name other ones; only lines that begin with one declare it."""
-        text = self.expect(0, *verb, "--help").stdout
+        text = self.expect(0, *verb, "--help-all").stdout
         return set(re.findall(r"^\s+(?:-\w,\s*)?(--[a-z][a-z-]+)", text, re.MULTILINE))
 
     def choices(self, verb, option):
-        shown = re.search(option + r" TEXT:\{([^}]+)\}", self.expect(0, verb, "--help").stdout).group(1)
-        return {one.strip() for one in shown.split(",")}
+        text = self.expect(0, verb, "--help-all").stdout
+        shown = re.search(option + r" ([a-z-]+(\|[a-z-]+)+)", text)
+        if shown:
+            return set(shown.group(1).split("|"))
+        # A long list is part of the description.
+        entry = re.search(rf"^  {option} NAME(.*?)^(  \S|$)", text, re.MULTILINE | re.DOTALL).group(1)
+        return set(" ".join(entry.split()).partition("one of: ")[2].partition(" (")[0].split(", "))
 
 
 @unittest.skipUnless(shutil.which("bash"), "no bash")
 class CompletionTest(CommandWithVerbs):
     def test_verbs(self):
-        self.assertEqual(complete("risley", ""), set(self.verbs()))
+        self.assertEqual(complete("risley", ""), set(verbs()))
 
     def test_options(self):
-        for verb in self.verbs():
+        for verb in verbs():
             declared = self.declared(verb)
             self.assertGreater(len(declared), 5)
             self.assertEqual(complete("risley", verb, "--"), declared, verb)
@@ -126,11 +126,11 @@ class FishTest(CommandWithVerbs):
         return complete_in_fish(line, self.folder)
 
     def test_verbs(self):
-        self.assertEqual(self.complete("risley "), set(self.verbs()))
+        self.assertEqual(self.complete("risley "), set(verbs()))
         self.assertEqual(self.complete("risley preset "), {"list", "show", "check", "new"})
 
     def test_options(self):
-        for verb in self.verbs():
+        for verb in verbs():
             self.assertEqual({one for one in self.complete(f"risley {verb} --") if one.startswith("--")},
                              self.declared(verb), verb)
         self.assertLess(self.declared("preset", "new"), self.complete("risley preset new --"))
@@ -154,7 +154,7 @@ class ZshTest(CommandWithVerbs):
         return set(re.findall(r"<([^>]+)>", found.read_text()))
 
     def test_verbs(self):
-        self.assertEqual(self.complete("risley "), set(self.verbs()))
+        self.assertEqual(self.complete("risley "), set(verbs()))
         self.assertEqual(self.complete("risley preset "), {"list", "show", "check", "new"})
 
     def test_options(self):

@@ -4,8 +4,8 @@
 import sys
 
 HALL = "--sensor mid-40-table3 --reported nominal --scene data/hall.yaml"
-DAMAGED = ("cp out/unit.lvx out/damaged.lvx && "
-           "printf '\\377\\377' | dd of=out/damaged.lvx bs=1 seek=3000004 conv=notrunc status=none")
+DAMAGED = ("cp data/recordings/mid-40.lvx out/damaged.lvx && "
+           "printf '\\377\\377' | dd of=out/damaged.lvx bs=1 seek=300008 conv=notrunc status=none")
 
 # The tables of a reproduction as its text has them.
 TABLES = f"""{sys.executable} - <<'TEXT'
@@ -39,7 +39,7 @@ DATA = {
         *(f"risley simulate -o {station}.lvx --sensor mid-40-table3 --reported nominal "
           f"--scene stations.yaml --station '{station} right' --duration-s 1"
           for station in ("upright", "flipped")),
-        "mkdir flight && cp recording.lvx flight/",
+        "mkdir flight survey && cp recording.lvx flight/ && cp wall.lvx survey/",
         "risley calibrate wall.lvx --force -o march/ && cp -r march june && cp -r march november",
         "risley pattern --sensor horizon --format livox-csv --duration-s 0.1 -o sequence.csv",
         # A frame of a sensor in which no shot is missing, as points.

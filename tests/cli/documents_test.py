@@ -18,7 +18,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from command import COMMAND, SOURCE, run
+from command import COMMAND, SOURCE, run, verbs
 from documents_data import DATA, LEFT_OUT, MESSAGES, STATUS
 
 TOLD = "\036"  # before the exit status of a command
@@ -52,10 +52,10 @@ def commands_of(lines):
 
 
 def help_text():
-    """The examples of all verbs as one document of shell blocks."""
-    verbs = re.findall(r"^  ([a-z]+) ", run("--help").stdout.split("Subcommands:")[1], re.MULTILINE)
-    examples = [run(verb, "--help").stdout.split("Example:\n")[1] for verb in verbs]
-    return "".join(f"```sh\n{re.sub('^  ', '', text, flags=re.MULTILINE)}```\n" for text in examples)
+    """The examples of all verbs as one document of shell blocks, those first whose files others use."""
+    ordered = sorted(verbs(), key=lambda verb: {"simulate": 0, "estimate": 1, "calibrate": 1}.get(verb, 2))
+    examples = [run(verb, "--help").stdout.partition("Examples:\n")[2].partition("\n\n")[0] for verb in ordered]
+    return "".join(f"```sh\n{re.sub('^  ', '', text, flags=re.MULTILINE)}\n```\n" for text in examples)
 
 
 def plain(line):
@@ -149,7 +149,7 @@ class DocumentsTest(unittest.TestCase):
             skip_aloud(command, f"{name} is not set")
         return bool(missing)
 
-    def told(self, status, command):
+    def output_of(self, status, command):
         """What a command prints."""
         found, printed = self.shell.run(command)
         self.assertEqual(found, status, command + "\n".join(printed))
@@ -167,7 +167,7 @@ class DocumentsTest(unittest.TestCase):
             if reason:
                 skip_aloud(command.strip(), reason)
                 continue
-            printed.append(self.told(STATUS.get(command.strip(), 0), command))
+            printed.append(self.output_of(STATUS.get(command.strip(), 0), command))
         return printed
 
     def check_message(self, shown, commands):
@@ -175,7 +175,7 @@ class DocumentsTest(unittest.TestCase):
         for status, command in commands:
             if self.lacks(command):
                 return
-            printed += self.told(status, command)
+            printed += self.output_of(status, command)
         apart = ["..."] + [part for line in shown for part in (line, "...")]
         self.assertTrue(follows(apart, printed), "\n".join(["shown:", *shown, "printed:", *printed]))
 
@@ -195,7 +195,7 @@ class DocumentsTest(unittest.TestCase):
         for command in DATA.get(name, ()):
             if self.lacks(command):
                 self.skipTest("data")
-            self.told(0, command)
+            self.output_of(0, command)
         messages = dict(MESSAGES.get(name, {}))
         printed = []
         for language, lines in blocks_of(text):

@@ -241,7 +241,7 @@ class EmulateTest(ProcessTest):
         self.assertEqual([clock["source"] for clock in recorded["clocks"]], sources)
         self.assertEqual((recorded["clock_jumps"], truth["clock_jumps"]), (jumps, jumps))
         self.assertEqual([gap["cause"] for gap in recorded["gaps"]], ["clock"] * jumps)
-        # A packet that is lost where the clock jumps cannot be told from the jump.
+        # A packet that is lost where the clock jumps cannot be distinguished from the jump.
         self.assertTrue(truth["lost"] - 3 * jumps <= recorded["lost"] <= truth["lost"],
                         (truth["lost"], recorded["lost"]))
         self.assertEqual(recorded["rows"], truth["rows"])

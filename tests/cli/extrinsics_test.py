@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Recordings in the frame of a hub or a vehicle, with the pose told or stored in the file."""
+"""Recordings in the frame of a hub or a vehicle, with the pose given or stored in the file."""
 import math
 import struct
 import unittest

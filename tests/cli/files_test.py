@@ -15,7 +15,7 @@ import unittest
 from command import COMMAND, SANITIZED, SOURCE, CommandTest, codes_of, run
 
 HEADER = "Time/s,Azimuth/deg,Zenith/deg\n"
-# Name, content, and what message and JSON must tell.
+# Name, content, and what message and JSON must contain.
 BAD = [
     ("missing.lvx", None, "no such file", {}),
     ("empty.lvx", b"", "empty", {"byte_offset": 0}),
@@ -110,7 +110,7 @@ class FilesTest(CommandTest):
         self.assertEqual(self.names(), before)
 
     def test_a_run_without_a_bar_can_be_interrupted(self):
-        # Reading, estimating and judging; a plan has nothing that tells how far it is.
+        # Reading, estimating and judging; a plan reports no progress.
         self.expect(0, "simulate", "-o", "unit.nc", "--duration-s", "5")
         before = self.names()
         for wait in (0.2, 0.5, 1.0) if not SANITIZED else (5, 10):

@@ -149,7 +149,7 @@ class FleetTest(CommandTest):
                 row["seconds_total"] = ""
         self.assertEqual(again, before)
         shutil.copy(self.folder / "fleet/zenith.lvx", self.folder / "before.lvx")
-        try:  # another file of the same name; its time tells nothing
+        try:  # another file of the same name; its time proves nothing
             times = os.stat(self.folder / "fleet/zenith.lvx")
             shutil.copy(self.folder / "fleet/east/scan.lvx", self.folder / "fleet/zenith.lvx")
             os.utime(self.folder / "fleet/zenith.lvx", ns=(times.st_atime_ns, times.st_mtime_ns))

@@ -67,7 +67,7 @@ def send_with_room(sender, data, to):
 
 
 def packet(data_type, time_ns, number, timestamp_type=0, status=0):
-    """Its points tell the packet's number: depths, or X, of number * 1000 + record mm."""
+    """Its points contain the packet's number: depths, or X, of number * 1000 + record mm."""
     records, size, _, _ = TYPES[data_type]
     body = bytearray(struct.pack("<BBBBIBBQ", 5, 1, 1, 0, status, timestamp_type, data_type, time_ns))
     for record in range(records):

@@ -282,7 +282,7 @@ class MovingCloudTest(CommandTest):
                 self.assertIn(words, said)
                 self.assertTrue("crs" in said or crs in said, said)
                 self.assertNotIn("wrong.csv", self.names())
-        # The zone beside it works and is told with both places.
+        # The zone beside it works, with a warning that names both places.
         done = self.cloud(0, crs="EPSG:32633", output="beside.csv")
         (told,) = [one["message"] for one in done["warnings"] if one["code"] == "outside_map"]
         for words in ("UTM zone 33N", "longitude 12.00 to 18.00", "latitude 49.99"):

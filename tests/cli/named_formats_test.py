@@ -94,12 +94,12 @@ class NamedFormatsTest(CommandTest):
         info = self.expect_json(0, "info", "few.nc", "--shot-rate-hz", 100000)
         self.assertEqual(info["last_time_ns"], 40000)
         self.assertEqual(info["no_return"], 1)
-        told = self.expect(2, "convert", "few.csv", "-o", "few.lvx", "--shot-rate-hz", 100000)
-        self.assertIn("type 255 (unknown)", told.stderr)
+        failed = self.expect(2, "convert", "few.csv", "-o", "few.lvx", "--shot-rate-hz", 100000)
+        self.assertIn("type 255 (unknown)", failed.stderr)
         self.expect(0, "convert", "few.csv", "-o", "few.lvx", "--shot-rate-hz", 100000,
                     "--sensor-type", "mid-40")
-        told = self.expect(2, "convert", "few.lvx", "-o", "other.lvx", "--sensor-type", "avia")
-        self.assertIn("Mid-40", told.stderr)
+        failed = self.expect(2, "convert", "few.lvx", "-o", "other.lvx", "--sensor-type", "avia")
+        self.assertIn("Mid-40", failed.stderr)
         info = self.expect_json(0, "info", "few.lvx")
         self.assertEqual(info["observations"] - info["no_return"], 2)
 

@@ -65,7 +65,7 @@ class PatternTest(CommandTest):
         refused = run(*arguments, "-o", "-", "--json")
         self.assertEqual(refused.returncode, 2)
         self.assertIn("--json needs a file", refused.stderr)
-        # Shots of a group fire one after another, unless they are told to fire together.
+        # Shots of a group fire one after another, unless they are set to fire together.
         held = self.rows(self.expect(0, *arguments, "-o", "-", "--firing", "together").stdout)
         self.assertEqual(held[0], rows[0])
         self.assertNotEqual(held[1], rows[1])

@@ -63,7 +63,7 @@ class PcapTest(ProcessTest):
         kinds.append(("padded", pcap([(t, data + b"trailer") for t, data in links(sent)])))
         for number, (name, data) in enumerate(kinds):
             with self.subTest(name):
-                # Its name tells nothing.
+                # Its name says nothing.
                 devices, packets = self.packets(self.write(f"capture{number}.any", data))
                 self.assertEqual(devices, [("0TFDG3B006H2Z11", 0, MID_40)])
                 self.assertEqual(packets, [(0, one) for one in expected])

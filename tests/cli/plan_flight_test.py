@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Planning a flight: what its calibration will tell, and how its points will lie on the ground."""
+"""Planning a flight: what its calibration will determine, and how its points will lie on the ground."""
 import unittest
 
 from command import SOURCE, CommandTest
@@ -67,7 +67,7 @@ class PlanFlightTest(CommandTest):
 
     def test_words(self):
         said = self.expect(0, *self.plan(*MOUNT, *ERRORS, *QUICK))
-        for words in ("boresight and prisms together", "not told by this flight: ", "lever_arm_z_m",
+        for words in ("boresight and prisms together", "not determined by this flight: ", "lever_arm_z_m",
                       "strip against strip", "ANPD", "dense: width"):
             self.assertIn(words, said.stdout)
         self.assertIn("no terrain is given", said.stderr)

@@ -189,7 +189,7 @@ class RecordTest(ProcessTest):
         self.assertEqual(times, sensor.times[:len(times)])
         info = self.expect_json(0, "info", "killed.lvx.unfinished")
         self.assertEqual(info["observations"], 100 * len(times))
-        # Nobody writes over it; the next one is told so before it disturbs a sensor.
+        # It is not overwritten; the next one fails before it disturbs a sensor.
         self.wait_for(lambda: sensor.host is None)
         failed = self.expect_json(3, "record", "-o", "killed.lvx", "--interface", HOST)
         self.assertIn("killed.lvx.unfinished", failed["error"])
@@ -336,7 +336,7 @@ class RecordTest(ProcessTest):
         self.assertEqual(json.loads((self.folder / "elsewhere.json").read_text())["sensors"], [])
         result = json.loads((self.folder / "recorded.json").read_text())["sensors"][0]
         truth = json.loads((self.folder / "emulated.json").read_text())["sensors"][0]
-        # Between two sessions the sensor sends nothing, but nobody knows since when: the gap of a session says how many
+        # Between two sessions the sensor sends nothing, but since when is unknown: the gap of a session says how many
         # packets may be missing.
         of = {cause: sum(gap["lost"] for gap in result["gaps"] if gap["cause"] == cause) for cause in ("loss", "session")}
         self.assertGreater(of["session"], 0)

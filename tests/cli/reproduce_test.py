@@ -29,7 +29,7 @@ class ReproduceTest(CommandTest):
         schemas.check_output(["reproduce"], done.stdout)
         cls.result = json.loads(done.stdout)
         cls.status = done.returncode
-        if os.environ.get("RISLEY_REPRODUCED"):  # for others who look at the page
+        if os.environ.get("RISLEY_REPRODUCED"):  # for other tests of the page
             shutil.copytree(os.path.join(cls.folder, "result"), os.environ["RISLEY_REPRODUCED"],
                             dirs_exist_ok=True)
         cls.tables = cls.result["tables"]

@@ -10,7 +10,7 @@ import subprocess
 import unittest
 
 import schemas
-from command import COMMAND, SOURCE, CommandTest, run
+from command import COMMAND, SOURCE, CommandTest, run, verbs
 from trajectory_test import sbet, smrmsg
 
 DATA = SOURCE / "data"
@@ -269,8 +269,7 @@ class SchemasTest(CommandTest):
         cls.outputs.append((verb, json.loads(done.stdout)))
 
     def test_every_verb_has_a_schema(self):
-        verbs = run("--help").stdout.partition("Subcommands:")[2].partition("Exit status")[0]
-        known = re.findall(r"^  ([a-z-]+) ", verbs, re.M)
+        known = verbs()
         self.assertGreater(len(known), 10)
         self.assertEqual(sorted(known), schemas.VERBS)
 

@@ -80,17 +80,17 @@ class ThreeSensorsTest(ProcessTest):
             process.send_signal(signal.SIGTERM)
             truth.append(json.loads(process.communicate(timeout=20)[0])["sensors"][0])
         self.skip_where_the_kernel_drops(json.loads(out))
-        told = json.loads(out)["sensors"]
-        self.assertEqual([one["serial"] for one in told], codes)
+        result = json.loads(out)["sensors"]
+        self.assertEqual([one["serial"] for one in result], codes)
         wrong = ("lost", "duplicates", "reordered", "kernel_drops", "late", "rejected")
-        self.assertEqual([[one[name] for name in wrong] for one in told], [[0] * len(wrong)] * len(told), wrong)
+        self.assertEqual([[one[name] for name in wrong] for one in result], [[0] * len(wrong)] * len(result), wrong)
         for name in ("rows", "packets", "imu_samples"):
-            self.assertEqual([one[name] for one in told], [one[name] for one in truth], name)
+            self.assertEqual([one[name] for one in result], [one[name] for one in truth], name)
         seen, samples = self.compare(codes, sent)
         self.assertEqual(seen, [one["packets"] - one["imu_samples"] for one in truth])
         self.assertEqual(samples, [one["imu_samples"] for one in truth])
         size = (self.folder / "three.lvx").stat().st_size
-        print(f"{SECONDS:g} s at {SPEED} x: {sum(one['rows'] for one in told)} rows, {size / 1e9:.2f} GB, all as sent; "
+        print(f"{SECONDS:g} s at {SPEED} x: {sum(one['rows'] for one in result)} rows, {size / 1e9:.2f} GB, all as sent; "
               f"{seconds:.1f} s of one processor, {memory / 1e3:.0f} MB", flush=True)
         if LONG:
             self.assertLess(seconds, SECONDS)

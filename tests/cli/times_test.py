@@ -87,21 +87,21 @@ class TimesTest(CommandTest):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(result["observations_used"] + result["outliers"], len(rows))
             self.assertEqual(len(result["warnings"]), 1, result["warnings"])
-            told = json.loads(run("info", name, "--json", folder=self.folder).stdout)
-            self.assertEqual(told["time_resets"], 0)
+            result = json.loads(run("info", name, "--json", folder=self.folder).stdout)
+            self.assertEqual(result["time_resets"], 0)
         # Without times, and without the shots of a part of the field.
         write("removed.csv", "x_m,y_m,z_m", [row for row in rows if row[2] < 0.3])
         done, result = self.estimate("removed.csv", "--shot-rate-hz", 100000)
         self.assertEqual(done.returncode, 1)
         self.assertIn("removed", result["error"])
-        told = json.loads(run("info", "removed.csv", "--json", folder=self.folder).stdout)
-        self.assertIn("shots_lost", codes_of(told))
+        result = json.loads(run("info", "removed.csv", "--json", folder=self.folder).stdout)
+        self.assertIn("shots_lost", codes_of(result))
 
     def test_one_of_two_devices_can_be_chosen(self):
         both = [(i, packet) for pair in zip(*self.packets) for i, packet in enumerate(pair)]
         (self.folder / "two.lvx").write_bytes(lvx(self.tables, both))
-        told = json.loads(run("info", "two.lvx", "--json", folder=self.folder).stdout)
-        self.assertEqual([one["observations"] for one in told["devices"]], [15000, 15000])
+        result = json.loads(run("info", "two.lvx", "--json", folder=self.folder).stdout)
+        self.assertEqual([one["observations"] for one in result["devices"]], [15000, 15000])
         done, result = self.estimate("two.lvx")
         self.assertEqual(done.returncode, 2)
         for word in ("--device", "3WEDH0000000001", "3WEDH0000000011"):
@@ -118,9 +118,9 @@ class TimesTest(CommandTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(json.loads(done.stdout)["done"], 2)
         for number in (0, 1):
-            told = json.loads(run("info", f"one-3WEDH00000000{number}1.nc", "--json",
+            result = json.loads(run("info", f"one-3WEDH00000000{number}1.nc", "--json",
                                   folder=self.folder).stdout)
-            self.assertEqual((told["observations"], len(told["devices"])), (15000, 1))
+            self.assertEqual((result["observations"], len(result["devices"])), (15000, 1))
 
 
 if __name__ == "__main__":

@@ -5,14 +5,13 @@
 import re
 import unittest
 
-from command import CommandTest
+from command import CommandTest, verbs
 
 VERBS = ("info", "convert", "simulate", "record", "emulate", "estimate", "observability", "calibrate", "cloud",
          "compare", "campaign", "identify", "pattern", "preset", "report", "reproduce")
 
 # Arguments that are wrong, and what the message must name.
 WRONG = [
-    ([], "subcommand"),
     (["frobnicate"], "frobnicate"),
     (["info"], "INPUT"),
     (["info", "a.lvx", "--colour"], "--colour"),
@@ -119,21 +118,41 @@ class UsageTest(CommandTest):
     def test_version(self):
         self.assertRegex(self.expect(0, "--version").stdout, r"^risley \d+\.\d+\.\d+\n$")
 
-    def test_help_has_every_verb(self):
+    def test_help_is_found_in_every_way(self):
         text = self.expect(0, "--help").stdout
+        self.assertEqual(self.expect(0).stdout, text)
+        self.assertEqual(self.expect(0, "help").stdout, text)
+        self.assertEqual(sorted(verbs()), sorted(VERBS))
         for verb in VERBS:
-            self.assertIn(verb, text)
+            self.assertEqual(self.expect(0, "help", verb).stdout, self.expect(0, verb, "--help").stdout)
 
     def test_help_of_each_verb_has_an_example(self):
         for verb in VERBS:
             text = self.expect(0, verb, "--help").stdout
-            self.assertRegex(text, rf"Example:\n\s+risley {verb} ")
-            for option in ("--json", "--threads", "--seed", "--quiet", "--verbose"):
+            self.assertRegex(text, rf"\n\nExamples:\n\s+risley {verb} ")
+            self.assertLessEqual(text.count("\n"), 45 if verb == "calibrate" else 60, verb)
+            text = self.expect(0, verb, "--help-all").stdout
+            for option in ("--json", "--quiet", "--no-progress", "--verbose"):
                 self.assertIn(option, text)
+            self.assertNotRegex(text, r"\{|TEXT:|FLOAT|Excludes|\(\d+x\)")
+
+    def test_seed_and_threads_are_shown_where_they_matter(self):
+        for option, verb in (("--seed", "info"), ("--seed", "estimate"), ("--threads", "preset")):
+            self.assertNotIn(option, self.expect(0, verb, "--help-all").stdout)
+        self.expect(0, "preset", "list", "--seed", "3", "--threads", "2")
+        self.assertIn("--seed", self.expect(0, "simulate", "--help").stdout)
+
+    def test_quiet_prints_what_was_asked_for(self):
+        self.expect(0, "simulate", "-o", "quiet.csv", "--rate-hz", "1000")
+        for words in (("simulate", "-o", "quiet.csv", "--rate-hz", "1000"), ("convert", "quiet.csv", "-o", "quiet.nc")):
+            done = self.expect(0, *words, "--quiet")
+            self.assertEqual(done.stdout + done.stderr, "")
+        self.assertNotEqual(self.expect(0, "info", "quiet.csv", "--quiet").stdout, "")
+        self.expect_json(0, "simulate", "-o", "quiet.csv", "--rate-hz", "1000", "--quiet")
 
     def test_help_fits_into_a_terminal(self):
         for verb in (None, *VERBS):
-            for line in self.expect(0, *filter(None, (verb, "--help"))).stdout.splitlines():
+            for line in self.expect(0, *filter(None, (verb, "--help-all" if verb else "--help"))).stdout.splitlines():
                 self.assertLessEqual(len(line), 100, line)
 
     def test_wrong_usage(self):

@@ -136,7 +136,7 @@ class WatchTest(ProcessTest):
             if select.select([controller], [], [], 1)[0]:
                 try:
                     shown += os.read(controller, 4096)
-                except OSError:  # nobody has the terminal any more
+                except OSError:  # the terminal is closed
                     self.fail((process.wait(), shown))
         process.send_signal(signal.SIGTERM)
         out, _ = process.communicate(timeout=20)

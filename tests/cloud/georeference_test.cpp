@@ -603,7 +603,7 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
       for (Index axis = 0; axis < 3; ++axis) one.squares[axis] += value[axis] * value[axis];
     }
   }
-  // What a cloud without a table tells: each point's covariance, as its own.
+  // What a cloud without a table states: each point's covariance, as its own.
   MatrixXd alone = MatrixXd::Zero(3 * n, 3 * n);
   for (Index i = 0; i < n; ++i) {
     alone.block<3, 3>(3 * i, 3 * i) = joint[0].block<3, 3>(3 * i, 3 * i);
@@ -619,7 +619,7 @@ TEST(Georeference, CovariancesOfAnySetOfPointsAreTrue) {
       const double measured = one.squares[axis] / kDraws;
       for (std::size_t table = 0; table < 2; ++table) {
         const double ratio = measured / predicted[table](axis, axis);
-        // 1,000 draws tell a variance to 4.5 %; this is 2.7 sigmas.
+        // 1,000 draws give a variance to 4.5 %; this is 2.7 sigmas.
         EXPECT_GT(ratio, 0.88) << one.name << " axis " << axis << " table " << table;
         EXPECT_LT(ratio, 1.12) << one.name << " axis " << axis << " table " << table;
         RecordProperty(fmt::format("{} {} {}", one.name, axis, table == 0 ? "1 s" : "10 s"),
@@ -743,7 +743,7 @@ TEST(Georeference, MountAndPrismsThatWereFoundTogetherAreCountedTogether) {
       return expected;
     };
     const Matrix3d joint = check(together, m.covariance.matrix), alone = check(apart, independent);
-    EXPECT_GT((joint - alone).norm(), 0.1 * alone.norm()) << "the case tells nothing";
+    EXPECT_GT((joint - alone).norm(), 0.1 * alone.norm()) << "the case proves nothing";
   }
 }
 

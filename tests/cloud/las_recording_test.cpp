@@ -125,7 +125,7 @@ TEST(LazRecordingTest, IsTested) {
 
 #ifdef RISLEY_HAS_LASZIP
 
-/// A LAZ file with some bytes written over, and what reading it says.
+/// A LAZ file with some bytes overwritten, and the message of reading it.
 std::string laz_error(const std::string& path, std::uint64_t at, const std::string& bytes) {
   {
     std::fstream stream(path, std::ios::binary | std::ios::in | std::ios::out);

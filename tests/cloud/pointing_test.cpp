@@ -951,7 +951,8 @@ TEST(PointingModel, OfATypeTakesTheRecordingsParametersAndTheirErrors) {
 // A unit whose parameters are known to 0.002 degree and that reports directions 0.2 degree off.
 TEST(PointingModel, AUnitThatContradictsTheRecordingIsTakenAtItsWord) {
   Case one(CalibrationReference::none);
-  one.calibration.set_knowledge({"wedge_angle_deg", 1e-4, "assumed"});  // no recording tells
+  one.calibration.set_knowledge(
+      {"wedge_angle_deg", 1e-4, "assumed"});  // no recording determines it
   const PointingModel model = one.model();
   EXPECT_EQ(model.reference, CalibrationReference::planes);
   EXPECT_EQ(model.train.parameters(), one.calibration.train.parameters());

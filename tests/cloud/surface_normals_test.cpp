@@ -178,7 +178,7 @@ TEST(SurfaceNormals, OfSlantedSurfacesKnowTheNoiseOfDirections) {
 }
 
 // Two walls that meet at a corner: each shot has the normal of its own wall, up to the edge. There
-// ranges do not tell the walls apart: ten millimetres are 0.03 degree of 90.
+// ranges do not separate the walls: ten millimetres are 0.03 degree of 90.
 TEST(SurfaceNormals, WallsReachToTheEdgeWhereTheyMeet) {
   const double noise = 0.01;
   const Plane left = tilted_plane(45, 0, 10.0), right = tilted_plane(45, 180, 10.0);

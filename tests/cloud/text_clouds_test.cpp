@@ -31,7 +31,7 @@ std::vector<std::string> split(const std::string& line, char separator) {
   return words;
 }
 
-/// @param types  of the columns, which the text does not tell
+/// @param types  of the columns, which the text does not state
 TestTable read_text(const std::string& text, char separator, const TestTable& types) {
   std::istringstream lines(text);
   std::string line;

@@ -122,7 +122,7 @@ class CampaignTest(unittest.TestCase):
                 "--config", f"plan={self.plan}", f"output={output}", f"chunks={chunks}", f"command={command}"]
 
     def expect_reference(self, output):
-        """The same bytes as those of one process of one thread that nobody disturbs, every cell once."""
+        """The same bytes as from one undisturbed process of one thread, every cell once."""
         if not type(self).reference:
             folder = self.folder / "reference"
             self.expect(0, [COMMAND, "campaign", self.plan, "-o", folder, "--threads", 1])

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""A small campaign through every engine that docs/clusters.md tells of, and what becomes of files that are lost."""
+"""A small campaign through every engine in docs/clusters.md, and what happens to lost files."""
 import importlib.util
 import os
 import unittest

@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """A campaign while the command, a node, the controller and the scheduler are killed: the same command again makes the
-same bytes as one process that nobody disturbs. RISLEY_CAMPAIGN_CELLS=2000 is what scripts/nightly takes."""
+same bytes as one undisturbed process. RISLEY_CAMPAIGN_CELLS=2000 is what scripts/nightly takes."""
 import os
 import signal
 import subprocess
@@ -31,7 +31,7 @@ class KilledTest(CampaignTest):
         kill_chunk(output)
         for name in ("node2", "slurmctld"):
             os.kill(int((cluster / "run" / name).read_text(encoding="utf-8")), signal.SIGKILL)
-        time.sleep(2)  # Snakemake asks for its jobs, and nobody answers
+        time.sleep(2)  # Snakemake asks for its jobs, without an answer
         self.expect(0, [CLUSTER, "start", cluster])
         wait_until(lambda: len(self.chunks(output)) >= 5 and chunk_processes(output), "five chunks")
         kept |= self.chunks(output)

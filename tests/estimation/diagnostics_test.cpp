@@ -126,7 +126,7 @@ TEST(Autocorrelation, NeverMakesResidualsBetterThanIndependent) {
   const Autocorrelation turning = Residuals(100'000, -0.5, 8).autocorrelation();
   EXPECT_EQ(turning.factor, 1.0);
   EXPECT_TRUE(turning.rho.empty());
-  EXPECT_EQ(Residuals(99, 0.9, 9).autocorrelation().factor, 1.0);  // too few to tell
+  EXPECT_EQ(Residuals(99, 0.9, 9).autocorrelation().factor, 1.0);  // too few to decide
   EXPECT_EQ(Residuals(0, 0.9, 9).autocorrelation().factor, 1.0);
   Residuals nothing(1000, 0.9, 9);
   std::fill(nothing.azimuth.begin(), nothing.azimuth.end(), kNan);

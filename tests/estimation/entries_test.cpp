@@ -328,7 +328,7 @@ struct Judged {
     }
   }
   void run() const { evaluate(estimate, sensor, truth); }
-  /// Makes one parameter free, which has so many values.
+  /// Makes one parameter free that has several values.
   void free_one(std::size_t values) {
     estimate.free = free_parameters({"refractive_index"}, {2});
     estimate.values.resize(values);

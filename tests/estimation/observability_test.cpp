@@ -104,7 +104,7 @@ TEST(Observability, SensitivitiesAreDifferenceQuotients) {
 
 TEST(Observability, Section23OfThePaper) {
   const Observability all = observability_of_plan(plan_of("mid-40-table3", 30, 1000));
-  // The index of air cannot be told at all, prism A's horizontal tilt hardly: it goes with A's
+  // The index of air is not determined at all, prism A's horizontal tilt hardly: it goes with A's
   // rotation angle at -0.99, and moves the beam least of all.
   EXPECT_TRUE(std::isinf(quantity(all, "refractive_index_air").sigma));
   EXPECT_NEAR(correlation(all, "prism_tilt_a_horizontal_deg", "rotation_angle_a_deg"), -0.99,
@@ -114,7 +114,7 @@ TEST(Observability, Section23OfThePaper) {
     if (one.name == tilt.name) continue;
     EXPECT_GT(one.sensitivity, tilt.sensitivity) << one.name;
   }
-  // Wedge and index are not one quantity: enough data tell them apart.
+  // Wedge and index are not one quantity: enough data separate them.
   const QuantityObservability wedge = quantity(all, "wedge_angle_deg");
   EXPECT_TRUE(std::isfinite(wedge.sigma));
   EXPECT_GT(std::abs(wedge.twins.front().second), 0.999);
@@ -125,7 +125,7 @@ TEST(Observability, Section23OfThePaper) {
     return std::any_of(words.begin(), words.end(),
                        [&](const std::string& one) { return one.find(text) != std::string::npos; });
   };
-  EXPECT_TRUE(says("refractive_index_air cannot be told from refractive_index"));
+  EXPECT_TRUE(says("refractive_index_air cannot be separated from refractive_index"));
   EXPECT_TRUE(says("rotation_angle_a_deg (rho = -0.99"));
 }
 
@@ -208,7 +208,7 @@ TEST(Observability, SixEmittersTellTheFirstPrismWhichOneDoesNot) {
   EXPECT_EQ(emitters.untold_alone[0].weights.front().first, "prism_tilt_a_vertical_deg");
   const auto words = observability_words(all, {3, 6});
   EXPECT_TRUE(std::any_of(words.begin(), words.end(), [](const std::string& one) {
-    return one.starts_with("only the 6 emitters together tell") &&
+    return one.starts_with("only the 6 emitters together determine") &&
            one.find("refractive_index_a") != std::string::npos;
   }));
 }

@@ -19,7 +19,7 @@ namespace risley::estimation::rotor_trajectory_test {
 using ::testing::ElementsAre;
 using Sizes = std::vector<std::size_t>;
 
-/// Shots at some times, told apart by their azimuth.
+/// Shots at some times, distinguished by their azimuth.
 AngleSeries series_at(const std::vector<std::int64_t>& time_ns) {
   AngleSeries series;
   for (const std::int64_t time : time_ns) {

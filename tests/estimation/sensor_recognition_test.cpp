@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Which sensor made a recording, told from its shots alone: mirrored, turned, half under the sky,
-// cut anywhere.
+// Which sensor made a recording, recognised from its shots alone: mirrored, turned, half under the
+// sky, cut anywhere.
 #include "risley/estimation/sensor_recognition.hpp"
 
 #include <cmath>
@@ -141,7 +141,7 @@ TEST(SensorRecognition, EmittersThatTheFileNamesTellTheRoll) {
       scene.roll = deg(roll);
       // Of 30 scans each, the worst was off by 0.13 degree, the Horizon's by 1.06: its two rotors
       // of equal speeds leave more within a tenth of a second. Gross errors move the roll: the
-      // Avia's by 3 degrees rms, less in this scan; others may tell none. They hide no sensor.
+      // Avia's by 3 degrees rms, less in this scan; others may find none. They hide no sensor.
       for (const double gross : {0.0, 0.02}) {
         scene.gross = gross;
         const SensorRecognition found =

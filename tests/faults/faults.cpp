@@ -6,7 +6,7 @@
 //   sync    fsync and fdatasync
 //   rename  in every form, link included
 //   create  a file that is opened for writing
-//   close   of a file with bytes that were not synced, whose loss only close would tell; it is
+//   close   of a file with bytes that were not synced, whose loss only close would report; it is
 //           closed all the same, as Linux does
 //   memory  malloc and its like; not in a build with sanitizers, which bring their own
 #include <atomic>

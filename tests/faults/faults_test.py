@@ -25,7 +25,7 @@ SANITIZED = os.environ.get("RISLEY_SANITIZED") == "ON"  # with a malloc that can
 # Which calls of a kind fail: each, or some that come closer to each other where runs are short.
 NUMBERS = range(1, 201) if EVERY else (1, 2, 7, 40)
 
-# Status of a run that met the fault. What is not written is a matter of files; libraries tell a lack
+# Status of a run that met the fault. What is not written is a matter of files; libraries report a lack
 # of memory as an error of the file that they were at.
 STATUSES = {"write": {3}, "sync": {3}, "rename": {3}, "create": {3}, "close": {3}}
 if not SANITIZED:
@@ -185,7 +185,7 @@ class Faults(unittest.TestCase):
         self.assertGreater(faults, 3 * len(cases))
 
     def expect_status(self, done, kind, where):
-        """A fault is told with its status and in words, or did no harm."""
+        """A fault is reported by status and message, or did no harm."""
         self.assertIn(done.returncode, STATUSES[kind] | {0}, f"{where}: {done.stderr[-600:]}")
         if done.returncode != 0:
             self.assertIn(b"error", done.stderr, where)

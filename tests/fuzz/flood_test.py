@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Strangers flood every socket of a recording and of a virtual sensor: nothing of it reaches the file,
-nothing is lost for it, and nobody grows.
+nothing is lost for it, and no process grows.
 
 RISLEY_FLOOD_DATAGRAMS=N sends N datagrams in all, as fast as they are read, instead of a few."""
 import json
@@ -45,10 +45,10 @@ def memory_kb(process):
 
 
 class FloodTest(unittest.TestCase):
-    """One sensor, one recording, and who belongs to neither."""
+    """One sensor, one recording, and a host that belongs to neither."""
 
     def start(self, *words):
-        # A sanitizer keeps what was freed, 256 MB of it unless told otherwise.
+        # A sanitizer keeps what was freed, 256 MB of it by default.
         quarantine = "quarantine_size_mb=1:thread_local_quarantine_size_kb=64"
         options = os.environ.get("ASAN_OPTIONS", "") + ":" + quarantine
         process = subprocess.Popen([COMMAND, *words, "--json"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,

@@ -37,7 +37,7 @@ int main(int count, char** arguments) {
     for (const fs::path& file : files) {
       std::ifstream stream(file, std::ios::binary);
       const std::vector<char> bytes(std::istreambuf_iterator<char>(stream), {});
-      // A broken invariant ends the program: the last name that was told is that of its input.
+      // A broken invariant ends the program: the last name printed is that of its input.
       std::printf("%s\n", file.c_str());
       std::fflush(stdout);
       try {

@@ -9,7 +9,7 @@
 
 namespace risley::fuzz {
 
-/// One kind of input from outside. Errors that the library tells are what damaged input asks for;
+/// One kind of input from outside. Errors that the library reports are right for damaged input;
 /// everything else ends the program.
 struct Target {
   std::string_view name;

@@ -121,7 +121,7 @@ void run_sensor(std::span<const std::uint8_t> bytes) {
     for (const auto& reply : replies) {
       require(reply.to.has_value(), "replies are not broadcast");
       require(reply.to->address == (stranger ? kStrangerAddress : kHostAddress),
-              "replies go to who asked");
+              "replies go to the host that asked");
     }
     if (was_connected && data.address != (stranger ? kStrangerAddress : kHostAddress)) {
       require(sensor.sampling() == was_sampling && sensor.data_target() == data,

@@ -2,9 +2,13 @@
 // SPDX-License-Identifier: MIT
 #include "risley/hashes/sha256.hpp"
 
+#include <climits>
+#include <cstdlib>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
@@ -39,6 +43,29 @@ TEST(Sha256, KnownAnswers) {
   io::write_text_file(path, std::string(1'000'000, 'a'));
   EXPECT_EQ(sha256_of_file(path),
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+}
+
+// What a library frees when a thread ends, it may have freed with the process. It keeps most with
+// the thread that calls it first, hence a process of its own.
+TEST(Sha256DeathTest, LeavesNothingWithAThread) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto things_of_thread = [] {
+    int count = 0;
+    for (pthread_key_t key = 0; key < PTHREAD_KEYS_MAX; ++key) {
+      if (::pthread_getspecific(key) != nullptr) ++count;
+    }
+    return count;
+  };
+  const auto hash = [&] {
+    int more = 0;
+    std::thread([&] {
+      const int before = things_of_thread();
+      sha256("abc");
+      more = things_of_thread() - before;
+    }).join();
+    std::exit(more <= 1 ? 0 : 1);  // one is a mark of the library's start, which nothing frees
+  };
+  EXPECT_EXIT(hash(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace risley::hashes::sha256_test

@@ -107,7 +107,7 @@ TEST(Identify, OneEmitterLeavesTheFacesOfTheFirstPrismOpen) {
     const auto row = static_cast<Eigen::Index>(at - best.fit.names.begin());
     return best.total_covariance(row, row);
   };
-  EXPECT_TRUE(std::isinf(total_variance("refractive_index_a"))) << "nothing tells it";
+  EXPECT_TRUE(std::isinf(total_variance("refractive_index_a"))) << "nothing determines it";
   EXPECT_TRUE(std::isinf(total_variance("wedge_angle_a_deg")));
   EXPECT_GT(total_variance("refractive_index_b"), 0);
   EXPECT_TRUE(std::isfinite(total_variance("refractive_index_b")));

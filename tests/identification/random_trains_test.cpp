@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Trains that nobody chose. A few run each time; RISLEY_SEEDS=N runs N of each kind, numbered from
+// Random trains. A few run each time; RISLEY_SEEDS=N runs N of each kind, numbered from
 // RISLEY_FIRST_SEED, and prints what became of them.
 #include <algorithm>
 #include <chrono>

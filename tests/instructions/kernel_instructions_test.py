@@ -54,7 +54,7 @@ def count(program):
         shots = {name: int(number) for name, number in (line.split() for line in done.stdout.splitlines())}
         found = counts_of(folder, shots)
     if set(found) != set(shots):
-        raise SystemExit(f"kernels {sorted(shots)} ran, callgrind tells of {sorted(found)}")
+        raise SystemExit(f"kernels {sorted(shots)} ran, callgrind reports {sorted(found)}")
     return found
 
 

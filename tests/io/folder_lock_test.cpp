@@ -31,7 +31,7 @@ TEST(FolderLock, OneWriterHasAFolder) {
     const FolderLock lock(path);
     EXPECT_THROW(const FolderLock second(path), FileError);
     EXPECT_FALSE(is_locked_by_other(path)) << "it is our own";
-    EXPECT_TRUE(folder.names().empty()) << "no file tells of it";
+    EXPECT_TRUE(folder.names().empty()) << "no file is left behind";
   }
   EXPECT_NO_THROW(const FolderLock again(path));
 }

@@ -24,7 +24,7 @@
 
 namespace {
 
-/// Whether the disk fails those who wait for it.
+/// Whether waiting for the disk fails.
 std::atomic<bool> disk_fails{false};
 
 }  // namespace
@@ -126,7 +126,7 @@ TEST_F(GrowingFileTest, WhatIsOnTheDiskLeavesMemory) {
   EXPECT_EQ(content(unfinished_).at((std::size_t{5} << 20U) + 7), '\5');
 }
 
-// The system tells it once, and not again when the file gets its name.
+// The system reports it once, and not again when the file gets its name.
 TEST_F(GrowingFileTest, ADiskThatFailsLaterIsToldOf) {
   GrowingFile file(path_);
   disk_fails = true;

@@ -149,7 +149,7 @@ TEST_F(CalibrateFlightTest, LeadsFromAFlightToAMount) {
   fs::remove_all(file("out"));
 }
 
-// A recording tells what a sensor believes of its glass. Where the glass is another, strips say so.
+// A recording shows what a sensor believes of its glass. If the glass is another, strips show that.
 TEST_F(CalibrateFlightTest, ContradictsAnIndexThatIsHeld) {
   record(sensors::load_sensor("mid-40"), "other-index.nc");
   CalibrateFlightOptions wanted = options("other-index.nc");
@@ -261,8 +261,8 @@ TEST_F(CalibrateFlightTest, RefusesWhatDoesNotFit) {
   };
   EXPECT_NE(refused([](auto& o) { o.recordings.clear(); }), "");
   EXPECT_NE(refused([](auto& o) { o.recordings.push_back(o.recordings.front()); }), "");
-  EXPECT_NE(refused([](auto& o) { o.platform.trajectory.clear(); }), "");
-  EXPECT_NE(refused([](auto& o) { o.platform.mount.clear(); }), "");
+  EXPECT_NE(refused([](auto& o) { o.platform.trajectory = {}; }), "");
+  EXPECT_NE(refused([](auto& o) { o.platform.mount = {}; }), "");
   EXPECT_NE(refused([](auto& o) { o.platform.errors.clear(); }), "");
   EXPECT_NE(refused([](auto& o) { o.platform.crs = "EPSG:25832"; }), "");
   EXPECT_NE(refused([](auto& o) { o.truths.clear(), o.truths.resize(2); }), "");

@@ -171,7 +171,7 @@ TEST_F(CompareResults, TestsWhetherTheUnitChanged) {
   EXPECT_EQ(compare_results("mid-40", "mid-40").change.degrees_of_freedom, 0);
 }
 
-// A turn of all beams that nobody knows does not hide a change of their shape, nor count as one.
+// An unknown turn of all beams does not hide a change of their shape, nor count as one.
 TEST_F(CompareResults, WhatIsHardlyKnownHardlyCounts) {
   sensors::Sensor one = sensors::load_sensor("mid-40");
   constexpr const char* kOther = "incident_beam_horizontal_deg";
@@ -299,9 +299,9 @@ TEST_F(CompareResults, OfManyUnitsEachStandsBesideTheOthers) {
   }
   add("unknown", result(""));
   const CompareUnitsOptions options{{table_of(folder_.path() / "t.csv", rows)}, 0.01};
-  std::vector<double> told;
+  std::vector<double> reported;
   const ComparedUnits found =
-      compare_units(options, Progress([&](double fraction) { told.push_back(fraction); }));
+      compare_units(options, Progress([&](double fraction) { reported.push_back(fraction); }));
   EXPECT_EQ(found.units.size(), 6U);
   EXPECT_EQ(found.pairs.size(), 6U);
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(found.units[i].changed, i == 4) << i;
@@ -311,7 +311,7 @@ TEST_F(CompareResults, OfManyUnitsEachStandsBesideTheOthers) {
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(fleet.fleet.units[i].outlier, i == 4) << i;
   ASSERT_EQ(found.left_out.size(), 1U);
   EXPECT_THAT(found.left_out[0].reason, HasSubstr("could be of any of 6 units"));
-  EXPECT_EQ(told.back(), 1);
+  EXPECT_EQ(reported.back(), 1);
 
   // The same by their names, in order of time.
   const ComparedUnits series = compare_units(named);

@@ -95,7 +95,7 @@ TEST_F(InputsTest, ALinkThatLeadsNowhereIsNotPassedOver) {
   }
 }
 
-// Parts of one recording are no recordings: who reads the folder asks for its metadata.yaml.
+// Parts of one recording are no recordings: reading the folder needs its metadata.yaml.
 TEST_F(InputsTest, PartsOfABagAreOneRecordingAlsoWithoutMetadata) {
   make({"fleet/drive/drive_0.mcap", "fleet/drive/drive_1.mcap", "fleet/days/monday_0.mcap",
         "fleet/days/tuesday_0.mcap"});

@@ -462,7 +462,7 @@ TEST_F(JobsTest, FailedNumbersSetAnOlderCalibrationAside) {
   std::ofstream(path("estimate/calibration.yaml")) << "risley, older";
   EstimateRecordingOptions options = estimation();
   options.truth.clear();
-  options.additional = {"refractive_index_air", "wedge_angle_deg"};  // no data tell them apart
+  options.additional = {"refractive_index_air", "wedge_angle_deg"};  // no data separate them
   const EstimatedRecording estimated = estimate_recording(options);
   EXPECT_FALSE(estimated.estimate.converged);
   EXPECT_EQ(names(), (std::set<std::string>{"estimate", "estimate/calibration.earlier.yaml",

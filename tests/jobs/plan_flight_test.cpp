@@ -47,7 +47,7 @@ TEST(PlanFlight, TellsAccuracyAndPoints) {
   ASSERT_TRUE(planned.distribution.has_value());
   ASSERT_EQ(planned.distribution->strips.size(), 2U);
   EXPECT_NEAR(planned.distribution->strips[0].density, 100'000 / (2 * 20 * 0.3485 * 10), 40);
-  // The index counts as a recording tells it, and does not hide what strips tell.
+  // The index counts as determined by a recording and does not hide what strips determine.
   EXPECT_LT(planned.forecast.datum.total, radians_from_degrees(0.1));
   const auto& unknowns = planned.forecast.unknowns;
   const auto index = std::find_if(unknowns.begin(), unknowns.end(), [](const auto& unknown) {

@@ -116,10 +116,10 @@ TEST(RunPipeline, NeverHandsOverHalfAResultWhereTheWorkAroundItFailed) {
 }
 
 TEST(ForEachJob, TellsWhatIsDoneAndCanBeStopped) {
-  std::vector<double> told;
+  std::vector<double> reported;
   for_each_job(
-      5, [](std::size_t) {}, [&](double fraction) { told.push_back(fraction); });
-  EXPECT_EQ(told, (std::vector<double>{0.2, 0.4, 0.6, 0.8, 1.0}));
+      5, [](std::size_t) {}, [&](double fraction) { reported.push_back(fraction); });
+  EXPECT_EQ(reported, (std::vector<double>{0.2, 0.4, 0.6, 0.8, 1.0}));
   CancelFlag flag;
   std::atomic<int> begun = 0;
   EXPECT_THROW(for_each_job(

@@ -45,11 +45,11 @@ def random_train(face_order, emitters):
     return train
 
 
-def assert_agrees(train, angles, told, emitter):
+def assert_agrees(train, angles, reported, emitter):
     wanted = risley.observe(train, angles, beam=(emitter or 1) - 1)
     through = np.isfinite(wanted.azimuth)
     assert through.mean() > 0.5
-    for one, other in zip(told, wanted):
+    for one, other in zip(reported, wanted):
         np.testing.assert_array_equal(np.isfinite(one), through)
         np.testing.assert_allclose(one[through], other[through], rtol=0, atol=1e-12)
 
@@ -65,8 +65,8 @@ def test_prisms(face_order, emitters):
     train = random_train(face_order, emitters)
     angles = RANDOM.uniform(0, 2 * np.pi, (train.prisms, 200))
     for emitter in range(1, emitters + 1) if emitters > 1 else [None]:
-        told = PAGE["prisms"](train, face_order, angles, emitter)
-        assert_agrees(train, angles, told, emitter)
+        reported = PAGE["prisms"](train, face_order, angles, emitter)
+        assert_agrees(train, angles, reported, emitter)
     if face_order == "PA-AP" and emitters == 1:
         assert_agrees(train, angles, PAGE["mid_40"](train, *angles), None)
 

@@ -315,6 +315,7 @@ def test_many_recordings(folder, hall):
     assert (found.done, found.skipped, found.failed, len(found)) == (2, 0, 1, 3)
     assert [one["status"] for one in found] == [3, 0, 0]
     assert sorted(path.parent.name for path in (folder / "each").rglob("calibration.yaml")) == ["one", "two"]
+    assert "bad.lvx" in str(found) and "bad.lvx" in found._repr_html_()
     alone = risley.estimate(scans / "one.nc", rate=5000).to_dict()
     assert found[1]["parameters"] == alone["parameters"]
     assert found.rows[1]["prism_tilt_a_vertical_deg"] == alone["parameters"]["prism_tilt_a_vertical_deg"]["value"]

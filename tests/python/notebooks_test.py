@@ -75,6 +75,8 @@ EXAMPLE = """# %% [markdown]
 
 # %%
 import sys
+
+# %%
 print(f"{1 + 1:.3f} in {sys.argv[2]}/sum.txt")
 """
 
@@ -91,10 +93,10 @@ def test_a_document_has_text_code_and_output(example, tmp_path):
     assert pictures == {}
     lines = text.splitlines()
     assert lines[:3] == ["# Sum", "", "Text."]
-    assert lines[5:] == ["", "```python", *EXAMPLE.splitlines()[6:], "```", "", "```", "2.000 in results/sum.txt", "```"]
+    assert lines[5:] == ["", "```python", EXAMPLE.splitlines()[-1], "```", "", "```", "2.000 in results/sum.txt", "```"]
 
 
-def test_a_stale_document_is_told(example, tmp_path):
+def test_a_stale_document_is_noticed(example, tmp_path):
     fresh, _ = notebooks.document_of(example, tmp_path)
     assert not differences(fresh, fresh)
     assert not differences(fresh.replace("2.000 in", "2.001 in"), fresh)

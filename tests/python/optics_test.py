@@ -36,8 +36,8 @@ def test_the_inverse_undoes_the_model(train, seed):
     found = risley.invert(train, azimuth, zenith)
     assert found.first.shape == (40, 4)
     again = risley.observe(train, [found.first, found.second])
-    for told, wanted in zip(again, (azimuth, zenith)):
-        close = np.isclose(told, wanted[:, None], rtol=0, atol=1e-7)
+    for reported, wanted in zip(again, (azimuth, zenith)):
+        close = np.isclose(reported, wanted[:, None], rtol=0, atol=1e-7)
         assert (close == np.isfinite(found.first)).all()
     turn = np.exp(1j * found.first) - np.exp(1j * angles[0])[:, None]
     other = np.exp(1j * found.second) - np.exp(1j * angles[1])[:, None]
@@ -68,14 +68,14 @@ def test_sensors_at_random_are_inverted_pickled_and_written(sensor, seed):
     assert other == sensor == risley.Sensor.from_text(sensor.to_text())
     assert other.parameters == sensor.parameters
     angles = np.random.default_rng(seed).uniform(0, 2 * np.pi, (sensor.train.prisms, 40))
-    told = risley.observe(sensor, angles)
-    for one, two in zip(told, risley.observe(other, angles)):
+    reported = risley.observe(sensor, angles)
+    for one, two in zip(reported, risley.observe(other, angles)):
         np.testing.assert_array_equal(one, two)
     if sensor.train.prisms != 2:
         return
-    found = risley.invert(sensor, *told)
+    found = risley.invert(sensor, *reported)
     assert (found.count > 0).all()
-    for again, wanted in zip(risley.observe(sensor, [found.first, found.second]), told):
+    for again, wanted in zip(risley.observe(sensor, [found.first, found.second]), reported):
         close = np.isclose(again, wanted[:, None], rtol=0, atol=1e-7)
         assert (close == np.isfinite(found.first)).all()
 

@@ -188,9 +188,9 @@ def test_wrong_options_of_reading(path):
 
 
 def test_progress_is_told_and_may_stop(path):
-    told = []
-    risley.read(path, progress=lambda name, fraction: told.append((name, fraction)))
-    assert told[-1] == ("reading", 1.0)
+    reported = []
+    risley.read(path, progress=lambda name, fraction: reported.append((name, fraction)))
+    assert reported[-1] == ("reading", 1.0)
 
     class Enough(Exception):
         pass

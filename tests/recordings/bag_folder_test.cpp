@@ -213,7 +213,7 @@ TEST(BagFolder, DamageInAFileKeepsTheFilesBefore) {
   EXPECT_EQ(read.rows.size(), 120U);
   ASSERT_EQ(read.warnings.size(), 1U);
   EXPECT_THAT(read.warnings[0].message, HasSubstr("bag_1.mcap: the file was not closed"));
-  // A message that is damaged is told with its file.
+  // A damaged message is reported with its file.
   McapFile part(small_ros2_bag());
   part.messages[1].second = "no CDR";
   part.write(folder.file(folder.name(2)));

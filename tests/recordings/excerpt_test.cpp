@@ -289,7 +289,7 @@ TEST_F(ExcerptTest, WithRangesIsExactToTheLastBit) {
 }
 
 /// Ranges, mm, of the points in whole millimetres that lie from `near` to `far` and whose direction
-/// is told apart from the given one by less than the tolerances.
+/// differs from the given one by less than the tolerances.
 std::vector<double> possible_ranges(double azimuth, double zenith, double azimuth_tolerance,
                                     double zenith_tolerance, double near, double far) {
   std::vector<double> ranges;
@@ -345,7 +345,7 @@ TEST_F(ExcerptTest, DirectionsFromCoordinatesDoNotGiveTheRangeAway) {
     EXPECT_GE(range, far / 2 * (1 - 1e-6));
     EXPECT_LE(range, far * (1 + 1e-6));
   }
-  EXPECT_GE(told_before, 25U);  // of 30: the directions as they were tell the very point
+  EXPECT_GE(told_before, 25U);  // of 30: the directions as they were give the very point
 }
 
 TEST_F(ExcerptTest, AnExcerptOfAnExcerptIsTheSame) {
@@ -361,7 +361,7 @@ TEST_F(ExcerptTest, AnExcerptOfAnExcerptIsTheSame) {
 }
 
 TEST_F(ExcerptTest, RoundsOnlyRowsThatCameFromCoordinates) {
-  Source source;  // packets of both kinds, and the header tells of the first one
+  Source source;  // packets of both kinds, and the header describes the first one
   source.add(100, 10'000, false);
   source.add(100, 10'000, true);
   const Excerpt excerpt = share(save(source));

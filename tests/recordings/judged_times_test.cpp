@@ -23,7 +23,7 @@ using namespace format_tests;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-/// Shots of a sensor with emitters that fire in turn. The azimuth of a shot tells its number.
+/// Shots of a sensor with emitters that fire in turn. The azimuth of a shot is its number.
 Recording shots(std::size_t count, double rate_hz, int emitters = 1) {
   Recording recording;
   recording.header.format = "test";

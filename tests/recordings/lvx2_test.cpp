@@ -266,7 +266,7 @@ TEST(Lvx2, WhatVariesIsTaken) {
   const Outcome renamed = read(package({kTime, 1, 1, 3}, good));
   EXPECT_EQ(renamed.rows().size(), 96U);
   EXPECT_EQ(renamed.recording.warnings.size(), 1U);
-  // A type that nobody knows: the times tell.
+  // An unknown type: the times decide.
   const Outcome unknown =
       read(package({kTime, 1}, good) + package({kTime + 480'000, 2}, good), head({{"x", 112, 0}}));
   EXPECT_EQ(unknown.recording.header.devices[0].type, kMid360);

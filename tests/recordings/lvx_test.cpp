@@ -495,7 +495,7 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
     const Outcome result = read(file.substr(0, cut));
     if (cut < frames[0]) {
       ASSERT_FALSE(result.opened);
-      // Without the whole name it is no LVX file that can be told.
+      // Without the whole name it is not recognised as LVX.
       if (cut >= 16) {
         ASSERT_TRUE(result.error->place().byte_offset);
         EXPECT_LE(*result.error->place().byte_offset, cut);
@@ -516,7 +516,7 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
     const Warning& warning = result.recording.warnings[0];
     ASSERT_TRUE(warning.place.byte_offset);
     EXPECT_LE(*warning.place.byte_offset, cut);
-    // Eleven bytes of a package tell how many records it had.
+    // Eleven bytes of a package state how many records it had.
     const std::size_t left = cut - *warning.place.byte_offset;
     const bool in_package = *warning.place.byte_offset != frames[0] &&
                             *warning.place.byte_offset != frames[1] &&
@@ -677,7 +677,8 @@ TEST_F(LvxTest, EmptyFramesAreRead) {
   EXPECT_EQ(result.recording.data.packets[0].frame, 1U);
 }
 
-// --- what the packets themselves tell ------------------------------------------------------------
+// --- what the packets themselves state
+// ------------------------------------------------------------
 
 TEST_F(LvxTest, TheRateOfAnUnknownDeviceIsTakenFromItsPackets) {
   for (const auto& [period, last] : {std::pair{960'000, 950'000}, std::pair{400'000, 395'833}}) {

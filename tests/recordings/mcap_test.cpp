@@ -119,7 +119,7 @@ TEST(Mcap, CutAnywhereItGivesWhatIsWhole) {
     const Outcome whole = read_bytes(bytes);
     ASSERT_FALSE(whole.error);
     std::size_t most = 0, opened = 0;
-    // Every byte of two ways, some of the others, which take long.
+    // Every byte in two ways; the other ways take long, so only some bytes.
     const bool is_plain = way.packing.empty() && !way.strange_records;
     const std::size_t step = way.packing == "lz4" || is_plain ? 1 : 29;
     for (std::size_t length = 1; length < bytes.size(); length += step) {

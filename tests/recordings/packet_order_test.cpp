@@ -162,7 +162,7 @@ TEST(PacketOrder, ASensorThatComesBack) {
   order.flush();
   run(100, 400, 12'000);  // and again, which its clock hardly shows
   order.flush();
-  EXPECT_EQ(order.counts().lost, 0U);  // nobody knows whether it sent any meanwhile
+  EXPECT_EQ(order.counts().lost, 0U);  // whether it sent any meanwhile is unknown
   EXPECT_EQ(order.counts().clock_jumps, 2U);
   EXPECT_EQ(order.counts().packets, 2800U);
   ASSERT_EQ(order.gaps().size(), 3U);

@@ -217,7 +217,7 @@ TEST_F(PacketTest, ExtremeRecordsAreWrittenWithTheSameBytes) {
       }
     }
   }
-  // Angles of null returns are nobody's to judge.
+  // Angles of null returns are not judged.
   spherical += spherical_record(1, 65535, 65535, {0}, 1, 0);
   spherical += spherical_record(1, 18001, 36001, {0}, 1, 0);
   expect_same_bytes(one_package_file(kMid40, 1, spherical));

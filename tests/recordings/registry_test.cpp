@@ -146,7 +146,7 @@ TEST_F(RegistryTest, AWholeRecordingIsLoadedWithItsWarnings) {
 }
 
 /// A file that is changed between two reads of its content: rows that were read stand, none is
-/// invented, and what is missing is told or was never announced.
+/// invented, and what is missing is reported or was never announced.
 void expect_changes_survived(const std::string& ending, bool shrinks) {
   SCOPED_TRACE(ending);
   constexpr std::size_t kRows = 150'000;

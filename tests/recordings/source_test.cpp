@@ -165,7 +165,7 @@ TEST(SourceTest, DamageThatAQuestionMeetsIsKept) {
   EXPECT_EQ(rows, kSound);
   ASSERT_TRUE(copy.damage());
   EXPECT_EQ(copy.damage()->place().line, kSound + 2U);
-  const auto reader = open_recording(copy);  // who needs them all meets it all the same
+  const auto reader = open_recording(copy);  // reading them all meets it all the same
   for (rows = 0; reader->read_sound(chunk);) rows += chunk.observations.size();
   EXPECT_EQ(rows, kSound);
   EXPECT_THROW(reader->read(chunk), FileError);

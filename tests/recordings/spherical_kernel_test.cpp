@@ -48,7 +48,7 @@ std::uint32_t depth_of(std::size_t record, std::size_t number) {
   return record % 5 == 0 ? 0U : static_cast<std::uint32_t>(record * 196'613 + number);
 }
 
-/// A record with these steps of angles; its returns have depths that are told by its number.
+/// A record with these steps of angles; its returns have depths that follow from its number.
 void put(const Layout& layout, std::size_t record, unsigned zenith, unsigned azimuth, bool returns,
          std::vector<std::uint8_t>& bytes) {
   std::vector<std::uint8_t> one(layout.bytes());

@@ -45,7 +45,7 @@ calibration::StripPair pair(std::uint16_t first, std::uint16_t second, double rm
   own.mean = -0.3 * rms;
   own.rms = rms;
   own.shift = {0.5 * rms, -0.4 * rms, 0.1 * rms};
-  own.sigma = {0.02 * rms, 1.0, 0.01 * rms};  // the north is not told
+  own.sigma = {0.02 * rms, 1.0, 0.01 * rms};  // the north is undetermined
   return own;
 }
 
@@ -65,7 +65,7 @@ calibration::TrajectoryKnots knots() {
   return own;
 }
 
-/// A calibration with numbers that tell each from the others.
+/// A calibration with distinct numbers.
 FlightCalibration calibrated_example() {
   FlightCalibration c;
   c.converged = true;

@@ -459,34 +459,34 @@ TEST(PresetFile, OptionalFieldsTravelAndAreAbsentWhereNothingIsSaid) {
                            "range_noise_weak_return_m", "range_offset_m", "calibrated_against"}) {
     EXPECT_THAT(preset_text(plain), ::testing::Not(HasSubstr(name)));
   }
-  Sensor told = plain;
-  told.range_noise_per_range = 2e-4;
-  told.range_noise_incidence = 0.003;
-  told.range_noise_weak_return = 0.05;
-  told.range_offset = -0.0125;
-  told.set_knowledge({"range_offset_m", 0.002, "walls"});
-  told.reference = CalibrationReference::planes;
-  told.covariance_names = {"incident_beam_vertical_deg", "range_offset_m"};
-  told.covariance = (Eigen::MatrixXd(2, 2) << 1e-8, -1e-8, -1e-8, 4e-6).finished();
-  const Sensor back = parse_preset(preset_text(told), "told.yaml");
+  Sensor stated = plain;
+  stated.range_noise_per_range = 2e-4;
+  stated.range_noise_incidence = 0.003;
+  stated.range_noise_weak_return = 0.05;
+  stated.range_offset = -0.0125;
+  stated.set_knowledge({"range_offset_m", 0.002, "walls"});
+  stated.reference = CalibrationReference::planes;
+  stated.covariance_names = {"incident_beam_vertical_deg", "range_offset_m"};
+  stated.covariance = (Eigen::MatrixXd(2, 2) << 1e-8, -1e-8, -1e-8, 4e-6).finished();
+  const Sensor back = parse_preset(preset_text(stated), "stated.yaml");
   EXPECT_EQ(back.range_noise_per_range, 2e-4);
   EXPECT_EQ(back.range_noise_incidence, 0.003);
   EXPECT_EQ(back.range_noise_weak_return, 0.05);
   EXPECT_EQ(back.range_offset, -0.0125);
   EXPECT_EQ(back.reference, CalibrationReference::planes);
-  EXPECT_EQ(back.covariance_names, told.covariance_names);
-  EXPECT_EQ(back.covariance, told.covariance);
-  expect_same(told, back);
-  EXPECT_EQ(preset_text(back), preset_text(told));
+  EXPECT_EQ(back.covariance_names, stated.covariance_names);
+  EXPECT_EQ(back.covariance, stated.covariance);
+  expect_same(stated, back);
+  EXPECT_EQ(preset_text(back), preset_text(stated));
 }
 
 TEST(PresetFile, RefusesAnUnknownReference) {
-  Sensor told = load_sensor("mid-40");
-  told.reference = CalibrationReference::directions;
+  Sensor stated = load_sensor("mid-40");
+  stated.reference = CalibrationReference::directions;
   const std::string text =
-      replaced(preset_text(told), "calibrated_against: directions", "calibrated_against: walls");
+      replaced(preset_text(stated), "calibrated_against: directions", "calibrated_against: walls");
   try {
-    parse_preset(text, "told.yaml");
+    parse_preset(text, "stated.yaml");
     FAIL();
   } catch (const FileError& error) {
     EXPECT_THAT(error.what(), HasSubstr("allowed directions, planes"));

@@ -118,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& sequence) { return parameter_name(sequence.param.preset); });
 
 // The manufacturer prints five digits of azimuth and elevation; the copy at hand keeps two behind
-// the point, and nobody knows which way it rounded a last digit of 5.
+// the point, and which way it rounded a last digit of 5 is unknown.
 TEST(MakersSequenceOfTheMid360, IsRepeatedDigitForDigit) {
   const char* folder = std::getenv("RISLEY_VENDOR_DATA");
   if (folder == nullptr) GTEST_SKIP() << "SKIPPED: RISLEY_VENDOR_DATA names no folder";

@@ -141,7 +141,7 @@ TEST(TrajectoryNoise, SameSeedSameBits) {
   EXPECT_EQ(a.position, b.position);
   for (std::size_t i = 0; i < 50; ++i) EXPECT_EQ(a.attitude[i].coeffs(), b.attitude[i].coeffs());
   EXPECT_NE(with_errors(truth, model(), 8).position[0], a.position[0]);
-  // Uneven steps: as correlated as their distance tells, not as their number.
+  // Uneven steps: as correlated as their distance implies, not their number.
   Trajectory uneven = truth;
   for (std::size_t i = 25; i < 50; ++i) uneven.time_ns[i] += 3'600'000'000'000;
   const Trajectory far = with_errors(uneven, model(), 7);

@@ -115,8 +115,8 @@ TEST(Calibration, Section33ScattersAsItMustByBothMethods) {
   EXPECT_LE(adjusted.mean_shape(), 0.007);
 }
 
-TEST(Calibration, AHallTellsTenTimesAsMuch) {
-  const int seeds = seeds_or(20);
+TEST(Calibration, AHallDeterminesTenTimesAsMuch) {
+  const int seeds = seeds_or(20, 4);
   const WallMonteCarlo result = testing::wall_monte_carlo(
       seeds, [](std::uint64_t seed) { return wall_settings(hall(), seed); }, wall_options());
   result.record();

@@ -108,7 +108,7 @@ TEST(Map, RoundedAnglesOfARealSensorKeepTheirSigma) {
 }
 
 TEST(Map, RotorsThatMoveAsTheModelSaysAreKnownExactlyAsWellAsStated) {
-  // The motion model is found by maximum likelihood, not told.
+  // The motion model is found by maximum likelihood, not given.
   const MonteCarlo result = monte_carlo(Method::map, testing::seeds_or(8), [](std::uint64_t seed) {
     auto settings = table3_settings(seed);
     settings.rotor = simulation::RotorKind::random_walk;
@@ -135,7 +135,7 @@ TEST(Map, HuntingRotorsAreFollowedHonestly) {
 }
 
 TEST(Map, CorrelatedNoiseIsSeenAndPaidFor) {
-  // AR(1) noise, rho 0.9 at 100 kHz: nineteen shots tell what one independent shot would.
+  // AR(1) noise, rho 0.9 at 100 kHz: nineteen shots are worth one independent shot.
   constexpr double kRho = 0.9;
   const MonteCarlo result = monte_carlo(
       Method::map, 6,

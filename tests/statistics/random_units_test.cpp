@@ -30,7 +30,7 @@ double log_uniform(const RandomStream& stream, std::uint64_t number, double leas
   return least * std::pow(most / least, stream.uniform(number));
 }
 
-/// What the answers of many units come to.
+/// Summary of the answers of many units.
 class Score {
  public:
   void refuse(int unit, const std::string& reason) {
@@ -116,7 +116,7 @@ simulation::SimulationSettings random_sensor(std::uint64_t seed) {
 }
 
 TEST(RandomUnits, SensorsLieWithinTheirTotalSigmasOrAreRefused) {
-  const int seeds = seeds_or(6);
+  const int seeds = seeds_or(6, 6);
   Score score;
   for (int seed = 0; seed < seeds; ++seed) {
     SCOPED_TRACE(seed);

@@ -124,7 +124,7 @@ inline WallRecording record_walls(const simulation::SimulationSettings& settings
   return result;
 }
 
-/// What the command takes when it is told the noise.
+/// What the command takes when the noise is given.
 inline calibration::CalibrationOptions wall_options(
     calibration::CalibrationMethod method = calibration::CalibrationMethod::adjustment) {
   calibration::CalibrationOptions options;

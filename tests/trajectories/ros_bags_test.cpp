@@ -406,7 +406,7 @@ TEST(RosBags, StampsAreNanosecondsOfTheHeader) {
     ASSERT_EQ(t.size(), flown.size());
     for (std::size_t i = 0; i < t.size(); ++i) EXPECT_EQ(t.time_ns[i], flown[i].time_ns);
   }
-  // Since power-on: a clock that nobody has stated.
+  // Since power-on: a clock that is not stated.
   for (std::size_t i = 0; i < flown.size(); ++i)
     flown[i].time_ns = static_cast<std::int64_t>(i) * 10'000'000;
   const Trajectory t = load_trajectory(write(BagKind::ros1, {{"/a", Type::pose, flown}}));

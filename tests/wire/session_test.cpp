@@ -207,7 +207,7 @@ TEST(Session, DamagedFramesDoNothing) {
   link.sensor.receive({kHost, kCommandPort}, kSensorPort, stop, link.now);
   EXPECT_TRUE(link.sensor.sampling());
   EXPECT_EQ(link.sensor.rejected(), 1U);
-  // Replies nobody asked for, of another sequence, or to another command.
+  // Replies to no request, of another sequence, or to another command.
   const auto hand_over = [&](const Reply& reply) {
     link.client.receive(encode(reply, 60'000), link.now);
   };

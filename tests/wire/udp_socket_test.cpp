@@ -61,7 +61,7 @@ TEST(UdpSocket, WhatTheKernelHasNoRoomForIsCounted) {
   for (std::size_t i = 0; i < kCount; ++i) there.send(here.local(), bytes_of_text(text));
   std::size_t count = 0;
   for (std::size_t more = 1; more > 0;) count += more = received(here).size();
-  there.send(here.local(), bytes_of_text("last"));  // tells of what was dropped
+  there.send(here.local(), bytes_of_text("last"));  // reports what was dropped
   EXPECT_EQ(received(here).size(), 1U);
   EXPECT_GT(here.kernel_drops(), 0U);
   EXPECT_EQ(here.kernel_drops() + count, kCount);

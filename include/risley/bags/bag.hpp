@@ -51,7 +51,7 @@ bool is_bag_folder(const std::string& folder);
 ///         where they do not lie unpacked beside
 std::vector<std::string> files_of_bag_folder(const std::string& folder);
 
-/// The messages that are known here, told by type in ROS 2 and by type's md5 in ROS 1.
+/// Known messages, identified by type in ROS 2 and by the type's MD5 in ROS 1.
 enum class MessageKind : std::uint8_t {
   points,                ///< CustomMsg of the Livox drivers
   cloud,                 ///< sensor_msgs PointCloud2

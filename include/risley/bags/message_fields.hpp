@@ -52,7 +52,7 @@ class Ros1Fields {
     return {bytes.begin(), bytes.end()};
   }
 
-  /// Length of a sequence whose elements have at least so many bytes. @throws BadMessage
+  /// Length of a sequence whose elements have at least this many bytes. @throws BadMessage
   std::uint32_t length(std::string_view what, std::size_t bytes_each) {
     const auto count = number<std::uint32_t>("the length of the " + std::string(what));
     require_room(what, count, bytes_each, left());
@@ -88,7 +88,7 @@ class CdrFields {
   /// @throws BadMessage
   std::string text(std::string_view what = {});
 
-  /// Length of a sequence whose elements have at least so many bytes. @throws BadMessage
+  /// Length of a sequence whose elements have at least this many bytes. @throws BadMessage
   std::uint32_t length(std::string_view what, std::size_t bytes_each);
 
   /// A sequence of bytes behind its length. @throws BadMessage

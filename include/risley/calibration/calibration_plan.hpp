@@ -74,7 +74,7 @@ struct AdjustedParameters {
 };
 
 /// The free parameters of a calibration and, with what the sensor states of them as priors, the
-/// tilts that directions do not tell and walls do: prism A's horizontal one, by default; also the
+/// tilts that walls determine and directions do not: prism A's horizontal one, by default; also the
 /// lean of a last axis that has one.
 /// @param angle_sigma  prior sigma of every angle, rad; none: only those of these tilts
 /// @throws InvalidArgument as calibration_parameters()
@@ -83,9 +83,9 @@ AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
                                        const std::vector<std::string>& additional,
                                        std::optional<double> angle_sigma);
 
-/// Free parameters of a calibration: what walls can tell, less the fixed ones plus the others. The
-/// refractive index is held unless asked for, since the recording itself tells it better; so is a
-/// lean of the last axis, which is known no better than the walls' poses.
+/// Free parameters of a calibration: what walls can determine, less the fixed ones plus the others.
+/// The refractive index is held unless asked for, since the recording itself determines it better;
+/// so is a lean of the last axis, which is known no better than the walls' poses.
 /// @throws InvalidArgument for a name that is no parameter of the prisms, or is in both lists
 std::vector<estimation::FreeParameter> calibration_parameters(
     TrainShape shape, const std::vector<std::string>& fixed,

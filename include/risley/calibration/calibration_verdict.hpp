@@ -12,7 +12,7 @@ enum class CalibrationCode {
   off_within_tolerance,  ///< the beam goes elsewhere, significantly, but less than is tolerated
   bent,                  ///< the beam goes elsewhere, significantly and more than is tolerated
   not_better,            ///< parameters moved, and walls are no flatter, strips no closer for it
-  undecided,             ///< the data do not tell, or contradict what is stated of them
+  undecided,             ///< the data cannot decide, or contradict what is stated
 };
 
 /// "as_believed", ...

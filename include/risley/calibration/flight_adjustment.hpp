@@ -45,8 +45,8 @@ Eigen::MatrixXd value_rates(const FlightModel& model);
 /// knots, six by six, and behind them the globals.
 class FlightSystem {
  public:
-  /// @throws InvalidArgument for sizes that do not fit, EstimationError when the equations tell
-  /// some
+  /// @throws InvalidArgument for sizes that do not fit, EstimationError when the equations
+  /// determine some
   ///         unknown nothing at all and no prior does
   FlightSystem(const FlightEquations& equations, const FlightModel& model,
                const FlightPriors& priors);

@@ -56,7 +56,7 @@ struct FlightCalibrationOptions {
   double cell_size = 2;               ///< of the ground's cells at the end, m
   double most_roughness = 0.06;       ///< of a cell, m, see GroundCellOptions
   std::size_t coarse_shots = 120000;  ///< with which the first rounds are made
-  /// With which the last but one is made: these tell the ranges' noise.
+  /// With which the last but one is made: these show the ranges' noise.
   std::size_t many_shots = 2'000'000;
   std::uint64_t seed = 0;  ///< of their choice
 };
@@ -98,7 +98,7 @@ struct TrajectoryFit {
   bool fits = true;                   ///< after that
 };
 
-/// A parameter that the adjustment holds and that may be off, as the flight itself tells it.
+/// A parameter that the adjustment holds and that may be off, as the flight itself determines it.
 struct HeldParameter {
   std::string name;
   double held = 0, stated_sigma = 0;  ///< SI
@@ -134,7 +134,7 @@ struct FlightCalibration : FlightJudgement {
   /// Beyond chance: the clock offset contradicts what is stated of it.
   bool clock_contradicts = false;
   TrajectoryFit trajectory_fit;
-  std::vector<HeldParameter> held;   ///< indices that recordings told, above all
+  std::vector<HeldParameter> held;   ///< mostly indices that recordings determined
   std::vector<SeenControl> control;  ///< in the order of the options
   std::vector<StripPair> pairs_before, pairs_after;
   double rms_before = 0, rms_after = 0;  ///< of all pairs and cells, along the normals, m

@@ -68,7 +68,7 @@ struct FlightModel {
   std::vector<GroundPlane> planes;
 
   /// Where given, a drift of the clock of 0 about this time, ns, is one more unknown: its
-  /// derivatives tell how much of one there is.
+  /// derivatives say how much of one there is.
   std::optional<std::int64_t> drift_about_ns;
   /// One more unknown: by how much the attitudes of the trajectory are late, now by 0 s. A record
   /// then has the attitude that the body had so long before the record's time.

@@ -36,7 +36,7 @@ struct SharedPointErrors {
   std::size_t places = 0, pairs = 0;
 };
 
-/// What a flight will tell.
+/// What a flight will determine.
 struct FlightForecast : FlightJudgement {
   std::vector<Warning> warnings;
   std::vector<trajectories::StripTimes> strips;

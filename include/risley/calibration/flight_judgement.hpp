@@ -35,13 +35,13 @@ struct FlightDatum {
   double height = 0;  ///< median range, m: times an angle gives what it is on the ground
 };
 
-/// A combination of unknowns that the flight does not tell.
+/// A combination of unknowns that the flight does not determine.
 struct NotTold {
   std::string words;  ///< "1.00 lever_arm_z_m", "boresight about the vertical against heading"
   double sigma = 0;   ///< after the flight, in sigmas before it
 };
 
-/// What a flight tells of everything that is the same for all of it, and what it does not.
+/// What a flight determines of everything that stays the same during it, and what it does not.
 struct FlightJudgement {
   std::vector<FlightUnknown> unknowns;
   /// [unknowns, unknowns], SI: noise, white noise shared by samples, the trajectory's process

@@ -17,8 +17,8 @@ namespace risley::calibration {
 struct FlightRecordings {
   FlightShots shots;
   /// The sensor that was given, with what it computes its directions with: parameters that the
-  /// recordings tell, and how well. One with a covariance, as a calibration writes it, keeps its
-  /// own parameters.
+  /// recordings determine, and how well. One with a covariance, as a calibration writes it, keeps
+  /// its own parameters.
   sensors::Sensor sensor;
   PrismTrain believed;  ///< what the recordings' directions were computed with
   /// What the recordings together say of the believed parameters moved the rotation angles of each

@@ -97,7 +97,7 @@ struct StripPair {
   std::size_t cells = 0;     ///< that both have seen
   double mean = 0, rms = 0;  ///< of the second less the first, along the cells' normals, m
   /// The shift east, north, up that explains most of it, and its sigma, m; where the ground does
-  /// not tell it, sigma is 1.
+  /// not determine it, sigma is 1.
   Eigen::Vector3d shift{0, 0, 0}, sigma{1, 1, 1};
 };
 

@@ -42,8 +42,8 @@ struct Wall {
   WallGrid grid = {};  ///< empty: the wall is flat
 };
 
-/// What one recording saw of one wall. Each has a distance of its own: nobody measures where in the
-/// sensor its origin is, and a rotation about the origin leaves the distance alone.
+/// What one recording saw of one wall. Each has a distance of its own: it is not measured where in
+/// the sensor its origin is, and a rotation about the origin leaves the distance alone.
 struct WallView {
   std::size_t recording = 0;  ///< row of PlanarProblem::stations
   std::size_t wall = 0;       ///< row of PlanarProblem::walls

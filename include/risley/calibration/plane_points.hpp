@@ -63,7 +63,7 @@ struct RangedRecording {
   Eigen::MatrixXd mean_angle_covariance;  ///< [prisms, prisms], rad^2, at given parameters
   /// What parameters that the estimate held may be off by does to it; empty: nothing.
   estimation::HeldChanges held_changes;
-  bool unit_assumed = false;      ///< nobody stated the unit of the ranges
+  bool unit_assumed = false;      ///< the unit of the ranges is stated nowhere
   std::size_t without_range = 0;  ///< shots that had a direction and no range
   std::size_t outliers = 0;       ///< shots whose reported direction was an outlier
 };

@@ -12,7 +12,7 @@
 
 namespace risley::calibration {
 
-/// How planes are told from clutter.
+/// How planes are separated from clutter.
 struct SegmentationOptions {
   double range_noise = 0.02;  ///< 1 sigma along the beam, m
   /// 1 sigma of directions that are not calibrated yet, without the rotation that all share, rad.

@@ -27,7 +27,7 @@ struct StepRegion {
   std::vector<std::size_t> rows;
 };
 
-/// What the residuals tell of a surface.
+/// What the residuals show of a surface.
 struct SurfaceReport {
   std::vector<StepRegion> steps;  ///< largest solid angle first
   /// Mean square of cell means over their variances, less the step regions and the cells beside
@@ -42,7 +42,7 @@ inline constexpr double kSurfaceCell = 0.017453292519943295;
 /// Looks for compact steps and unevenness in means over cells of the field of view. A step of a
 /// few sigmas on a small region is taken up by the calibration parameters, which bend the rest of
 /// the plane smoothly; so the cells are compared with a smooth surface fitted robustly to all of
-/// them, and not with zero. Cells are told apart in sigmas of their medians: a step has at least
+/// them, and not with zero. Cells are compared in sigmas of their medians: a step has at least
 /// three of them, is higher than 5 mm, and stands out from waves of the surface. On noise alone
 /// less than one of a thousand surfaces shows one. Rows that are not finite are left out.
 /// @throws InvalidArgument when the columns differ in length

@@ -44,7 +44,7 @@ class Georeference {
  public:
   /// @param platform         must outlive this
   /// @param recording_clock  of the points' times
-  /// @param first_time_ns    of the recording, by which weeks and days are told
+  /// @param first_time_ns    of the recording, which decides weeks and days
   /// @throws InvalidArgument as MapProjection, Interpolation, require_mount; for a map and a
   ///         trajectory in a frame of its own
   Georeference(const MovingPlatform& platform, recordings::TimeReference recording_clock,

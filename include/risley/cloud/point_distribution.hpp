@@ -38,7 +38,7 @@ struct SwathProfile {
   std::vector<double> density;  ///< [stripes], of the strip's whole length, 1/m^2
 };
 
-/// Shares of half the swath's width at which densities are told.
+/// Shares of half the swath's width at which densities are given.
 inline constexpr std::array<double, 6> kSwathPlaces{0.25, 0.5, 0.75, 0.9, 0.97, 0.99};
 
 /// How the points of one strip lie on the ground. The swath is what the sensor of a level platform

@@ -113,7 +113,7 @@ enum class PointUnit : std::uint8_t { one, metres, square_metres, degrees, secon
 enum class PointType : std::uint8_t { uint8, float32, float64, int32, int64 };
 
 /// A column of points, or several alike: one for each term of a covariance, each prism, or each
-/// axis of each common factor. {} in names and words stands for what tells these apart.
+/// axis of each common factor. {} in names and words stands for what distinguishes them.
 struct PointColumn {
   using Numbers = std::vector<double>;  ///< of most columns
   ColumnPlace<Points, std::vector<std::int64_t>, Numbers, std::vector<std::uint8_t>,

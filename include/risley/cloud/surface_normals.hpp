@@ -32,7 +32,7 @@ class SurfaceNormals {
 
   /// Forgets all shots; normals stay until the next fit().
   void clear();
-  /// Adds one shot; one without a range above 0 tells nothing. @param azimuth, zenith  rad
+  /// Adds one shot; one without a range above 0 is ignored. @param azimuth, zenith  rad
   /// @param range  m
   void add(double azimuth, double zenith, double range);
   /// Fits all cells to the shots added.

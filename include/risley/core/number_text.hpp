@@ -28,7 +28,7 @@ NumberText number_text(double value, double sigma);
 /// number_text.
 std::string text_to_place_of(double value, double sigma);
 
-/// Where people are told how far a small angle moves a point, m.
+/// Distance at which messages give the shift that a small angle causes, m.
 inline constexpr double kStatedDistance = 30;
 
 /// How far a direction that is off by an angle, rad, moves a point at a distance, m, from where it

@@ -31,9 +31,9 @@ class CancelFlag {
   std::atomic<bool> set_{false};
 };
 
-/// How a long computation tells its caller where it stands, and hears that it shall stop. It calls
+/// How a long computation reports its progress and learns that it is cancelled. It calls
 /// from one thread at a time. A callback stops it by throwing, best Cancelled; a flag stops it with
-/// Cancelled also where there is nothing to tell. An empty Progress means that nobody is watching.
+/// Cancelled also where there is nothing to report. An empty Progress ignores reports.
 class Progress {
  public:
   /// @param fraction  done, [0, 1]  @param stage  of a job that has several; may be empty
@@ -69,7 +69,7 @@ class Progress {
     result.callback_ = std::move(callback);
     return result;
   }
-  /// For work whose share is not known: it can be cancelled by the flag and tells nothing.
+  /// For work whose share is not known: it can be cancelled by the flag and reports nothing.
   Progress silent() const { return with({}); }
   /// For a stage of a job: the same, its fractions from 0 to 1 again.
   Progress stage(std::string name) const {
@@ -77,7 +77,7 @@ class Progress {
     result.stage_ = std::move(name);
     return result;
   }
-  /// For a part of the work: its 0 is told as `from`, its 1 as `to`.
+  /// For a part of the work: its 0 is reported as `from`, its 1 as `to`.
   Progress part(double from, double to) const {
     if (!callback_) return *this;
     return with([callback = callback_, from, to](double fraction, std::string_view stage) {

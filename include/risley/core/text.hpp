@@ -12,7 +12,7 @@ namespace risley {
 /// The same with the letters A to Z in lower case, for endings of file names.
 std::string lower_case(std::string text);
 
-/// The name that somebody may have meant who wrote another word: the one that fewest changed,
+/// The known name that was probably meant by another word: the one that fewest changed,
 /// missing, added or swapped letters separate from it, where capitals and hyphens, underscores and
 /// spaces do not count; else the first name that the word is the beginning of, up to such a mark.
 /// Empty when every name is further than a third of its letters away.

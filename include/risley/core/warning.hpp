@@ -21,7 +21,7 @@ struct WarningCode {
   bool operator==(const WarningCode&) const = default;
 };
 
-/// All of them; docs/files.md says what each means.
+/// All of them; docs/files/json.md explains each.
 struct WarningCodes {
   // What a file holds.
   WarningCode cut_off{"cut_off"}, content_left_out{"content_left_out"},

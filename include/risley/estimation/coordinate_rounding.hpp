@@ -12,7 +12,7 @@ namespace risley::estimation {
 
 /// How coordinates became whole steps.
 enum class CoordinateRounding {
-  unknown,      ///< no coordinates, or the data do not tell
+  unknown,      ///< no coordinates, or undecided by the data
   nearest,      ///< to the nearest step
   toward_zero,  ///< cut off: every coordinate is half a step too small in the mean
 };
@@ -28,7 +28,7 @@ std::string to_string(CoordinateRounding rounding);
 void add_half_steps(AngleSeries& series, const Eigen::Matrix3d& recording_from_sensor);
 
 /// How far the directions of such a series would move, in sigmas of all shots together: below 5 or
-/// so the two ways of rounding cannot be told apart.
+/// so the two ways of rounding cannot be distinguished.
 /// @param noise  of the angles beside the rounding, 1 sigma, rad
 double half_step_signal(const AngleSeries& series, double noise);
 

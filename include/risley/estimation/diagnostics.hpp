@@ -40,7 +40,7 @@ struct Autocorrelation {
   /// 1 + 2 (rho_1 + rho_2 + ...): by so much larger is the variance of a mean than that of as many
   /// independent residuals. Never below 1.
   double factor = 1.0;
-  std::vector<double> rho;  ///< at lags 1, 2, ... until it cannot be told from zero
+  std::vector<double> rho;  ///< at lags 1, 2, ... until it is no different from zero
 };
 
 /// Autocorrelation of residual columns, both axes together; pairs with a shot missing between them

@@ -37,7 +37,7 @@ struct EkfOptions {
 /// starts from a wide prior at the forward filter's last state, so no observation counts twice;
 /// process noise is continuous and found by maximum likelihood. docs/theory/ekf.md
 /// Parameters and their covariance are means over the smoothed ones; the trajectory has a knot for
-/// every shot, without acceleration. Data and prior are not told apart, nor common errors of the
+/// every shot, without acceleration. Data and prior are not separated, nor common errors of the
 /// angles. Memory is that of the result: filtered covariances live for one block of shots at a
 /// time.
 /// @throws EstimationError when the series is empty or the filter diverges (message says where)

@@ -15,8 +15,9 @@
 
 namespace risley::estimation {
 
-/// How well one parameter of one prism is told, by what is known of the emitters: Cramer-Rao bounds
-/// with the free parameters and this one, SI units; infinite where no such data can tell.
+/// How well one parameter of one prism is determined, given what is known of the emitters:
+/// Cramer-Rao bounds with the free parameters and this one, SI units; infinite where no such data
+/// determine it.
 struct EmitterBounds {
   std::string name;
   double all = 0;    ///< all emitters, their directions as free as they are
@@ -25,12 +26,12 @@ struct EmitterBounds {
   double alone = 0;
 };
 
-/// What several emitters behind the same prisms tell that one of them does not.
+/// What several emitters behind the same prisms determine and one of them does not.
 struct EmitterComparison {
   int emitters = 0;  ///< that fired
   int alone = 0;     ///< the one that is taken alone, from 0: the one nearest to the axis
   std::vector<EmitterBounds> bounds;  ///< each prism's own glass, wedge and tilts
-  /// Combinations of what is free for the one alone that its shots do not tell.
+  /// Combinations of free parameters that the shots of one emitter do not determine.
   std::vector<WeakDirection> untold_alone;
 };
 
@@ -47,8 +48,8 @@ EmitterComparison compare_emitters(const AngleSeries& series, const RotorTraject
                                    const ShotWeights& weights, double factor,
                                    const Progress& progress = {});
 
-/// The same in sentences: which parameters only several emitters tell, which they tell better, and
-/// which would be known better if the emitters' directions were known.
+/// The same in sentences: which parameters only several emitters determine, which they determine
+/// better, and which would be known better if the emitters' directions were known.
 std::vector<std::string> emitter_words(const EmitterComparison& comparison);
 
 }  // namespace risley::estimation

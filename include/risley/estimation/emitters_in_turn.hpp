@@ -23,7 +23,7 @@ int emitters_in_turn(const CountedShots& shots);
 
 /// How many rows stand between two places where the beam of an emitter jumps or turns as no rotors
 /// move it from one of its shots to the next; infinite where it does not, or there are too few
-/// shots to tell. @param emitters  of the sensor, which fire in turn
+/// shots to decide. @param emitters  of the sensor, which fire in turn
 double rows_between_jumps(const CountedShots& shots, int emitters);
 
 }  // namespace risley::estimation

@@ -81,7 +81,7 @@ struct SpeedFactor {
 /// Everything one estimation found: the solution, what it was found from, and whether to believe
 /// it.
 struct Estimate : Solution {
-  Method method = Method::map;  ///< to be told, not to be asked: every method answers alike
+  Method method = Method::map;  ///< for reports only: all methods answer alike
   bool converged = false;
   std::string reason;  ///< why not converged; empty when converged
   EstimateVerdict verdict;
@@ -93,10 +93,10 @@ struct Estimate : Solution {
   CoordinateRounding coordinates = CoordinateRounding::unknown;
   Start start;
   std::vector<FreeParameter> free;
-  std::optional<SpeedFactor> speed_factor;  ///< where the rotors tell one that is not 1
+  std::optional<SpeedFactor> speed_factor;  ///< if the rotors show one that is not 1
   std::vector<EstimatedValue> values;       ///< parameters, mean speeds, first rotation angles
   HeldChanges held_changes;
-  /// Parameter combinations that the data do not tell; any makes the estimate not converged.
+  /// Parameter combinations that the data do not determine; any makes the estimate not converged.
   std::vector<WeakDirection> unobservable;
 
   PackedSeries series;  ///< the shots in the sensor's frame, see prepare_shots()

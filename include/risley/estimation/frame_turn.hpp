@@ -15,8 +15,8 @@ namespace risley::estimation {
 
 /// How the frame of a recording stands against the sensor's: p_recording = Rz(yaw) Ry(pitch)
 /// p_sensor, rad. A hub or a vehicle's calibration turns clouds so. The sensor's optical axis then
-/// points to azimuth yaw and elevation -pitch. Directions alone do not tell a roll about that axis
-/// from other zeros of all rotation angles; it is taken as 0.
+/// points to azimuth yaw and elevation -pitch. Directions alone do not determine a roll about that
+/// axis from other zeros of all rotation angles; it is taken as 0.
 ///
 /// Of a sensor whose axis of rotation is its Z, yaw and pitch are about Z and Y of the train's
 /// frame, which are the sensor's Y and X, and the axis is Z.

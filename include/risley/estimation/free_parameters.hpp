@@ -26,8 +26,8 @@ bool one_glass(const PrismTrain& train);
 
 /// The paper's choice for any number of prisms: the refractive index, all incident beams, every
 /// bearing tilt, the vertical tilt of every prism and the horizontal tilt of the last. Air, wedge
-/// angles and the other horizontal tilts cannot be told from the rest and stay fixed.
-/// [B21 section 2.3] Several emitters do tell the other horizontal tilts: they are free then.
+/// angles and the other horizontal tilts cannot be separated from the rest and stay fixed.
+/// [B21 section 2.3] Several emitters do determine the other horizontal tilts: they are free then.
 /// @param one_glass  one index for all prisms; otherwise each has its own
 std::vector<std::string> default_free_names(TrainShape shape, bool one_glass = true);
 

@@ -37,7 +37,7 @@ struct StartOptions {
   friend bool operator==(const StartOptions&, const StartOptions&) = default;
 };
 
-/// How rotors are taken to move before the recording tells.
+/// How rotors are assumed to move before the recording shows it.
 struct FirstMotion {
   double window = 0.025;  ///< s, in which a speed is as good as constant
   RotorProcess process = kSettlingProcess;
@@ -58,7 +58,7 @@ struct Start {
   FirstMotion motion;              ///< faster where the sensor's speeds swing
 };
 
-/// What was found out about some shots on the way to a start, so that who asks next need not look
+/// What was found out about some shots on the way to a start, so that the next caller need not look
 /// for it again. It holds for these shots alone.
 struct StartFindings {
   /// A question that was asked, and its answer.
@@ -79,7 +79,7 @@ struct StartFindings {
 /// and so loses no shot, and half of the field may be missing.
 ///
 /// Whether a recording holds the mirror image of what the sensor can produce (its elevation has the
-/// other sign), as public copies of some vendor files do, cannot be told from the speeds: a
+/// other sign), as public copies of some vendor files do, cannot be seen from the speeds: a
 /// mirrored first combination turns like the second. The optics can: prisms bend differently when
 /// met from the other side, and the fit leaves a tenth of a degree for the wrong image.
 /// @param head   every shot of about the first second, as recorded

@@ -37,7 +37,7 @@ struct QuantityObservability {
   /// unit. A speed turns the prism about the middle of the recording.
   double sensitivity = 0;
   /// Cramer-Rao bound with the free quantities, and with this one too when it is not among them;
-  /// infinite where no data of the kind can tell. Rotation angles and speeds: in the middle.
+  /// infinite where no data of the kind determine it. Rotation angles and speeds: in the middle.
   double sigma = 0;
   /// What it is most correlated with among those, and how much: the strongest, and others beyond
   /// 0.98, strongest first.
@@ -48,7 +48,7 @@ struct QuantityObservability {
 struct Observability {
   std::vector<QuantityObservability> quantities;  ///< all of the prisms, then angles, then speeds
   /// Correlation of everything in quantities with all of the prisms' parameters free, under their
-  /// wide priors (1 degree, 0.01 of an index): what would happen to who frees everything.
+  /// wide priors (1 degree, 0.01 of an index): what would happen if everything were free.
   std::vector<std::string> correlation_names;
   Eigen::MatrixXd correlation;
   /// With all of the prisms' parameters free: combinations that keep their prior sigma or more.
@@ -68,7 +68,7 @@ Observability observability_of_plan(const ObservabilityPlan& plan, const Progres
 Observability observability_of_estimate(const Estimate& estimate, const Progress& progress = {});
 
 /// What a user should know, in sentences: which parameters to hold fixed, what each is mixed up
-/// with, and how long a recording would have to be to tell them after all.
+/// with, and how long a recording would have to be to determine them.
 std::vector<std::string> observability_words(const Observability& observability, TrainShape shape);
 
 }  // namespace risley::estimation

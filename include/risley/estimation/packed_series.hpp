@@ -100,7 +100,7 @@ class PackedSeries {
   };
   /// What the numbers of angles that are multiples of a step stand for.
   struct Grid {
-    float variance = 0;         ///< of rounding, which tells the step; 0: none was met
+    float variance = 0;         ///< of rounding, which gives the step; 0: none was met
     std::vector<double> value;  ///< [65536] by number; NaN where none was met
   };
   /// Numbers of a grid, or the angles themselves.

@@ -61,8 +61,8 @@ GuessedPlaces guess_places(const PacketShots& shots, const std::vector<std::uint
 
 /// Finds the places of the shots. Those of whole packets are evident, and those of a single
 /// emitter's runs of shots that go on smoothly from packet to packet; where there are enough they
-/// tell optics and rotors. Otherwise packets of several emitters that lack few shots tell, each by
-/// itself, the angles of the rotors, the order of the emitters and their shots' places, because
+/// determine optics and rotors. Otherwise packets of several emitters that lack few shots do, each
+/// by itself, the angles of the rotors, the order of the emitters and their shots' places, because
 /// neighbouring shots are far apart. From there the rotors are followed from packet to packet in
 /// both directions, and in each the likeliest places in ascending order are taken; a shot that fits
 /// another place nearly as well has none. docs/theory/slips.md

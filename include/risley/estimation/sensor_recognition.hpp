@@ -43,8 +43,8 @@ struct SensorMatch {
   bool mirrored = false;
   FrameTurn frame;    ///< where the optical axis stands, to a degree or so
   FiringOrder order;  ///< of a sensor with several emitters
-  /// Of the recording about the optical axis, rad in (-pi, pi]: what the emitters tell of it; 0
-  /// where they tell nothing.
+  /// Of the recording about the optical axis, rad in (-pi, pi]: as the emitters show it; 0
+  /// where they do not.
   double roll = 0;
 };
 
@@ -62,7 +62,7 @@ inline constexpr double kClearlyWorse = 1.5;
 /// their amplitudes, which say how far the prisms bend, and how far the emitters stand apart. Every
 /// sensor is tried in all its speed combinations, as recorded and mirrored, whatever way the
 /// recording's frame is turned. Where lines do not decide, because shots in a corner of the field
-/// tell little of their amplitudes, the sensors' optics do. docs/theory/start.md
+/// say little about their amplitudes, the sensors' optics do. docs/theory/start.md
 /// @param head   every shot of about the first second, as recorded
 /// @param found  about the head before; this adds to it
 /// @throws EstimationError as LineSearch
@@ -80,7 +80,7 @@ std::optional<double> start_residual(const AngleSeries& head, const sensors::Sen
 void number_beams(AngleSeries& series, const sensors::Sensor& sensor, const FiringOrder& order);
 
 /// The candidate with the smallest field of view that holds the shots and has their beams: all that
-/// shots without times, or too few, tell.
+/// shots without times, or too few, allow.
 /// @return its place; empty when no field holds them
 std::optional<std::size_t> smallest_field(const AngleSeries& head,
                                           std::span<const sensors::Sensor> candidates,

@@ -26,7 +26,7 @@ struct ShotCount {
 /// Finds slips of the shot count: where shots are missing from a recording, every later time is too
 /// early, and the phases of all rotors jump by the same time, which no motor does. The rotors are
 /// followed from a stretch without slips in both directions; where they leave their prediction, the
-/// number of shots that brings them back is looked for. Where it cannot be told, the recording is
+/// number of shots that brings them back is looked for. Where it cannot be found, the recording is
 /// to be cut. docs/theory/slips.md
 /// @throws InvalidArgument for columns of different lengths, a shot rate that is not above 0
 ShotCount find_slips(const CountedShots& shots, const sensors::Sensor& sensor,

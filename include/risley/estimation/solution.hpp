@@ -24,7 +24,7 @@ struct CommonAngleErrors {
   /// How the rotation angles follow the parameters, mean over the recording [prisms, free]: an
   /// error of the parameters moves all angles of a rotor by nearly the same.
   Eigen::MatrixXd sensitivity;
-  /// What all shots together tell of a shift of all angles, at given parameters [prisms, prisms],
+  /// What all shots together say about a shift of all angles, at given parameters [prisms, prisms],
   /// rad^-2: its inverse is the covariance of the mean errors of the angles.
   Eigen::MatrixXd information;
 };
@@ -57,11 +57,11 @@ struct Solution {
   /// turned back by it. Identity unless it was free.
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();
   Eigen::Matrix2d frame_covariance = Eigen::Matrix2d::Zero();  ///< turns about Z and Y, rad^2
-  /// Parameters, frame: what the data alone tell of both together, variance factor included. Empty
-  /// where the estimator does not tell data from prior.
+  /// Parameters, frame: what the data alone say about both together, variance factor included.
+  /// Empty where the estimator does not separate data from prior.
   std::vector<FreeParameter> constants;
   Eigen::MatrixXd information;  ///< [constants, constants]
-  /// What the angles of a rotor have in common, where the estimator tells it.
+  /// What the angles of a rotor have in common, if the estimator provides it.
   std::optional<CommonAngleErrors> common_angles;
 };
 

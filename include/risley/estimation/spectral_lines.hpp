@@ -42,7 +42,7 @@ struct RotorLines {
   std::vector<EmitterConstant> emitters;  ///< those that have shots
   double unexplained = 0;  ///< mean square of what the fit leaves, of the unit vector
   /// How that grows with a change of the lines' complex amplitudes, as change^H normal change,
-  /// [turning rotors squared]. Small where the shots tell little of them.
+  /// [turning rotors squared]. Small where the shots say little about them.
   Eigen::MatrixXcd normal;
 };
 
@@ -118,7 +118,7 @@ inline constexpr double kUsualShare = 0.06;
 /// So many minima of a search for speeds are tried.
 inline constexpr std::size_t kMostMinima = 4;
 
-/// Duration of the shortest window that tells the rotors of a sensor apart, s.
+/// Duration of the shortest window that separates the rotors of a sensor, s.
 inline constexpr double kShortestStart = 0.02;
 
 }  // namespace risley::estimation

@@ -10,7 +10,7 @@ namespace risley::estimation {
 enum class StoredPoseUse {
   not_applied,  ///< shots lie in the sensor's field of view as recorded
   applied,      ///< shots lie in it only after turning back
-  undecided,    ///< the shots do not tell
+  undecided,    ///< the shots cannot decide
 };
 
 /// What the shots say of a stored pose.

@@ -11,7 +11,7 @@ enum class EstimateCode {
   consistent,    ///< directions agree with the sensor's own belief; walls have not been asked
   unusual,       ///< they do, but something is not as in a healthy unit
   inconsistent,  ///< the model does not describe them
-  undecided,     ///< the data do not tell
+  undecided,     ///< the data cannot decide
 };
 
 /// "consistent", ...

@@ -12,7 +12,7 @@
 
 namespace risley::estimation {
 
-/// A combination of parameters that data do not tell.
+/// A combination of parameters that data do not determine.
 struct WeakDirection {
   /// Parameters by name, each in its prior sigmas (1 degree, 0.01 in an index), as a unit vector;
   /// weights below 0.05 are left out. The largest is positive.

@@ -11,17 +11,17 @@
 
 namespace risley::identification {
 
-/// A sensor from what a scan told of it.
+/// A sensor from what its scan revealed.
 struct IdentifiedSensor {
   sensors::Sensor sensor;
-  /// Shots of the sensor for each row of the recording, 1 where nothing tells that some are left
+  /// Shots of the sensor for each row of the recording, 1 where nothing shows that some are left
   /// out. Only shots that share a time show what the sensor's own shots are.
   int decimation = 1;
 };
 
 /// The best hypothesis as a preset: optics, mean speeds, and the scan from the first shot, so that
-/// its row r is the recording's; the frame's turn is no part of it. What directions do not tell,
-/// such as limits of range, is taken from `rest` and said to be assumed.
+/// its row r is the recording's; the frame's turn is no part of it. What directions do not
+/// determine, such as limits of range, is taken from `rest` and said to be assumed.
 /// @param rest  any sensor
 IdentifiedSensor identified_sensor(const Identification& identification, const std::string& name,
                                    const sensors::Sensor& rest);

@@ -29,11 +29,12 @@ struct Hypothesis {
   /// By how much it is worse than the best one: chi squared of 2 N independent angles.
   double excess = 0;
   /// Places in Identification::hypotheses of trains whose scans no recording of this kind could
-  /// tell from this one's.
+  /// distinguish from this one's.
   std::vector<std::size_t> equivalent_to;
 
   /// Covariance of the same names as the fit's with the glass of every prism free, where the fit
-  /// took it as one: what is assumed counts; infinite where nothing tells. Empty unless the best.
+  /// took it as one: what is assumed counts; infinite if nothing determines it. Empty unless the
+  /// best.
   Eigen::MatrixXd total_covariance;
 
   /// The prisms of the fit.
@@ -57,7 +58,7 @@ struct Motion {
   bool smooth = true;  ///< no jumps between segments
 };
 
-/// What a scan tells of the train that made it.
+/// What a scan reveals about the train that made it.
 struct Identification {
   std::vector<Hypothesis> hypotheses;  ///< best first; never empty
   TrainFreedom freedom;                ///< what the data asked to be fitted

@@ -12,7 +12,7 @@ namespace risley::identification {
 /// Why trains that fit a scan best are nevertheless not those of the sensor.
 struct Doubt {
   std::string words;  ///< empty: there is none
-  /// The train cannot be the sensor's; otherwise the scan does not tell it.
+  /// The train cannot be the sensor's; otherwise the scan does not determine it.
   bool refuted = false;
 };
 

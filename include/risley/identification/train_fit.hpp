@@ -46,7 +46,7 @@ struct TrainFit {
   /// Of the values below, variance of the shots from their rms; independent shots.
   std::vector<std::string> names;  ///< as in parameter_list(), and "lag_2_s", "frame_yaw_deg"
   /// SI units: what is free of optics, lags and frame; rotation angles where the curves begin, and
-  /// their mean speeds. Infinite variances where nothing tells.
+  /// their mean speeds. Infinite variances where nothing determines them.
   Eigen::MatrixXd covariance;
   std::vector<double> azimuth_residual, zenith_residual;  ///< [shots], observed minus predicted
 };
@@ -60,7 +60,7 @@ struct TrainFitOptions {
 };
 
 /// Least squares of azimuths and zeniths: Gauss and Newton's steps, damped by Levenberg and
-/// Marquardt. Indices move at a held deviation (n - 1) wedge, which data tell much better than
+/// Marquardt. Indices move at a held deviation (n - 1) wedge, which data determine much better than
 /// either, and stay within 1.3 and 2.3. docs/theory/identify.md
 /// @param start  with as many emitters as the grid
 TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFreedom& freedom,

@@ -31,7 +31,7 @@ class FileDescriptor {
   int value_;
 };
 
-/// A regular file that is opened once and read by all who hold a copy of this, each at places of
+/// A regular file that is opened once and read by all holders of a copy of this, each at places of
 /// its own and in any thread.
 class InputFile {
  public:

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The beginning of a file, which tells what it is.
+// The beginning of a file, by which its format is recognised.
 #pragma once
 
 #include <cstddef>

@@ -10,7 +10,7 @@ namespace risley::io {
 /// @throws FileError
 bool make_folder(const std::string& path);
 
-/// A folder for files that nobody keeps, under a name that nobody can foresee and for this user
+/// A folder for temporary files, under an unpredictable name and for this user
 /// alone: in TMPDIR where that is set, otherwise in memory (/dev/shm) where there is plenty of
 /// room, otherwise where the system has such files (/tmp). The destructor removes it with all that
 /// is in it.

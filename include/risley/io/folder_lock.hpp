@@ -10,7 +10,7 @@
 namespace risley::io {
 
 /// A folder that one writer has for itself. The kernel takes the lock back when its owner ends in
-/// whatever way, and no file tells of it. File systems without such locks have none.
+/// whatever way, and leaves no file behind. File systems without such locks have none.
 class FolderLock {
  public:
   /// @throws FileError where another writer has it, in this process or another

@@ -17,19 +17,19 @@ class ForkLock {
     static ForkLock lock;
     return lock;
   }
-  /// For who calls OpenSSL.
+  /// Held while OpenSSL is called.
   std::shared_lock<std::shared_mutex> share() {
     const std::scoped_lock in_turn(turn_);
     return std::shared_lock(held_);
   }
-  /// For who forks.
+  /// Held while the process forks.
   std::unique_lock<std::shared_mutex> alone() {
     const std::scoped_lock in_turn(turn_);
     return std::unique_lock(held_);
   }
 
  private:
-  std::mutex turn_;  ///< those who share it could keep out for long who wants it alone
+  std::mutex turn_;  ///< keeps shared holders from starving an exclusive one
   std::shared_mutex held_;
 };
 

@@ -21,7 +21,7 @@ struct FileTarget;
 /// An output that grows for long and cannot be made again. As OutputFile it gets its name, and
 /// replaces a file of that name and keeps its mode, when it is whole; but until then it has a name
 /// that everybody can find, and stays whatever happens. A thread of its own writes, so that a disk
-/// that pauses does not hold up who measures.
+/// that pauses does not hold up the caller.
 class GrowingFile {
  public:
   /// What its name ends with until commit().
@@ -44,7 +44,7 @@ class GrowingFile {
   std::uint64_t size() const { return size_; }  ///< bytes appended so far
 
   /// Appends bytes, all or none, soon; waits while more than kMostWaiting wait already.
-  /// @return an empty vector that has room, as soon as others were written: who appends again need
+  /// @return an empty vector that has room, as soon as others were written: appending again need
   ///         not ask the system for memory
   /// @throws FileError when the disk refused something that was appended before: the file ends
   ///         there

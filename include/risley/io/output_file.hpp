@@ -7,7 +7,7 @@
 namespace risley::io {
 
 /// An output that appears under its final name only when it is whole and on the disk: it is
-/// written under a temporary name that nobody can foresee, in the same folder, and renamed by
+/// written under an unpredictable temporary name, in the same folder, and renamed by
 /// commit(). Without commit() the destructor removes the temporary, so an interrupted run leaves
 /// no half file and never costs the file that was there before. What a killed run left of the same
 /// output is removed by the next one, unless somebody is writing it. A file that is replaced keeps

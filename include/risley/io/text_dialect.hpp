@@ -32,7 +32,7 @@ class TextDecoder {
   std::uint32_t high_half_ = 0;  ///< of a pair of units
 };
 
-/// So many characters of a text's beginning tell its dialect.
+/// Characters at the beginning of a text from which its dialect is recognised.
 inline constexpr std::size_t kDialectBytes = 16384;
 
 /// How the rows of a table are written.

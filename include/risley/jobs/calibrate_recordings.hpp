@@ -52,7 +52,7 @@ void check(const CalibrateRecordingsOptions& options);
 
 /// The stations of recordings, in their order.
 /// @param path   of a scene with stations; empty: none
-/// @param names  which of them, one per recording; empty: all, which are as many
+/// @param names  which of them, one per recording; empty: all, one per recording
 /// @throws InvalidArgument naming the numbers where they differ; FileError
 std::vector<scenes::Station> stations_of(const std::string& path,
                                          const std::vector<std::string>& names,

@@ -31,7 +31,7 @@ struct CellErrors {
   double sigma = 0;  ///< what was stated of it
 };
 
-/// Name of errors of a kind with the unit in which they are told: "rotation_angle_a_deg", degrees
+/// Name of errors of a kind with the unit in which they are given: "rotation_angle_a_deg", degrees
 /// in place of radians.
 std::string name_with_unit(const std::string& errors);
 
@@ -56,7 +56,7 @@ struct CellOutcome {
 /// @throws FileError, InvalidArgument, Cancelled
 CellOutcome run_cell(const CampaignPlan& plan, std::uint64_t number, const Progress& progress = {});
 
-/// Where results of a campaign are kept, and who makes them.
+/// Where results of a campaign are kept, and which processes make them.
 struct CampaignOptions {
   std::string folder;   ///< chunks go to chunks/ in it
   std::string program;  ///< name and version of what computes, part of what makes results the same
@@ -77,7 +77,7 @@ struct CampaignChunk {
 /// Runs the cells of a chunk, several at a time, and writes what comes of them to one file
 /// (chunk-I-of-N.jsonl), which appears when it is whole. If it is there already, whole and made of
 /// the same plan by the same program, nothing is done. The bytes do not depend on threads or on
-/// who ran the chunk when.
+/// when and where the chunk ran.
 /// @throws InvalidArgument for a chunk that there is not; FileError, Cancelled
 CampaignChunk run_chunk(const CampaignPlan& plan, const ChunkNumber& which,
                         const CampaignOptions& options, const Progress& progress = {});

@@ -29,8 +29,8 @@ struct ParameterDifference {
 };
 
 /// Whether two results are of one and the same optics. The differences of all parameters of the
-/// prisms together, with their joint covariance: what a result hardly tells, such as a rotation of
-/// all beams where nobody knew how the sensor stood, hardly counts.
+/// prisms together, with their joint covariance: what a result hardly determines, such as a
+/// rotation of all beams when the sensor's orientation was unknown, hardly counts.
 struct ChangeTest {
   double chi2 = 0;  ///< of independent errors, chi-squared distributed where nothing changed
   int degrees_of_freedom = 0;  ///< 0 where neither result has a covariance

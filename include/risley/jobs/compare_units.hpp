@@ -72,7 +72,7 @@ struct ComparedUnits {
 };
 
 /// Results that are named are one series, whatever their serial numbers are: each is compared with
-/// the one before it and, from the third on, with the first. With a table, serial numbers tell
+/// the one before it and, from the third on, with the first. With a table, serial numbers identify
 /// units apart, each is a series of its own, and up to four units of a kind are compared in pairs,
 /// each by its last result; results without a serial number are of the only unit that there is, and
 /// left out where several are known. From kFewestUnitsOfFleet on, units of a kind are compared as a

@@ -21,8 +21,8 @@ struct ConvertRecordingOptions {
   recordings::ReadOptions reading;
   std::string output;  ///< path
   std::string format;  ///< as recordings::create_recording(); empty: as the output's name ends
-  /// Livox device type of the sensor, where the recording does not tell it; empty: what its scan
-  /// tells.
+  /// Livox device type of the sensor if the recording does not state it; empty: recognised from
+  /// its scan.
   std::optional<std::uint8_t> sensor_type;
 };
 

@@ -28,7 +28,7 @@ struct RotorSpeed {
 /// Mean residuals over a plane of two angles, and which of its cells are worth a look.
 struct ResidualPlane {
   estimation::ResidualMap map;
-  /// A cell that few beams graze tells nothing: cells with fewer shots than this do not count.
+  /// Cells with fewer shots than this are ignored: few beams say nothing about a cell.
   double fewest_shots = 0;
   /// What noise alone leaves in a typical cell, rad.
   double azimuth_noise = 0, zenith_noise = 0;
@@ -50,9 +50,9 @@ struct ShotDensity {
   double mean_per_cell = 1.0;  ///< over the cells that were met
 };
 
-/// What there is to say of an estimate beside the numbers that it found.
+/// Details of an estimate beyond its numbers.
 struct EstimateDetails {
-  /// What the recording can tell, in sentences; none for the filter, and where the numbers failed.
+  /// What the recording can determine, as sentences; empty for the filter and after a failure.
   std::vector<std::string> advice;
   std::optional<estimation::PiecewiseEstimate> pieces;     ///< under the same condition
   std::vector<RotorSpeed> speeds;                          ///< [prisms]

@@ -18,7 +18,7 @@
 
 namespace risley::jobs {
 
-/// Shots per second that a method takes unless it is told otherwise, empty for all: the filter is
+/// Shots per second that a method uses by default, empty for all: the filter is
 /// given what it can do in a time that one waits for.
 std::optional<double> usual_rate(estimation::Method method);
 
@@ -53,7 +53,7 @@ struct EstimatedRecording {
   estimation::AngleSeries head;  ///< every shot of the first second, as recorded
   estimation::SelectionCounts counts;
   std::vector<Warning> warnings;  ///< of the recording; the estimate has its own
-  SensorChoice choice;            ///< who says which sensor it was
+  SensorChoice choice;            ///< how the sensor was chosen
   sensors::Sensor nominal;        ///< what the estimation started from
   estimation::Estimate estimate;
   std::optional<estimation::Evaluation> evaluation;  ///< where the truth is known

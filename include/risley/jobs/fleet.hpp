@@ -14,7 +14,7 @@
 
 namespace risley::jobs {
 
-/// Of fewer units nobody can say how far apart units of a type are.
+/// Fewer units do not show how much units of a type differ.
 inline constexpr std::size_t kFewestUnitsOfFleet = 5;
 
 /// One parameter over a fleet, SI units.

@@ -43,9 +43,9 @@ struct IdentifiedRecording {
   std::string words, to_do;
   std::string like;                       ///< the built-in preset that has this train; empty: none
   bool like_mirrored = false;             ///< it is that one's mirror image
-  std::vector<std::string> unobservable;  ///< what such a recording never tells, in words
+  std::vector<std::string> unobservable;  ///< what such recordings cannot determine
   std::vector<Warning> warnings;
-  bool cropped = false;  ///< packets lack points, and a preset's optics told their shots' times
+  bool cropped = false;  ///< packets lack points; times follow from a preset's optics
   bool written = false;
   double reading_time = 0, solving_time = 0;  ///< s
 };

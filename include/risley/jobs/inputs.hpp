@@ -40,7 +40,7 @@ bool are_many(const InputNames& wanted);
 const std::vector<std::string>& recording_endings();
 
 /// All inputs, those of a folder or pattern sorted by name, each of them once by whatever names and
-/// links. A file that does not exist is an input, too: who reads it is told. Hidden files and what
+/// links. A file that does not exist is an input, too: reading it then fails. Hidden files and what
 /// risley writes beside recordings (states.nc, ....truth.nc) are not found in folders.
 /// @throws InvalidArgument for a pattern or folder in which there is nothing, and for a file that
 ///         is named twice; FileError for a list that cannot be read; Cancelled

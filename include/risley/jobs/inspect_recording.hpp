@@ -37,8 +37,8 @@ struct InspectedRecording {
   std::optional<recordings::Excerpt> excerpt;
 };
 
-/// Reads a recording to its end, audits its times and tells its sensor. Stages: placing, sharing,
-/// reading, recognising.
+/// Reads a recording to its end, audits its times and recognises its sensor. Stages: placing,
+/// sharing, reading, recognising.
 /// @throws FileError when it cannot be opened; InvalidArgument; Cancelled
 InspectedRecording inspect_recording(const InspectRecordingOptions& options,
                                      const Progress& progress = {});

@@ -78,7 +78,7 @@ struct InputWork {
   std::string verb;           ///< "estimate"
   std::string label;          ///< for a bar, "estimating"
   std::string counted;        ///< name in the JSON of what is summed up, if anything
-  bool into_folders = false;  ///< outputs are folders, which are made by who fills them
+  bool into_folders = false;  ///< outputs are folders, created when they are filled
   std::string ending;         ///< of files in a folder for all, ".las"; empty: not known
   /// Files that a job writes; without it the output alone.
   std::function<std::vector<std::string>(const InputJob&)> files;

@@ -27,7 +27,7 @@ struct ObservabilityOptions {
   std::vector<std::string> additional;  ///< further parameters to free
 };
 
-/// What it can tell.
+/// What it can determine.
 struct JudgedObservability {
   estimation::Observability observability;
   TrainShape shape;
@@ -37,7 +37,7 @@ struct JudgedObservability {
   std::string reason;     ///< why not
 };
 
-/// Judges what a recording can tell of every parameter. Stages: reading, estimating.
+/// Judges how well a recording determines every parameter. Stages: reading, estimating.
 /// @throws EstimationError, InvalidArgument, FileError, Cancelled
 JudgedObservability judge_observability(const ObservabilityOptions& options,
                                         const Progress& progress = {});

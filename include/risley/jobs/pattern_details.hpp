@@ -13,13 +13,13 @@
 
 namespace risley::jobs {
 
-/// What a page tells of a scan pattern.
+/// What a page shows of a scan pattern.
 struct PatternDetails {
   sensors::Sensor sensor;
   sensors::PatternCoverage coverage;
   /// The first shots, as long as the longest integration time, thinned for drawing.
   sensors::ScanPattern rosette;
-  std::uint64_t rosette_every = 1;  ///< of so many shots one
+  std::uint64_t rosette_every = 1;  ///< one shot of this many is drawn
 };
 
 /// @param sensor  as sensors::load_sensor()

@@ -17,7 +17,7 @@
 
 namespace risley::jobs {
 
-/// What becomes of shots that the rotors do not tell the times of.
+/// What happens to shots whose times the rotors do not reveal.
 enum class UntoldShots {
   left_out,  ///< they lose their directions
   guessed,   ///< they get times in their order
@@ -64,9 +64,9 @@ struct PreparedRecording {
   /// Begins at the first row again.
   void read_again(const Progress& progress);
   /// What is wrong with the shots of a recording without times where those without a return were
-  /// removed; empty where they were not. By its first shots, of a sensor that nobody knows.
+  /// removed; empty where they were not. From its first shots if the sensor is unknown.
   std::string removed_shots_words(const Progress& progress) const;
-  /// The sensor, chosen where nobody has before. @throws as choose_sensor()
+  /// The sensor, chosen here unless it was before. @throws as choose_sensor()
   const SensorChoice& choose(const std::optional<sensors::Sensor>& given, const Progress& progress);
 };
 
@@ -75,15 +75,15 @@ struct PreparedRecording {
 /// Where packets lack points, it is found when their shots were fired, which needs the sensor.
 ///
 /// For the sensor's frame its sensor is chosen, and it is decided what a pose in its header means
-/// where the options do not give one: the first second of the shots tells whether the points were
-/// moved by it (see estimation/stored_pose.hpp), and where they do not tell, a recording made
+/// where the options do not give one: the first second of shots shows whether the points were
+/// moved by it (see estimation/stored_pose.hpp), and where it does not, a recording made
 /// through a hub counts as moved, because hubs move points, and any other one does not, because LVX
 /// keeps points as they are. Moved points are turned back. Where emitters show that the recording
-/// is rolled about the optical axis, and no pose says so, it is turned back by that.
+/// is rolled about the optical axis, and no pose says so, it is turned back.
 ///
-/// Where times are counted, here or evidently by who wrote the file (each row of a file without
+/// Where times are counted, here or evidently by the writer of the file (each row of a file without
 /// packets follows the one before it by the same time), the rotors are followed to find slips of
-/// the count and, where the file does not tell which of a sensor's emitters fired, the order in
+/// the count and, where the file does not say which of a sensor's emitters fired, the order in
 /// which they do: see estimation/shot_slips.hpp. Both are mended. Such a recording is read twice,
 /// and all of its directions are held in memory meanwhile. Shots of a recording whose times are all
 /// the same are counted at the rate of its sensor where that is given or named by the file; so are

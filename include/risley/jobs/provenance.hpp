@@ -20,7 +20,7 @@ using Provenance = std::vector<std::pair<std::string, std::string>>;
 /// recording they take a twentieth of the time of estimating from it.
 class InputHashes {
  public:
-  /// @param progress  its flag must outlive this; nothing is told
+  /// @param progress  its flag must outlive this; no progress is reported
   explicit InputHashes(const std::vector<recordings::Source>& inputs,
                        const Progress& progress = {});
   ~InputHashes();

@@ -29,7 +29,7 @@ struct RangedInput {
   std::vector<ReadRecording> recordings;
   std::uint64_t observations = 0;            ///< rows of all recordings
   std::vector<Warning> warnings;             ///< of the recordings
-  SensorChoice choice;                       ///< who says which sensor the first one was
+  SensorChoice choice;                       ///< how the first one's sensor was chosen
   sensors::Sensor nominal;                   ///< preset that all started from
   double reading_time = 0, angles_time = 0;  ///< s
 };

@@ -53,7 +53,7 @@ struct EstimationInput {
 EstimationInput read_for_estimation(const EstimationInputOptions& options,
                                     const Progress& progress = {});
 
-/// Says which shots were left out because their times do not tell when they were fired.
+/// Reports which shots were left out because their times do not show when they were fired.
 void warn_of_left_out(const estimation::SelectionCounts& counts, std::vector<Warning>& warnings);
 
 }  // namespace risley::jobs

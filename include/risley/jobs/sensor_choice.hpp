@@ -24,7 +24,7 @@ enum class ChosenBy {
   option,  ///< whoever asked
   file,    ///< the recording names it
   scan,    ///< no other built-in preset describes the shots as well
-  guess,   ///< not enough was there to tell
+  guess,   ///< too few data to decide
 };
 
 /// "option", "file", "scan", "guess"
@@ -42,7 +42,7 @@ struct SensorChoice {
   sensors::Sensor sensor;
   ChosenBy chosen_by = ChosenBy::option;
   std::string words;  ///< why this one
-  /// Whether the sensor describes the shots; empty where they are too few to tell, or nobody asked.
+  /// Whether the sensor describes the shots; empty if they are too few or this was not checked.
   std::optional<bool> fits;
   /// The sensor and the next best one, where the shots were asked.
   std::vector<PresetMisfit> misfits;
@@ -51,8 +51,7 @@ struct SensorChoice {
   /// that are none of a sensor's frame, a field of view beyond theirs. The sensor is the usual one.
   std::string impossible;
   std::string beyond_reach;  ///< what is wrong with ranges that the sensor cannot measure, or empty
-  int lines =
-      0;  ///< the first shots name so many (one more than the highest), 0 when not looked at
+  int lines = 0;             ///< in the first shots (one more than the highest), 0 if not counted
   /// The times of the recording do not describe its scan, and shots that are counted at the rate of
   /// the sensor do.
   bool times_at_fault = false;

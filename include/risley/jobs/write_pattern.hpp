@@ -19,7 +19,7 @@ namespace risley::jobs {
 /// A way to write a scan pattern.
 struct PatternFormat {
   std::string name;         ///< "livox-csv"
-  std::string description;  ///< columns, units, who reads it
+  std::string description;  ///< columns, units, programs that read it
 };
 
 /// Those that write_pattern() knows.

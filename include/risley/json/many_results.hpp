@@ -38,7 +38,7 @@ Json with_status(Json result, const std::optional<FileError>& damage);
 using Tell = std::function<void(const std::string& words, bool is_wrong)>;
 
 // A job of each of many inputs: the options are those of one, without its recording and output.
-// What is wrong with them is told before anything is read: InvalidArgument.
+// They are checked before anything is read: InvalidArgument.
 
 /// As jobs::estimate_recording().
 jobs::InputWork estimate_each(jobs::EstimateRecordingOptions options, const Tell& tell);

@@ -77,7 +77,7 @@ Json of(const jobs::RecordingCloud& made);
 Json of(const jobs::InspectedRecording& found);
 /// Of every verb: `warnings`.
 Json of(const std::vector<Warning>& warnings);
-/// What a reader told of a recording that a result is of, and how sound its times are.
+/// What the reader found out about the recording of a result, and how sound its times are.
 Json of(const jobs::ReadRecording& recording);
 /// How well a calibration on walls knows directions; without the `kind` of the datum.
 Json of(const calibration::FormalDatum& datum);
@@ -111,7 +111,7 @@ Json of(const jobs::LiveRecording& live);
 Json of(const jobs::EmulatedSensor& truth);
 /// The `coverage` of `risley pattern`.
 Json of(const sensors::PatternCoverage& coverage);
-/// What a list of presets tells of one.
+/// One preset's line in a list of presets.
 Json of(const sensors::Sensor& sensor);
 /// Which file is wrong, where, and why.
 Json of(const FileError& error);

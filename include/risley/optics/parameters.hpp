@@ -105,7 +105,7 @@ const std::vector<ParameterInfo>& parameter_list(TrainShape shape);
 /// The entry of that name. @throws InvalidArgument that lists the known names
 const ParameterInfo& find_parameter(std::string_view name, TrainShape shape);
 
-/// The entry of that name in whatever train has it, for who does not know the train yet: a name
+/// The entry of that name in whatever train has it, for use before the train is known: a name
 /// means the same in each. Null where no train has it.
 const ParameterInfo* find_parameter_of_any_train(std::string_view name);
 

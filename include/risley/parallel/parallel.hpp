@@ -10,7 +10,7 @@
 #include "risley/core/progress.hpp"
 
 /// Work on several threads. What is here runs also within each other, and none of it returns before
-/// all is done: where one part throws, the others are told to stop, and what runs within them
+/// all is done: if one part throws, the others are cancelled, and what runs within them
 /// throws Cancelled instead of handing over half a result.
 namespace risley::parallel {
 
@@ -24,7 +24,7 @@ void for_each(std::size_t count, const std::function<void(std::size_t)>& body);
 
 /// The same for jobs that are parallel themselves: a thread that waits within one never begins
 /// another.
-/// @param progress  told the share that is done, and asked before each job whether to go on
+/// @param progress  receives the share that is done; checked for cancellation before each job
 /// @throws Cancelled, and as for_each()
 void for_each_job(std::size_t count, const std::function<void(std::size_t)>& job,
                   const Progress& progress = {});

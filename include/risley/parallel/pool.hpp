@@ -24,7 +24,7 @@ class Pool {
  public:
   using Item = std::unique_ptr<T, GiveBack>;  ///< goes back by itself
 
-  /// One that nobody else has, as its last user left it or new.
+  /// One that is not in use, as its last user left it or new.
   Item take() {
     const std::scoped_lock lock(mutex_);
     if (spare_.empty()) {

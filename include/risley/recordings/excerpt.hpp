@@ -40,7 +40,7 @@ struct Excerpt {
   std::optional<FileError> damage;  ///< of the recording, behind the rows searched
 };
 
-/// The same in words, for who is to send it away.
+/// The same in words, for the person who sends it.
 struct ExcerptContents {
   std::vector<std::string> holds, lacks;
 };

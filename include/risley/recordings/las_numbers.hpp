@@ -9,7 +9,7 @@
 
 #include "risley/core/gps_time.hpp"
 
-/// The numbers of LAS files, for those who read and those who write them [ASPRS LAS 1.0
+/// The numbers of LAS files, shared by their reader and writer [ASPRS LAS 1.0
 /// to 1.4-R15].
 namespace risley::recordings::las {
 

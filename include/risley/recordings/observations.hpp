@@ -40,8 +40,8 @@ struct Observations {
 
   std::size_t size() const { return time_ns.size(); }
   void clear();                    ///< leaves no row
-  void resize(std::size_t rows);   ///< gives every column so many rows
-  void reserve(std::size_t rows);  ///< takes memory for so many at once
+  void resize(std::size_t rows);   ///< gives every column this many rows
+  void reserve(std::size_t rows);  ///< allocates memory for this many
   /// @throws InvalidArgument as require_columns()
   void append(const Observations& other);
   /// Appends rows [begin, end) of another. @throws InvalidArgument as append(), and beyond its rows
@@ -94,7 +94,7 @@ void mark_valid(Observations& rows);
 void require_angles(const Observations& rows);
 
 /// Whether a row is a further return of the shot of the row before, which has the same time: it
-/// says so, or shows the same direction as far as rounding tells. @param row  at least 1
+/// says so, or shows the same direction to within rounding. @param row  at least 1
 bool is_further_return(const Observations& rows, std::size_t row);
 
 /// Header of one sensor data packet as it was recorded, kept so that a packet format can be
@@ -169,7 +169,7 @@ const LivoxType* livox_type(std::uint8_t number);
 std::string livox_types_text(bool first_generation = true);
 /// Whether sensors of this type send the packets of the second generation.
 bool is_second_generation(std::uint8_t type);
-/// Device::type of a sensor about which a format tells nothing, or only that it is no Mid-40.
+/// Device::type of a sensor that a format does not name, or only as no Mid-40.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;
 
 /// One sensor of a recording.

@@ -29,7 +29,7 @@ double cone_radius(std::span<const double> azimuth, std::span<const double> zeni
 DirectionSpread direction_spread(std::span<const double> azimuth, std::span<const double> zenith);
 
 /// What is wrong with directions that no scan fills, in words: map coordinates, angles in another
-/// unit. Nothing where there are too few to tell: map coordinates take 20, others kFewestJudged.
+/// unit. Nothing where there are too few to judge: map coordinates take 20, others kFewestJudged.
 /// @param range  m, of the same shots; empty or NaN where they have none
 std::optional<std::string> not_a_scan(std::span<const double> azimuth,
                                       std::span<const double> zenith,

@@ -72,7 +72,7 @@ inline constexpr std::int64_t kLongestTimeSpan_ns = (std::int64_t{1} << 62) - 1;
 /// turns of a rotor over.
 inline constexpr double kUnknownGap = 10.0;
 
-/// Place of a row of which nobody knows when in its packet it was fired.
+/// Place of a row whose position in its packet is unknown.
 inline constexpr std::uint8_t kNoPlace = 255;
 
 /// Where in their packets the shots of rows were fired; of formats whose packets may lack points
@@ -124,7 +124,7 @@ struct ReadOptions {
 /// a folder of ROS 2 whose metadata.yaml names the bags that are read one after the other; or one
 /// in memory. Times are judged before they are given: where rows of a file do not stand in the
 /// order of firing they are sorted by time, times that begin anew with every message are counted,
-/// rounded ones are put on the even grid of shots that they show. Warnings tell.
+/// rounded ones are put on the even grid of shots that they show, with a warning.
 /// @param progress  cancels opening, and reading where a chunk may take long; its flag must outlive
 ///                  the reader
 /// @throws FileError when it is missing, empty, of no known format, or its header is damaged;

@@ -79,7 +79,7 @@ class TimeAudit {
   TimeAuditResult result() const;
 
  private:
-  /// Steps that are kept until the nominal step can be told.
+  /// Steps that are kept until the nominal step is known.
   static constexpr std::size_t kStepsForMedian = 4096;
 
   struct TimeStep {

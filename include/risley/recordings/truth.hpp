@@ -11,8 +11,8 @@
 
 namespace risley::recordings {
 
-/// What a simulation knows of every shot and a sensor does not tell. SI units. One row per shot; a
-/// recording in a format of fixed rate can have more rows, so rows are matched by their time.
+/// What a simulation knows of every shot and a sensor does not report. SI units. One row per shot;
+/// a recording in a format of fixed rate can have more rows, so rows are matched by their time.
 struct TruthColumns {
   std::vector<std::int64_t> time_ns;                  ///< as in the recording, ascending
   std::vector<std::vector<double>> rotation_angle;    ///< [prisms][rows], rad, not wrapped

@@ -76,7 +76,7 @@ struct Chart {
   Palette palette = Palette::sequential;
   /// Values that the ends of the colours stand for; without it the least and the greatest.
   std::optional<std::pair<double, double>> value_range = {};
-  /// The points of the first series came one after another in so many seconds, and the page can
+  /// Seconds in which the points of the first series came one after another; the page can
   /// show how.
   std::optional<double> grows_for = {};
   /// Choices for the colours of the first series, instead of its values; the first is shown first.
@@ -102,7 +102,7 @@ std::string script_text(json::Json chart, std::size_t number);
 /// Value of a row.
 using Column = std::function<double(std::size_t)>;
 
-/// Every row that a thinning to at most so many points keeps: all, or each n-th.
+/// Every row that a thinning to a largest number of points keeps: all, or each n-th.
 std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most);
 /// The same in words.
 std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view what = "shots");
@@ -111,7 +111,7 @@ std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view 
 /// they stand; short columns stay as they are.
 Series peak_line(std::string label, std::string colour, std::size_t rows, const Column& x,
                  const Column& y);
-/// Which rows peak_line() draws of so many shots, as a sentence.
+/// Which rows peak_line() draws, as a sentence.
 std::string peak_line_note(std::size_t rows);
 
 /// Counts per bin within 4.5 standard deviations of the mean (9 to 61 bins, by the cube root of the

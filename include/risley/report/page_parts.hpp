@@ -15,7 +15,7 @@ namespace risley::report {
 
 class View;
 
-/// Errors beyond so many sigmas stand out.
+/// Errors beyond this many sigmas are highlighted.
 inline constexpr double kFarOff = 3.0;
 
 /// "Δφ_L0" with a lowered index.

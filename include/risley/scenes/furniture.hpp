@@ -21,7 +21,7 @@ struct SceneBox {
   double reflectivity = kMattReflectivity;    ///< (0, 1]
 };
 
-/// Somebody who walks to and fro: an upright ellipsoid.
+/// A person walking to and fro: an upright ellipsoid.
 struct Person {
   std::string name;
   Vector3<double> from, to;                 ///< of the feet, m; at `from` at time 0

@@ -39,7 +39,7 @@ struct CoverageAfter {
                                            ///< where a ring has none
 };
 
-/// Shares of the field of view for which time_to_cover() is told, percent.
+/// Shares of the field of view for which time_to_cover() is given, percent.
 inline constexpr int kToldShares[] = {50, 90, 99};
 
 /// How a scan fills the field of view. Cells are squares of an equal-area map of Lambert and have

@@ -16,7 +16,7 @@
 
 namespace risley::sensors {
 
-/// How well one named value is known and who says so.
+/// How well one named value is known, and from which source.
 struct Knowledge {
   std::string name;    ///< as in parameter_list(), or a preset's field such as "range_noise_m"
   double sigma = 0;    ///< one standard deviation, SI units; 0 when taken as exact
@@ -82,7 +82,7 @@ struct Sensor {
   /// has the fast rotor first and both directions kept, (wA, wB) becomes (-wB, -wA).
   /// [B21 section 2.4]
   std::vector<SpeedCombination> combinations;
-  /// Empty where nobody knows at which angles the rotors start.
+  /// Empty if the rotors' start angles are unknown.
   std::optional<ScanSequence> sequence;
   std::vector<Knowledge> knowledge;  ///< of parameters, speeds and the numbers below, any order
 

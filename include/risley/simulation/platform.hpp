@@ -35,7 +35,7 @@ struct Platform {
   /// where its terrain says. A local trajectory has the scene's axes.
   std::optional<trajectories::Geodetic> map_origin;
 
-  // What is told of it beside the recording; shots do not depend on it.
+  // What is written of it beside the recording; shots do not depend on it.
   std::optional<trajectories::ErrorModel> errors;  ///< of the trajectory that the user gets
   std::string trajectory_ending = ".csv";          ///< of its file, which chooses the format
   std::vector<trajectories::StripTimes> strips;    ///< of the flight; may be empty

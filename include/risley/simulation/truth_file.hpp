@@ -39,7 +39,7 @@ struct SimulationResult {
   sensors::Sensor truth;                         ///< as in OUT.truth.yaml
   std::vector<double> start_angles;              ///< rotation angles at time zero, rad
   std::vector<std::string> files;                ///< all that were written, the recording first
-  std::vector<std::string> truth_files;          ///< of them, those that tell the truth
+  std::vector<std::string> truth_files;          ///< of them, those with the truth
   std::string trajectory;                        ///< the user's; empty where the sensor stands
   std::vector<trajectories::StripTimes> strips;  ///< of a flight
   /// What the format of the user's trajectory has no place for, in words.

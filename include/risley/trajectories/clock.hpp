@@ -13,7 +13,7 @@ namespace risley::trajectories {
 /// What is added to UTC (since 1 January 1970) to get the time of a trajectory, ns: one number for
 /// a whole flight, since seconds of week and of day run on. Where week or day are not known, those
 /// that bring the time nearest to the trajectory are taken.
-/// @param utc_ns  of the flight, by which leap seconds are told
+/// @param utc_ns  of the flight, which decides the leap seconds
 /// @return nothing for an unknown scale of time
 /// @throws InvalidArgument for a trajectory without records
 std::optional<std::int64_t> shift_from_utc_ns(const Trajectory& trajectory, std::int64_t utc_ns);

@@ -41,7 +41,7 @@ struct ErrorModel {
   double sample_interval = 0;                ///< of the white parts, s; above 0 where there are any
 };
 
-/// Correlation times for trajectories of which nobody states any: 120 s for positions and tilts,
+/// Default correlation times of trajectories: 120 s for positions and tilts,
 /// 300 s for the heading, as assumptions. No program that makes a trajectory writes them.
 ErrorModel assumed_error_model();
 

@@ -18,7 +18,7 @@ namespace risley::trajectories {
 
 /// What the times of a trajectory count from.
 enum class TimeScale : std::uint8_t {
-  unknown,             ///< an origin that nobody has stated
+  unknown,             ///< an origin that is stated nowhere
   gps_second_of_week,  ///< GPS time since Sunday midnight; the week may be known
   utc_second_of_day,   ///< UTC since midnight
   gps,                 ///< GPS time since 6 January 1980

@@ -17,8 +17,8 @@ namespace risley::trajectories {
 /// What a file holds of a flight.
 enum class TrajectoryFileKind { none, trajectory, accuracies };
 
-/// Whether a file is a trajectory or a file of accuracies: told by its content, and by its ending
-/// where the content cannot tell (.sbet, .smrmsg). What cannot be read is none, and neither is a
+/// Whether a file is a trajectory or a file of accuracies: recognised by content, or by the ending
+/// where the content is ambiguous (.sbet, .smrmsg). What cannot be read is none, and neither is a
 /// bag that holds points of a lidar: it is a recording, though load_trajectory() reads its poses.
 /// @throws Cancelled: a bag that was cut off may have to be looked through for its topics
 TrajectoryFileKind trajectory_file_kind(const std::string& path, const Progress& progress = {});

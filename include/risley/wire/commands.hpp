@@ -18,7 +18,7 @@ namespace risley::wire {
 
 // Messages that a sensor sends on its own.
 
-/// Says who is there, about once a second until somebody shakes hands.
+/// Announces the sensor, about once a second until a host shakes hands.
 struct Broadcast {
   static constexpr CommandId kId{0, 0x00};  ///< of its frames
   std::string code;              ///< broadcast code, at most 15 characters: "0TFDG3B006H2Z11"

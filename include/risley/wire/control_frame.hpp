@@ -23,7 +23,7 @@ inline constexpr std::size_t kControlHeaderBytes = 24;
 
 /// Commands of the second generation.
 enum class ControlCommand : std::uint16_t {
-  search = 0x0000,         ///< who is there?
+  search = 0x0000,         ///< which sensors are there?
   set = 0x0100,            ///< a list of keys and values
   get = 0x0101,            ///< a list of keys; the reply has their values
   push = 0x0102,           ///< a list that a sensor sends once a second
@@ -160,7 +160,7 @@ std::vector<std::string> trouble_words(const SensorReport& report);
 
 /// "13.18.2.44" of the value of kFirmwareKey; empty for another length.
 std::string version_text(std::span<const std::uint8_t> value);
-/// A work state in words: "sampling"; "state 12" for those that nobody described.
+/// A work state in words: "sampling"; "state 12" for undocumented ones.
 std::string work_state_words(std::uint8_t state);
 
 }  // namespace risley::wire

@@ -17,7 +17,7 @@
 
 namespace risley::wire {
 
-/// The network refuses, or nobody answers. The message names the address and what to do.
+/// The network refuses, or no answer comes. The message names the address and what to do.
 class NetworkError : public Error {
  public:
   using Error::Error;
@@ -66,7 +66,7 @@ class UdpSocket {
   /// Gives what has arrived, at most kBatch datagrams. @return how many  @throws NetworkError
   std::size_t receive(const std::function<void(const Datagram&)>& take);
 
-  /// Datagrams that the kernel had no room for, as far as received ones tell.
+  /// Datagrams that the kernel had no room for, as far as received ones show.
   std::uint64_t kernel_drops() const { return kernel_drops_; }
   /// Bytes of the receive buffer that were granted; 0 where none were asked for.
   std::size_t receive_buffer() const { return receive_buffer_; }

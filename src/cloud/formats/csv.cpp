@@ -68,7 +68,7 @@ class TextWriter final : public CloudWriter {
   fmt::memory_buffer text_;
 };
 
-/// "StdX_m": names tell their units.
+/// "StdX_m": names include their units.
 std::unique_ptr<CloudWriter> create_csv(const std::string& path, const CloudHeader& header,
                                         const CloudWriterOptions&) {
   std::vector<PointField> fields = all_fields(header);

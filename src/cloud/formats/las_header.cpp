@@ -27,7 +27,7 @@ using recordings::las::kExtraBytesNumber;
 using recordings::las::kRecordHeaderBytes;
 using recordings::las::kSpecificationUser;
 
-/// The 16 bits that a variable length record tells its length in.
+/// The 16 bits of a variable length record's length.
 constexpr std::size_t kMaxRecordBytes = std::numeric_limits<std::uint16_t>::max();
 
 /// Text in a field of fixed length, filled up with zeros.

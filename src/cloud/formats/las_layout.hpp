@@ -18,7 +18,7 @@
 
 namespace risley::cloud::las {
 
-/// What the public header tells of the points, gathered while they are packed.
+/// What the public header states about the points, gathered while they are packed.
 struct Summary {
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -40,7 +40,7 @@ struct VariableLengthRecord {
 
 /// The public header's numbers that depend on the points, as they stand in the file.
 struct HeaderNumbers {
-  std::uint16_t creation_day = 0, creation_year = 0;  ///< 0 where nobody knows
+  std::uint16_t creation_day = 0, creation_year = 0;  ///< 0 where unknown
   std::array<double, 3> low{}, high{};                ///< m; 0 without points
 };
 

@@ -137,8 +137,8 @@ class LazWriter final : public CloudWriter {
     check(laszip_write_point(laszip_));
   }
 
-  /// Fills in what the header tells of the points, LAS 1.4. LASzip's own inventory counts with 32
-  /// bits.
+  /// Fills in what the header states about the points, LAS 1.4. LASzip's own inventory counts with
+  /// 32 bits.
   void write_summary() {
     const las::HeaderNumbers numbers = layout_.numbers(summary_);
     put_at(90, numbers.creation_day);

@@ -85,7 +85,7 @@ class NetcdfWriter final : public CloudWriter {
     if (std::holds_alternative<decltype(&Points::loading)>(column.place) && !variables.empty()) {
       factor = file_.define_dimension("factor", header.factors.size());
       file_.define_texts("factor_name", *factor,
-                         "common factor, one standard deviation of which the loadings tell",
+                         "common factor; loadings are per standard deviation of it",
                          header.factors);
     }
     for (auto& one : variables) {

@@ -43,7 +43,7 @@ void store_numbers(const From* from, std::size_t count, double factor, std::uint
   }
 }
 
-/// What tells one of several columns alike from the others, in each of PointColumn's texts.
+/// What distinguishes one of several similar columns, in each of PointColumn's texts.
 struct Words {
   std::string field, note, variable, meaning;
 };

@@ -36,7 +36,7 @@ class SequentialFile {
   std::ofstream stream_;  // after output_: closed before the temporary is removed
 };
 
-/// Packed records behind a text header that tells how many there are. The header is written again
+/// Packed records behind a text header with their number. The header is written again
 /// by close(), so its length must not depend on the number of points.
 class RecordFile final : public CloudWriter {
  public:

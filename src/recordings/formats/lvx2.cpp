@@ -279,7 +279,7 @@ bool Lvx2Reader::read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t 
     fail(position() + kPackageTimeAt, fmt::format("{} ns is not a time", header.time_ns));
     return true;
   }
-  // Packages stay whole; one alone is delivered however small the chunk is to be.
+  // Packages stay whole; one is delivered even if the chunk should be smaller.
   const RecordLayout layout = *numbered_layout(header.data_type, header.records);
   if (has_to_wait(chunk, max_rows, layout.rows())) return false;
   if (package.length % size != 0) ++leftovers_;

@@ -18,7 +18,7 @@
 
 namespace risley::trajectories {
 
-/// What tells the format of a file.
+/// What identifies the format of a file.
 struct FileHead {
   std::string name;        ///< of the file, in lower case
   std::string bytes;       ///< its beginning

@@ -18,7 +18,7 @@ namespace risley::trajectories {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
-/// Records may come late by so much; a larger step back is another flight or another clock.
+/// Largest delay of a record; a larger step back is another flight or another clock.
 constexpr std::int64_t kLatest_ns = kSecond_ns;
 constexpr double kFastest = 1e4;        // m/s
 constexpr double kFarthest = 1e7;       // m, from the origin of a map
@@ -34,7 +34,7 @@ std::optional<std::int64_t> period_ns(TimeScale scale) {
 }
 
 int unwrap_times(std::vector<std::int64_t>& times_ns, std::int64_t period) {
-  constexpr int kMost = 1000;  // nobody flies for so many weeks
+  constexpr int kMost = 1000;  // weeks; no flight takes longer
   int periods = 0, most = 0;
   std::int64_t before = times_ns.empty() ? 0 : times_ns.front();
   for (std::int64_t& time : times_ns) {

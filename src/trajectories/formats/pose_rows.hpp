@@ -69,7 +69,7 @@ class PoseRows {
   std::vector<FilePlace> places_;  ///< of the rows
 };
 
-/// What is to be said of records that were put in order.
+/// Warnings about records that were put in order.
 /// @param place_of  of a record, by its number from 0
 std::vector<Warning> order_warnings(const TimeOrder& told, std::size_t records,
                                     const std::function<FilePlace(std::size_t)>& place_of);
@@ -83,7 +83,7 @@ std::optional<std::int64_t> period_ns(TimeScale scale);
 int unwrap_times(std::vector<std::int64_t>& times_ns, std::int64_t period_ns);
 
 /// What times count from by their size: UTC since 1970 where they are of the years 1998 to 2100, a
-/// clock that nobody has stated otherwise.
+/// clock unless stated otherwise.
 TimeScale scale_by_size(const std::vector<std::int64_t>& ascending_ns);
 
 /// Half the body's turn about its x axis: forward-left-up axes, as ROS has them, to

@@ -141,10 +141,11 @@ class RowReader {
 
  private:
   /// Makes a second of the day, or of the week, one of the week, as the first date behind a Sunday
-  /// tells; on a Sunday both are the same.
+  /// shows; on a Sunday both are the same.
   void place_in_week(std::int64_t day, std::int64_t& time_ns, std::optional<std::int64_t>& week) {
     constexpr std::int64_t kDay_ns = 86'400'000'000'000, kDays = 7;
-    constexpr std::int64_t kLate_ns = 60'000'000'000;  // dates of UTC change so much later at most
+    constexpr std::int64_t kLate_ns =
+        60'000'000'000;  // dates of UTC change at most this much later
     const std::int64_t before_ns = day % kDays * kDay_ns;
     const auto is_of_day = [](std::int64_t time) { return time >= 0 && time < kDay_ns + kLate_ns; };
     const bool in_day = is_of_day(time_ns), in_week = is_of_day(time_ns - before_ns);

@@ -13,8 +13,8 @@
 
 namespace risley::recordings::livox {
 
-/// What the first packets of a sensor tell that no packet states: how its shots follow each other,
-/// and what kind of sensor it may be.
+/// What the first packets of a sensor reveal that no packet states: how its shots follow each
+/// other, and what kind of sensor it may be.
 class FirstPackets {
  public:
   /// A packet of points. @param rows  its rows are [first_row, first_row + packet.rows)
@@ -24,11 +24,11 @@ class FirstPackets {
   std::uint8_t data_type() const { return data_type_; }  ///< of the last packet
   /// Shortest time between two packets over the records of one, ns; of use behind two packets.
   double interval_ns() const;
-  /// Grid of its shots: where the type does not tell it, it is judged by the packets' times, and
+  /// Grid of its shots: if the type does not imply it, it is judged by the packets' times, and
   /// the Mid-40 firmware that stores several returns as so many records shows it by intensities.
   /// Empty: as device type and data type say. @param device_type  as Device::type
   std::optional<ShotGrid> grid(std::uint8_t device_type) const;
-  /// Device::type, as far as data type and times tell it; otherwise kUnknownDeviceType.
+  /// Device::type, as far as data type and times reveal it; otherwise kUnknownDeviceType.
   std::uint8_t device_type() const;
 
  private:

@@ -46,7 +46,7 @@ struct NumberedHeader {
 /// Layout of so many records of a data type; empty for other data types.
 std::optional<RecordLayout> numbered_layout(std::uint8_t data_type, std::uint16_t records);
 
-/// Shots of a device type; empty when it does not tell. @param device_type  Device::type
+/// Shots of a device type; empty if the type does not imply them. @param device_type  Device::type
 std::optional<ShotGrid> numbered_grid(std::uint8_t device_type);
 
 /// Shots of a packet by its own interval; where it states none, those of the device type.
@@ -88,7 +88,7 @@ void decode_numbered_records_into(const NumberedHeader& header,
                                   std::span<const std::uint8_t> records, const ShotGrid& grid,
                                   std::uint8_t device, Chunk& chunk, std::size_t row);
 
-/// Turns a datagram into rows: its header tells the times of its shots.
+/// Turns a datagram into rows: the times of its shots follow from its header.
 /// @param device_type  which emitters fire in turn
 /// @throws BadPacket as decode_numbered_header() and decode_numbered_records(); the chunk is then
 ///         as before

@@ -74,7 +74,7 @@ inline constexpr ShotGrid kGridOfTwo{10'000, 1, 1, 2};
 /// The same with three.
 inline constexpr ShotGrid kGridOfThree{50'000, 3, 1, 3};
 
-/// Grid of a device type and data type, empty when the two do not tell.
+/// Grid of a device type and data type, empty if they do not imply one.
 std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_type);
 
 /// Whether sensors of this type send inertial samples. @param device_type  Device::type

@@ -54,7 +54,7 @@ class PacketDecoder {
   /// @param bytes  header and all records, nothing behind them
   /// @throws BadPacket for a wrong length, version, data type or time, for angles beyond a turn of
   ///         a return, for coordinates and inertial values that are no finite numbers;
-  ///         InvalidArgument when neither the types nor the options tell the grid. Chunk and clock
+  ///         InvalidArgument if neither types nor options determine the grid. Chunk and clock
   ///         are then as before.
   void decode(std::span<const std::uint8_t> bytes, Chunk& chunk);
   /// The same for a chunk that is filled by many packets: rows go where the columns have room for
