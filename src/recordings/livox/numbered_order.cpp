@@ -50,7 +50,7 @@ bool NumberedOrder::add(std::span<const std::uint8_t> packet, std::int64_t host_
                                        static_cast<std::uint32_t>(chunk_.observations.size()),
                                        header.time_type});
   while (!track.held.empty() &&
-         (track.held.size() > kWindow || track.restarted ||
+         (track.held.size() > kWindow ||
           (track.last_index && track.held.begin()->first == *track.last_index + 1))) {
     give_out(track);
   }

@@ -300,7 +300,8 @@ PacketNumbers::Place PacketNumbers::add(const Packet& packet, bool paused) {
   const bool same_clock = packet.timestamp_type == last_->timestamp_type;
   if (same_clock && passed < (paused ? 0 : -kFarBack)) {
     came_.reset();
-    return advance(packet, 1, Kind::restarted, 0);
+    // Room for those that this one has overtaken.
+    return advance(packet, kRemembered, Kind::restarted, 0);
   }
   // Numbers that begin anew with every frame.
   if (packet.reserved != last_->reserved && packet.number < last_->number) {
