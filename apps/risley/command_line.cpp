@@ -51,14 +51,15 @@ constexpr Verb kVerbs[] = {
      "  risley convert recording.lvx -o recording.csv\n"
      "  risley convert 'survey/*.lvx' --format netcdf -o converted/",
      "--output --device", kThreads, declare_convert},
-    {"record", kLook, "Record first-generation Livox sensors from the network",
+    {"record", kLook, "Record Livox sensors from the network",
      "  risley record -o hall.lvx --interface 192.168.1.5 --duration-s 30\n"
      "  risley record --list",
      "--output --interface --list --duration-s --serial --passive --watch --optics", kNothing,
      declare_record},
     {"emulate", kLook, "Emulate a sensor on the network, with any faults you choose",
      "  risley emulate --interface 127.0.0.5 --sensor avia --duration-s 60\n"
-     "  risley emulate --interface 127.0.0.5 --loss 0.01 --speed 10",
+     "  risley emulate --interface 127.0.0.5 --loss 0.01 --speed 10\n"
+     "  risley emulate --interface 127.0.0.7 --sensor mid-360",
      "--interface --sensor --serial --scene --recording --duration-s --speed --set --seed", kSeed,
      declare_emulate},
     {"report", kLook,

@@ -111,6 +111,21 @@ void print_clock(const jobs::RecordedSensor& one) {
     say("{}: from {:.1f} s on {}\n", one.sensor.serial, change.begin,
         words.empty() ? "healthy" : fmt::format("{}", fmt::join(words, ", ")));
   }
+  for (std::size_t i = 0; i < std::min(one.reports.size(), kMostLines); ++i) {
+    const wire::SensorReport& report = one.reports[i].report;
+    auto words = wire::trouble_words(report);
+    constexpr std::uint8_t kPtp = 1, kGps = 2;
+    if (report.sync == kPtp) words.insert(words.begin(), "time from PTP");
+    if (report.sync == kGps) words.insert(words.begin(), "time from GPS");
+    if (report.work_state) {
+      words.insert(words.begin(), wire::work_state_words(*report.work_state));
+    }
+    say("{}: from {:.1f} s on {}\n", one.sensor.serial, one.reports[i].begin,
+        fmt::join(words, ", "));
+  }
+  if (one.coldest) {
+    say("{}: {:.1f} to {:.1f} deg C\n", one.sensor.serial, *one.coldest, *one.warmest);
+  }
 }
 
 /// The page of the recording, as --watch has it.
@@ -189,7 +204,10 @@ class StatusLine {
 };
 
 void print_recorded(const jobs::RecordedSensors& recorded) {
-  say("{}: {:.1f} s, {} bytes\n\n", recorded.output, recorded.duration, grouped(recorded.bytes));
+  for (const auto& file : recorded.files) {
+    say("{}: {:.1f} s, {} bytes\n", file.path, recorded.duration, grouped(file.bytes));
+  }
+  say("\n");
   Table table({"sensor", "observations", "packets", "lost", "dropped by the kernel", "rejected"});
   for (const jobs::RecordedSensor& one : recorded.sensors) {
     table.add({one.sensor.serial, grouped(one.counts.rows), grouped(one.counts.packets),
@@ -232,7 +250,9 @@ Run declare_record(CLI::App& verb) {
   RecordChoices& o = *options;
   verb.add_option(
       "-o,--output", o.output,
-      "Recording to write (.lvx, .nc); until the end it is an LVX file called FILE.unfinished");
+      "Recording to write (.lvx, .lvx2, .nc); until the end it is an LVX file called "
+      "FILE.unfinished. "
+      "Sensors of the second generation are written to the .lvx2 of this name, others to the .lvx");
   verb.add_option("--interface", o.interface,
                   "IPv4 address of this machine where the sensors are (default: the only one)")
       ->type_name("ADDRESS");
@@ -255,7 +275,8 @@ Run declare_record(CLI::App& verb) {
                   "Length of the recording, s (default: until Ctrl-C or SIGTERM)")
       ->excludes(list);
   add_choice(verb, "--coordinates", o.coordinates, {"spherical", "cartesian", "as-is"},
-             "What the sensors are to send");
+             "What the sensors are to send; those of the second generation send Cartesian "
+             "coordinates unless as-is");
   add_choice(verb, "--return-mode", o.return_mode,
              {"first", "strongest", "dual", "triple", "as-is"},
              "Returns per shot to request from the sensors");
@@ -269,7 +290,7 @@ Run declare_record(CLI::App& verb) {
                   "port of 127.0.0.1 or at an address and port of this machine")
       ->type_name("[ADDRESS:]PORT")
       ->excludes(list);
-  add_choice(verb, "--imu", o.imu, {"yes", "no"}, "Inertial samples of Avia, Horizon and Tele-15");
+  add_choice(verb, "--imu", o.imu, {"yes", "no"}, "Inertial samples, of sensors that have them");
   return [options](const CommonOptions& common) {
     end_in_own_time();
     const jobs::RecordOptions job = job_of(*options);

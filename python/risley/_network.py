@@ -19,7 +19,7 @@ def _note(words: str, is_wrong: bool) -> None:
 @suggesting
 def find_sensors(interface: str = "", *, find: float = 2.5,
                  progress: Progress = None) -> List[Dict[str, Any]]:
-    """Find the first-generation Livox sensors on an interface. Nothing is sent to them.
+    """Find the Livox sensors on an interface. A search is sent to all, and nothing else.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
            passive: bool = False, data_port: int = 56001, coordinates: str = "spherical",
            return_mode: str = "as-is", imu: bool = True, optics: AnySensor = "",
            progress: Progress = None) -> Dict[str, Any]:
-    """Record first-generation Livox sensors from the network.
+    """Record Livox sensors of both generations from the network.
 
     What happens meanwhile, such as a sensor that falls silent, is told to the logger ``risley``.
 
@@ -59,7 +59,8 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
     ----------
     output : str or path
         The recording, LVX or NetCDF by its ending; until the end it is an LVX file called
-        ``OUTPUT.unfinished``.
+        ``OUTPUT.unfinished``. Sensors of the second generation are written to the ``.lvx2`` of
+        this name, others to the ``.lvx``.
     duration : float, optional
         Length, s, from the first data on; by default until `stop` is set.
     stop : Stop, optional
@@ -76,7 +77,8 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
     data_port : int, default 56001
         Port of the data to which `passive` listens.
     coordinates : {'spherical', 'cartesian', 'as-is'}
-        What the sensors are to send.
+        What the sensors are to send; those of the second generation send Cartesian coordinates
+        unless 'as-is'.
     return_mode : {'as-is', 'first', 'strongest', 'dual', 'triple'}
         Returns of a shot that they are to send.
     imu : bool, default True
@@ -122,7 +124,7 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
             restart_takes: float = 2.0, bend: Mapping[str, float] = {},
             bend_s: Optional[float] = None, seed: int = 0, threads: int = 0,
             progress: Progress = None) -> Dict[str, Any]:
-    """Be a first-generation Livox sensor on the network, with known truth.
+    """Be a Livox sensor on the network, with known truth.
 
     Parameters
     ----------

@@ -17,7 +17,8 @@
 #include "risley/core/require.hpp"
 #include "risley/core/setting.hpp"
 #include "risley/recordings/livox/packet_encoder.hpp"
-#include "risley/wire/sensor_session.hpp"
+#include "risley/wire/control_sensor.hpp"
+#include "risley/wire/handshake_sensor.hpp"
 #include "risley/wire/udp_socket.hpp"
 
 #include "jobs/emulated_scan.hpp"
@@ -25,8 +26,6 @@
 
 namespace risley::jobs {
 namespace {
-
-using recordings::livox::record_layout;
 
 constexpr std::int64_t kEmulatedSecond = 1'000'000'000;  // ns
 constexpr std::int64_t kImuStep = 5'000'000;             // ns of the sensor's clock
@@ -73,6 +72,7 @@ struct Outgoing {
   std::vector<std::uint8_t> bytes;
   wire::Endpoint to;
   std::uint64_t number = 0;
+  std::size_t rows = 0;
   std::int64_t due_ns = 0;
   bool twice = false;  ///< it has a copy
 };
@@ -98,7 +98,7 @@ class Emulator {
         progress_(progress),
         scan_(options.simulation, options.recording, options.faults.bend),
         rate_(options.speed * (1 + 1e-6 * options.clock.drift_ppm)),
-        socket_({wire::interface_of(options.interface).address, wire::kSensorPort}),
+        interface_(wire::interface_of(options.interface)),
         loss_(options.simulation.seed, 101, options.faults.loss),
         duplication_(options.simulation.seed, 102, options.faults.duplication),
         disorder_(options.simulation.seed, 103, options.faults.disorder),
@@ -110,13 +110,22 @@ class Emulator {
     }
     identity_.device_type = scan_.device().type;
     identity_.firmware = {3, 8, 0, 0};
-    identity_.address = socket_.local().address;
-    identity_.abilities = abilities_of(identity_.device_type);
+    if (scan_.numbered()) identity_.firmware = {13, 18, 2, 44};
+    identity_.address = interface_.address;
+    if (scan_.numbered() && options.faults.heartbeat_dies) {
+      throw InvalidArgument(fmt::format("{}: sensors of the second generation have no heartbeat",
+                                        name_of(kSetting.heartbeat_dies)));
+    }
+    session_ = make_session(0);
+    open_sockets();
   }
 
   EmulatedSensor run();
 
  private:
+  std::unique_ptr<wire::SensorSession> make_session(std::int64_t now) const;
+  void open_sockets();
+  const wire::UdpSocket& socket_of(std::uint16_t port) const;
   void power_on(std::int64_t now);
   void power_off(std::int64_t now, std::int64_t time_ns);
   void end_session();
@@ -125,7 +134,6 @@ class Emulator {
   void follow_session(std::int64_t now);
   void start_stream(std::int64_t now);
   void end_stream(std::int64_t now);
-  std::uint8_t data_type() const;
   void send_due(std::int64_t now);
   void make_packet(std::int64_t now);
   void let_go(std::int64_t now, bool all);
@@ -146,10 +154,12 @@ class Emulator {
   /// Of power-on, as its clock has it.
   std::int64_t epoch_ns_ = 0;
   bool has_source_ = false, has_jumped_ = false;
-  wire::UdpSocket socket_;
+  wire::Interface interface_;
+  std::vector<wire::UdpSocket> sockets_;         // one for each port
+  std::vector<wire::UdpSocket> public_sockets_;  // for what is sent to everybody
   Chance loss_, duplication_, disorder_, damage_;
   wire::SensorIdentity identity_;
-  std::optional<wire::SensorSession> session_;
+  std::unique_ptr<wire::SensorSession> session_;
   std::optional<Stream> stream_;
   std::multimap<std::uint64_t, Outgoing> overtaken_;  // by the packet that they follow
   std::deque<Outgoing> delayed_;
@@ -160,12 +170,34 @@ class Emulator {
   EmulatedSensor truth_;
 };
 
+std::unique_ptr<wire::SensorSession> Emulator::make_session(std::int64_t now) const {
+  if (scan_.numbered()) return std::make_unique<wire::ControlSensor>(identity_, now);
+  return std::make_unique<wire::HandshakeSensor>(identity_, abilities_of(identity_.device_type),
+                                                 now);
+}
+
+void Emulator::open_sockets() {
+  for (const std::uint16_t port : session_->ports()) {
+    sockets_.emplace_back(wire::Endpoint{interface_.address, port});
+  }
+  const std::uint16_t port = session_->public_port();
+  if (port == 0) return;
+  public_sockets_.emplace_back(wire::Endpoint{wire::kEverybody, port}, 0, interface_.name);
+  if (interface_.broadcast && *interface_.broadcast != wire::kEverybody) {
+    public_sockets_.emplace_back(wire::Endpoint{*interface_.broadcast, port}, 0, interface_.name);
+  }
+}
+
+const wire::UdpSocket& Emulator::socket_of(std::uint16_t port) const {
+  return *std::ranges::find(sockets_, port, [](const auto& one) { return one.local().port; });
+}
+
 void Emulator::power_on(std::int64_t now) {
   power_on_ns_ = now;
   epoch_ns_ = 0;
   has_source_ = false;
-  scan_.set_header(0, 0);
-  session_.emplace(identity_, now);
+  scan_.begin();
+  session_ = make_session(now);
 }
 
 void Emulator::power_off(std::int64_t now, std::int64_t time_ns) {
@@ -183,7 +215,7 @@ void Emulator::set_clock(std::int64_t now) {
   if (synchronised && !has_source_ && since_start >= clock.source_from) {
     has_source_ = true;
     const bool by_ptp = clock.source == recordings::TimeReference::ptp;
-    if (by_ptp) {
+    if (by_ptp || scan_.numbered()) {
       // Whole microseconds, as its own times have.
       constexpr std::int64_t kMicrosecond = 1000;
       const std::int64_t here = std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -193,8 +225,7 @@ void Emulator::set_clock(std::int64_t now) {
     } else {
       epoch_ns_ = kFarthestJump * kEmulatedSecond;  // so that it can jump back
     }
-    scan_.set_header(recordings::livox::timestamp_type_of(clock.source),
-                     by_ptp ? kPtpSignal | kSyncByPtp : kPpsSignal | kSyncByPps);
+    scan_.set_header(clock.source, by_ptp ? kPtpSignal | kSyncByPtp : kPpsSignal | kSyncByPps);
     if (clock.source_from > 0 && stream_) {
       ++truth_.clock_jumps;
       note_(fmt::format("its time is that of {} now", to_string(clock.source)));
@@ -209,6 +240,10 @@ void Emulator::set_clock(std::int64_t now) {
     ++truth_.clock_jumps;
     note_(fmt::format("its clock jumps by {:.9g} s", 1e-9 * static_cast<double>(jump_ns)));
   }
+  constexpr std::uint8_t kPtp = 1, kGps = 2;  // SensorReport::sync
+  std::uint8_t sync = 0;
+  if (has_source_) sync = clock.source == recordings::TimeReference::ptp ? kPtp : kGps;
+  if (session_) session_->set_clock(sync, stamp(clock_ns(now)) - now);
 }
 
 /// Of what is sent next, since power-on.
@@ -228,41 +263,34 @@ void Emulator::end_session() {
 }
 
 void Emulator::take_commands(std::int64_t now) {
-  socket_.receive([&](const wire::UdpSocket::Datagram& datagram) {
-    if (!session_) return;
-    if (heart_dead_) {
-      const auto decoded = wire::decode_frame(datagram.bytes);
-      const auto* frame = std::get_if<wire::Frame>(&decoded);
-      if (frame != nullptr && frame->command == wire::Heartbeat::kId) return;
+  for (auto* sockets : {&sockets_, &public_sockets_}) {
+    for (wire::UdpSocket& socket : *sockets) {
+      socket.receive([&](const wire::UdpSocket::Datagram& datagram) {
+        if (!session_) return;
+        if (heart_dead_) {
+          const auto decoded = wire::decode_frame(datagram.bytes);
+          const auto* frame = std::get_if<wire::Frame>(&decoded);
+          if (frame != nullptr && frame->command == wire::Heartbeat::kId) return;
+        }
+        session_->receive(datagram.from, socket.local().port, datagram.bytes, now);
+        follow_session(now);
+      });
     }
-    session_->receive(datagram.from, datagram.bytes, now);
-    follow_session(now);
-  });
+  }
 }
 
 void Emulator::say(std::int64_t now) {
   if (!session_) return;
   session_->advance(now);
   follow_session(now);
-  for (auto& datagram : session_->take_datagrams()) {
+  for (auto& datagram : session_->take_datagrams(now)) {
     if (damage_.falls()) {
       datagram.bytes.back() ^= 1U;
       ++truth_.wrong_checksums;
     }
-    socket_.send(datagram.to.value_or(wire::Endpoint{wire::kEverybody, wire::kBroadcastPort}),
-                 datagram.bytes);
+    const wire::Endpoint everybody{wire::kEverybody, session_->broadcast_port()};
+    socket_of(datagram.from).send(datagram.to.value_or(everybody), datagram.bytes);
   }
-}
-
-std::uint8_t Emulator::data_type() const {
-  const bool cartesian = !session_->spherical();
-  if (identity_.device_type == recordings::kMid40) {
-    return recordings::livox::data_type_of(cartesian, false, 1);
-  }
-  const int returns = session_->return_mode() == wire::ReturnMode::triple ? 3
-                      : session_->return_mode() == wire::ReturnMode::dual ? 2
-                                                                          : 1;
-  return recordings::livox::data_type_of(cartesian, true, returns);
 }
 
 /// Starts, stops and changes what is sent as commands have it.
@@ -272,19 +300,19 @@ void Emulator::follow_session(std::int64_t now) {
     end_stream(now);
   } else if (!stream_) {
     start_stream(now);
-  } else if (stream_->data_type != data_type()) {
+  } else if (stream_->data_type != session_->data_type()) {
     // The next packet follows the last one.
     Stream& stream = *stream_;
     const std::int64_t passed = scan_.time_of(stream.number, stream.data_type);
     stream.first_ns += passed;
     stream.begin_ns += static_cast<std::int64_t>(static_cast<double>(passed) / rate_);
     stream.number = 0;
-    stream.data_type = data_type();
+    stream.data_type = session_->data_type();
   }
   if (const auto delay = session_->take_reboot()) {
     // The reply goes out first.
-    for (const auto& datagram : session_->take_datagrams()) {
-      if (datagram.to) socket_.send(*datagram.to, datagram.bytes);
+    for (const auto& datagram : session_->take_datagrams(now + kEmulatedSecond)) {
+      if (datagram.to) socket_of(datagram.from).send(*datagram.to, datagram.bytes);
     }
     ++truth_.restarts;
     note_("restarts as it was told to");
@@ -295,7 +323,7 @@ void Emulator::follow_session(std::int64_t now) {
 void Emulator::start_stream(std::int64_t now) {
   constexpr std::int64_t kClockStep = 1000;
   Stream stream;
-  stream.data_type = data_type();
+  stream.data_type = session_->data_type();
   stream.first_ns = clock_ns(now) / kClockStep * kClockStep;
   stream.begin_ns = now;
   stream.imu_number = static_cast<std::uint64_t>(stream.first_ns / kImuStep) + 1;
@@ -331,7 +359,7 @@ void Emulator::make_packet(std::int64_t now) {
   const auto delay_ns = static_cast<std::int64_t>(1e9 * options_.faults.delay);
   if (session_->imu() && static_cast<std::int64_t>(stream.imu_number) * kImuStep <= time_ns) {
     const auto sample = scan_.imu(stamp(static_cast<std::int64_t>(stream.imu_number++) * kImuStep));
-    if (socket_.send(session_->imu_target(), sample)) {
+    if (socket_of(session_->imu_port()).send(session_->imu_target(), sample)) {
       ++truth_.packets;
       ++truth_.imu_samples;
     } else {
@@ -352,11 +380,9 @@ void Emulator::make_packet(std::int64_t now) {
                            ? static_cast<std::uint64_t>(disorder_.count(options_.faults.farthest))
                            : 0);
     };
-    const Outgoing packet{{bytes.begin(), bytes.end()},
-                          session_->data_target(),
-                          number,
-                          now + delay_ns,
-                          duplication_.falls()};
+    const Outgoing packet{
+        {bytes.begin(), bytes.end()}, session_->data_target(), number,
+        scan_.rows(stream.data_type), now + delay_ns,          duplication_.falls()};
     overtaken_.emplace(place(), packet);
     if (packet.twice) overtaken_.emplace(place(), packet);
   }
@@ -375,7 +401,7 @@ void Emulator::let_go(std::int64_t now, bool all) {
 }
 
 void Emulator::send(const Outgoing& packet) {
-  const bool sent = socket_.send(packet.to, packet.bytes);
+  const bool sent = socket_of(session_->data_port()).send(packet.to, packet.bytes);
   // Of two copies the one that is sent first counts.
   if (packet.twice && !sent_once_.insert(packet.number).second) {
     sent_once_.erase(packet.number);
@@ -388,8 +414,7 @@ void Emulator::send(const Outgoing& packet) {
     return;
   }
   ++truth_.packets;
-  const std::uint8_t type = packet.bytes[recordings::livox::kDataTypeAt];
-  truth_.rows += record_layout(type)->rows();
+  truth_.rows += packet.rows;
   if (packet.number < stream_->last_sent) ++truth_.reordered;
   stream_->last_sent = std::max(stream_->last_sent, packet.number);
 }
@@ -412,15 +437,18 @@ EmulatedSensor Emulator::run() {
   power_on(begin);
   note_(fmt::format("{}, a {}, at {}", identity_.code,
                     recordings::device_type_name(identity_.device_type),
-                    to_string(socket_.local())));
-  const wire::UdpSocket* const sockets[] = {&socket_};
+                    to_string(sockets_.front().local())));
+  std::vector<const wire::UdpSocket*> sockets;
+  for (const auto* some : {&sockets_, &public_sockets_}) {
+    for (const wire::UdpSocket& socket : *some) sockets.push_back(&socket);
+  }
   const EmulatedFaults& faults = options_.faults;
   for (std::int64_t now = begin; !progress_.cancelled(); now = steady_ns()) {
     if (options_.duration && now - begin >= duration) break;
     take_commands(now);
-    set_clock(now);
     if (!session_ && now >= dead_until_ns_) power_on(now);
     say(now);
+    set_clock(now);
     send_due(now);
     const auto since_start =
         first_start_ns_ ? 1e-9 * static_cast<double>(now - *first_start_ns_) : -1.0;
@@ -446,7 +474,7 @@ EmulatedSensor Emulator::run() {
   truth_.device_type = identity_.device_type;
   truth_.address = identity_.address;
   truth_.duration = 1e-9 * static_cast<double>(steady_ns() - begin);
-  truth_.kernel_drops = socket_.kernel_drops();
+  for (const wire::UdpSocket* socket : sockets) truth_.kernel_drops += socket->kernel_drops();
   end_session();
   return truth_;
 }

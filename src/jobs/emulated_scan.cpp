@@ -11,6 +11,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/setting.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 #include "risley/recordings/livox/packet_encoder.hpp"
 #include "risley/scenes/scene.hpp"
 
@@ -31,13 +32,6 @@ constexpr const char* kRoom = R"(planes:
   - {name: ceiling, distance_m: 2.5, normal_azimuth_deg: 0, normal_zenith_deg: 0}
 )";
 
-/// Of packets with tags; those without are of the Mid-40, whose grid is the same.
-std::optional<ShotGrid> grid_of(int device_type) {
-  constexpr std::uint8_t kTagged = 2;
-  const auto type = static_cast<std::uint8_t>(device_type);
-  return type == device_type ? shot_grid(type, kTagged) : std::nullopt;
-}
-
 simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   SimulationOptions wanted = options;
   wanted.duration = kScanDuration;
@@ -45,11 +39,11 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   wanted.quantize = false;  // what a packet holds is rounded as the sensor does
   simulation::SimulationSettings settings = simulation_settings(wanted);
   const int type = settings.truth.device_type;
-  const std::optional<ShotGrid> grid = grid_of(type);
+  const std::optional<ShotGrid> grid = grid_of_type(type);
   if (!grid) {
-    throw InvalidArgument(fmt::format(
-        "{} = {}: the device type {} is none that can be emulated, allowed {}",
-        name_of(kSetting.sensor), options.sensor.name(), type, recordings::livox_types_text()));
+    throw InvalidArgument(
+        fmt::format("{} = {}: the device type {} is none that can be emulated, allowed {}",
+                    name_of(kSetting.sensor), options.sensor.name(), type, emulated_types_text()));
   }
   settings.rate = 1e9 * grid->interval_denominator / grid->interval_numerator_ns;
   if (!settings.scene) settings.scene = scenes::parse_scene(kRoom, "the built-in room");
@@ -69,7 +63,7 @@ void read_on(const simulation::SimulationSettings& settings,
 
 EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& recording,
                            const ParameterValues& bend)
-    : settings_(settings_of(options)), grid_(*grid_of(settings_.truth.device_type)) {
+    : settings_(settings_of(options)), grid_(*grid_of_type(settings_.truth.device_type)) {
   if (recording.empty()) {
     scanner_ = std::make_unique<simulation::Scanner>(settings_);
     device_ = scanner_->header().devices.front();
@@ -99,12 +93,52 @@ void EmulatedScan::read_shots() {
   if (bent_settings_) read_on(*bent_settings_, bent_scanner_, bent_chunk_);
 }
 
-void EmulatedScan::begin_packet(std::uint8_t data_type, std::int64_t time_ns) {
+void EmulatedScan::begin() {
+  number_ = imu_number_ = 0;
+  set_header(recordings::TimeReference::power_on, 0);
+}
+
+void EmulatedScan::set_header(recordings::TimeReference source, std::uint32_t status) {
+  // Of pulses the second generation makes whole times, with what it is told besides.
+  const bool has_pulses = source == recordings::TimeReference::pps;
+  header_.timestamp_type = numbered()
+                               ? time_type_of(has_pulses ? recordings::TimeReference::utc : source)
+                               : timestamp_type_of(source);
+  header_.status = status;
+}
+
+RecordLayout EmulatedScan::layout_of(std::uint8_t data_type) const {
+  if (!numbered()) return *record_layout(data_type);
+  constexpr std::uint16_t kRecords = 96;
+  return *numbered_layout(data_type, data_type == kNumberedImu ? std::uint16_t{1} : kRecords);
+}
+
+std::uint8_t* EmulatedScan::begin_packet(std::uint8_t data_type) {
+  const std::size_t head = numbered() ? kNumberedHeaderBytes : kPacketHeaderBytes;
+  packet_.resize(head + layout_of(data_type).bytes());
+  return &packet_[head];
+}
+
+std::span<const std::uint8_t> EmulatedScan::end_packet(std::uint8_t data_type,
+                                                       std::int64_t time_ns) {
+  if (numbered()) {
+    NumberedHeader header;
+    header.data_type = data_type;
+    header.records = layout_of(data_type).records;
+    constexpr std::int64_t kIntervalUnit_ns = 100;
+    header.interval = static_cast<std::uint16_t>(
+        (grid_.offset_ns(header.records - 1U) + kIntervalUnit_ns / 2) / kIntervalUnit_ns);
+    header.number = data_type == kNumberedImu ? imu_number_++ : number_++;
+    header.time_type = header_.timestamp_type;
+    header.time_ns = static_cast<std::uint64_t>(time_ns);
+    encode_numbered_header(header, packet_);
+    return packet_;
+  }
   recordings::Packet header = header_;
   header.data_type = data_type;
   header.timestamp = encode_timestamp(header.timestamp_type, time_ns);
-  packet_.resize(kPacketHeaderBytes + record_layout(data_type)->bytes());
   encode_packet_header(header, packet_.data());
+  return packet_;
 }
 
 void EmulatedScan::simulate_shot(bool tagged) {
@@ -120,34 +154,37 @@ void EmulatedScan::simulate_shot(bool tagged) {
 }
 
 std::span<const std::uint8_t> EmulatedScan::next(std::uint8_t data_type, std::int64_t time_ns) {
-  begin_packet(data_type, time_ns);
-  const RecordLayout& layout = *record_layout(data_type);
+  const RecordLayout layout = layout_of(data_type);
   record_.clear();
   record_.resize(layout.returns);
-  std::uint8_t* bytes = &packet_[kPacketHeaderBytes];
+  std::uint8_t* bytes = begin_packet(data_type);
   for (std::uint32_t shot = 0; shot < layout.records; ++shot) {
     if (recorded_) {
       recorded_->next(record_);
       if (!layout.tagged) std::fill(record_.tag.begin(), record_.tag.end(), std::uint8_t{0});
     } else {
-      simulate_shot(layout.tagged);
+      simulate_shot(layout.tagged && !numbered());
     }
-    encode_record(layout, record_, 0, shot, bytes);
+    if (numbered()) {
+      encode_numbered_record(data_type, record_, 0, shot, bytes);
+    } else {
+      encode_record(layout, record_, 0, shot, bytes);
+    }
     bytes += layout.bytes_per_record;
   }
-  return packet_;
+  return end_packet(data_type, time_ns);
 }
 
 std::span<const std::uint8_t> EmulatedScan::imu(std::int64_t time_ns) {
-  begin_packet(kImuDataType, time_ns);
+  const std::uint8_t data_type = numbered() ? kNumberedImu : kImuDataType;
   recordings::ImuSample sample;
   sample.acceleration_g = {0, 0, 1};
-  encode_imu(sample, &packet_[kPacketHeaderBytes]);
-  return packet_;
+  encode_imu(sample, begin_packet(data_type));
+  return end_packet(data_type, time_ns);
 }
 
 std::uint64_t EmulatedScan::period_numerator_ns(std::uint8_t data_type) const {
-  return std::uint64_t{record_layout(data_type)->records} * grid_.interval_numerator_ns;
+  return std::uint64_t{layout_of(data_type).records} * grid_.interval_numerator_ns;
 }
 
 std::int64_t EmulatedScan::time_of(std::uint64_t packets, std::uint8_t data_type) const {

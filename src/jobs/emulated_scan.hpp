@@ -27,11 +27,14 @@ class EmulatedScan {
 
   const recordings::Device& device() const { return device_; }  ///< serial number and type
 
-  /// What headers say from now on: Packet::timestamp_type and Packet::status.
-  void set_header(std::uint8_t timestamp_type, std::uint32_t status) {
-    header_.timestamp_type = timestamp_type;
-    header_.status = status;
-  }
+  /// The sensor is of the second generation.
+  bool numbered() const { return recordings::is_second_generation(device_.type); }
+  /// The sensor starts: packets are numbered from 0, and times are from power-on.
+  void begin();
+  /// What headers say from now on. @param status  Packet::status, of the first generation
+  void set_header(recordings::TimeReference source, std::uint32_t status);
+  /// Observations of a packet of points.
+  std::size_t rows(std::uint8_t data_type) const { return layout_of(data_type).rows(); }
   /// The next packet of points. @param time_ns  of its first shot
   /// @return header and records, until the next call
   std::span<const std::uint8_t> next(std::uint8_t data_type, std::int64_t time_ns);
@@ -49,7 +52,11 @@ class EmulatedScan {
   void simulate_shot(bool tagged);
   /// Of a packet's period, over the grid's denominator.
   std::uint64_t period_numerator_ns(std::uint8_t data_type) const;
-  void begin_packet(std::uint8_t data_type, std::int64_t time_ns);
+  recordings::livox::RecordLayout layout_of(std::uint8_t data_type) const;
+  /// Makes room for its records. @return where they go
+  std::uint8_t* begin_packet(std::uint8_t data_type);
+  /// Writes what stands in front of them. @return the packet
+  std::span<const std::uint8_t> end_packet(std::uint8_t data_type, std::int64_t time_ns);
 
   simulation::SimulationSettings settings_;
   recordings::livox::ShotGrid grid_;
@@ -64,6 +71,7 @@ class EmulatedScan {
   recordings::Observations record_;
   std::vector<std::uint8_t> packet_;
   recordings::Packet header_;
+  std::uint16_t number_ = 0, imu_number_ = 0;  // of the next packets
 };
 
 }  // namespace risley::jobs

@@ -16,6 +16,7 @@
 #include "risley/core/progress.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/parallel/parallel.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
 namespace risley::jobs {
@@ -26,7 +27,7 @@ using recordings::livox::ShotGrid;
 
 /// What only the thread has of a sensor.
 struct Followed {
-  std::optional<PacketDecoder> decoder;
+  std::optional<PacketDecoder> decoder;  // of the first generation
   std::optional<estimation::RunningEstimate> estimate;
 };
 
@@ -151,18 +152,29 @@ class OpticsWatch::Work {
 
   void follow(const Waiting& one) {
     Followed& followed = followed_[one.sensor];
-    const auto header = recordings::livox::decode_packet_header(one.packet);
-    if (header.data_type == recordings::livox::kImuDataType) return;
-    if (!followed.decoder) begin(one.sensor, header.data_type);
     chunk_.clear();
-    followed.decoder->decode(one.packet, chunk_);
+    if (recordings::is_second_generation(device_types_[one.sensor])) {
+      const auto header = recordings::livox::decode_numbered_header(one.packet);
+      if (header.data_type == recordings::livox::kNumberedImu) return;
+      const auto layout = recordings::livox::numbered_layout(header.data_type, header.records);
+      if (!followed.estimate) begin(one.sensor, layout->cartesian);
+      recordings::livox::decode_numbered_packet(one.packet, device_types_[one.sensor], 0, chunk_);
+    } else {
+      const auto header = recordings::livox::decode_packet_header(one.packet);
+      if (header.data_type == recordings::livox::kImuDataType) return;
+      if (!followed.estimate) {
+        begin_decoder(one.sensor);
+        begin(one.sensor, recordings::livox::record_layout(header.data_type)->cartesian);
+      }
+      followed.decoder->decode(one.packet, chunk_);
+    }
     const bool estimated = followed.estimate->add(chunk_.observations, progress_);
     const std::scoped_lock lock(mutex_);
     ++health_[one.sensor].packets;
     if (estimated) health_[one.sensor].state = followed.estimate->state();
   }
 
-  void begin(std::size_t sensor, std::uint8_t data_type) {
+  void begin_decoder(std::size_t sensor) {
     recordings::livox::PacketDecoderOptions decoding;
     decoding.device_type = device_types_[sensor];
     {
@@ -170,10 +182,13 @@ class OpticsWatch::Work {
       decoding.grid = grids_[sensor];
     }
     followed_[sensor].decoder.emplace(decoding);
+  }
+
+  void begin(std::size_t sensor, bool cartesian) {
     estimation::RunningOptions options;
     options.sensor = *sensors_[sensor];
     options.is_sensor = health_[sensor].is_reference;  // does not change
-    options.cartesian = recordings::livox::record_layout(data_type)->cartesian;
+    options.cartesian = cartesian;
     followed_[sensor].estimate.emplace(std::move(options));
   }
 

@@ -3,7 +3,9 @@
 #include "risley/jobs/record_sensors.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <filesystem>
 #include <iterator>
@@ -24,9 +26,12 @@
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/optics/parameters.hpp"
 #include "risley/recordings/livox/first_packets.hpp"
+#include "risley/recordings/livox/numbered_order.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 #include "risley/recordings/livox/packet_file.hpp"
-#include "risley/wire/client_session.hpp"
+#include "risley/wire/control_client.hpp"
+#include "risley/wire/handshake_client.hpp"
 
 #include "jobs/sensor_search.hpp"
 
@@ -51,7 +56,7 @@ constexpr std::int64_t kWatchPeriod = 500 * kMillisecond;
 constexpr double kLongestFinish = 2;
 /// Half a second of an Avia at ten times its speed.
 constexpr std::size_t kReceiveBuffer = std::size_t{16} << 20U;
-constexpr std::size_t kMostStatuses = 100;
+constexpr std::size_t kMostStatuses = 100, kMostReports = 1000;
 constexpr std::size_t kMostPassiveSensors = 16;
 /// Of a status: anything but what a healthy sensor reports (PPS, PTP, time synchronisation).
 constexpr std::uint32_t kTroubles = 0xC0000DFF;
@@ -59,24 +64,47 @@ constexpr std::uint32_t kTroubles = 0xC0000DFF;
 /// Whether the output is made of the file that grows.
 bool is_converted(const std::string& output) { return lower_case(output).ends_with(".nc"); }
 
+/// The name of a generation's file.
+std::string file_name(const std::string& output, bool numbered) {
+  if (is_converted(output)) return output;
+  const std::string ending = lower_case(output).ends_with(".lvx2") ? ".lvx2" : ".lvx";
+  const std::string wanted = numbered ? ".lvx2" : ".lvx";
+  // As it was written, in whichever case.
+  return ending == wanted ? output : output.substr(0, output.size() - ending.size()) + wanted;
+}
+
 /// A sensor while it is recorded.
 struct LiveSensor {
-  explicit LiveSensor(const FoundSensor& found) : order(found.device_type) {
+  LiveSensor(const FoundSensor& found, bool is_numbered)
+      : numbered(is_numbered),
+        order(recordings::livox::packet_sequence(found.device_type, is_numbered)) {
     result.sensor = found;
   }
 
   RecordedSensor result;
-  recordings::livox::PacketOrder order;
+  bool numbered;  ///< of the second generation
+  std::unique_ptr<recordings::livox::PacketSequence> order;
   std::unique_ptr<wire::UdpSocket> commands, data;
-  std::optional<wire::ClientSession> session;
-  std::size_t place = 0;  ///< among all sensors
+  std::unique_ptr<wire::ClientSession> session;
+  std::size_t place = 0;   ///< among all sensors
+  std::uint8_t index = 0;  ///< in the table of its file
   std::int64_t session_begin_ns = 0;
   std::optional<std::int64_t> data_ns;  ///< when the last packet came
   bool silent = false, stopped = false;
   std::uint64_t session_rejected = 0;  ///< by sessions that are over
   std::optional<std::uint32_t> status;
+  std::optional<wire::SensorReport> report;  ///< the last one, of the second generation
+  /// Changes, by the host's clock, ns.
+  std::vector<std::pair<std::int64_t, wire::SensorReport>> reports;
   std::uint64_t alarms_told = 0;
 };
+
+/// Of this machine, ns since 1970.
+std::int64_t host_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
 
 class Recorder {
  public:
@@ -93,12 +121,15 @@ class Recorder {
 
  private:
   void find();
-  std::vector<FoundSensor> find_passively();
+  void find_passively();
   void open_sockets();
   void begin_session(LiveSensor& live, std::int64_t now);
   void step(std::int64_t now, std::int64_t wait_until);
   void step_session(LiveSensor& live, std::int64_t now);
   void take_event(LiveSensor& live, const ClientEvent& event);
+  void take_report(LiveSensor& live, const wire::SensorReport& report);
+  void add_sensor(const FoundSensor& found, bool numbered);
+  void open_files();
   void take_broadcasts(std::int64_t now);
   void tell_of_newcomer(const FoundSensor& heard);
   void take_commands(LiveSensor& live, std::int64_t now);
@@ -107,8 +138,8 @@ class Recorder {
   void watch_silence(LiveSensor& live, std::int64_t now);
   void write_frame(bool last);
   void stop_all();
-  void finish_file();
-  void begin_watch(const std::vector<recordings::Device>& devices);
+  void finish_files();
+  void begin_watch();
   void tell_watch(std::int64_t now, bool over);
   std::uint64_t rejected_by(const LiveSensor& live) const;
   RecordedSensors result();
@@ -122,9 +153,9 @@ class Recorder {
   BroadcastListener listener_;
   std::unique_ptr<wire::UdpSocket> passive_data_;  // for all sensors
   std::vector<std::unique_ptr<LiveSensor>> sensors_;
-  std::set<std::string> newcomers_;  // serial numbers
-  std::unique_ptr<PacketFile> file_;
-  std::unique_ptr<OpticsWatch> optics_;  // where the optics are watched
+  std::set<std::string> newcomers_;                 // serial numbers
+  std::vector<std::unique_ptr<PacketFile>> files_;  // by RecordedSensors::files
+  std::unique_ptr<OpticsWatch> optics_;             // where the optics are watched
   std::vector<const wire::UdpSocket*> waiting_;
   std::optional<std::int64_t> first_packet_ns_,
       first_data_ns_;  ///< also a rejected one; a sound one
@@ -134,11 +165,35 @@ class Recorder {
   std::uint64_t passive_strangers_ = 0;
 };
 
-/// Whoever sends packets to the data port, and what their times say of the sensor.
-std::vector<FoundSensor> Recorder::find_passively() {
+/// Of a packet that a sensor of the second generation sent: by its own interval, as far as it tells
+/// the type.
+std::uint8_t numbered_type(std::span<const std::uint8_t> packet) {
+  const auto header = recordings::livox::decode_numbered_header(packet);
+  const auto grid = recordings::livox::interval_grid(header, recordings::kUnknownDeviceType);
+  for (const std::uint8_t type : {recordings::kMid360, recordings::kHap}) {
+    const auto usual = *recordings::livox::numbered_grid(type);
+    constexpr double kNear = 0.02;
+    const double ratio =
+        static_cast<double>(grid.interval_numerator_ns) * usual.interval_denominator /
+        (static_cast<double>(grid.interval_denominator) * usual.interval_numerator_ns);
+    if (std::abs(ratio - 1) < kNear) return type;
+  }
+  return recordings::kUnknownDeviceType;
+}
+
+void Recorder::add_sensor(const FoundSensor& found, bool numbered) {
+  sensors_.push_back(std::make_unique<LiveSensor>(found, numbered));
+  if (found.device_type == recordings::kUnknownDeviceType) {
+    sensors_.back()->order->set_grid(recordings::livox::kGrid240kHz);
+  }
+}
+
+/// Takes whoever sends packets to the data port, and what their times say of the sensor.
+void Recorder::find_passively() {
   struct Heard {
     recordings::livox::PacketDecoder decoder{{.grid = recordings::livox::kGrid100kHz}};
     recordings::livox::FirstPackets packets;
+    std::optional<std::uint8_t> numbered_type;  ///< of the second generation
   };
   std::map<wire::Address, Heard> heard;
   std::map<wire::Address, FoundSensor> named;
@@ -153,37 +208,44 @@ std::vector<FoundSensor> Recorder::find_passively() {
       if (heard.size() >= kMostPassiveSensors && !heard.contains(datagram.from.address)) return;
       chunk.clear();
       Heard one = heard.contains(datagram.from.address) ? heard[datagram.from.address] : Heard{};
+      const bool numbered =
+          !datagram.bytes.empty() && datagram.bytes[0] == recordings::livox::kNumberedVersion;
       try {
-        one.decoder.decode(datagram.bytes, chunk);
+        if (numbered) {
+          recordings::livox::decode_numbered_packet(datagram.bytes, recordings::kMid360, 0, chunk);
+        } else {
+          one.decoder.decode(datagram.bytes, chunk);
+        }
       } catch (const recordings::livox::BadPacket&) {
         return;
       }
       if (chunk.observations.size() == 0) return;
-      one.packets.add(chunk.packets.front(), chunk.observations, 0);
+      if (numbered) {
+        one.numbered_type = numbered_type(datagram.bytes);
+      } else {
+        one.packets.add(chunk.packets.front(), chunk.observations, 0);
+      }
       heard[datagram.from.address] = one;
     });
   }
-  std::vector<FoundSensor> found;
   for (const auto& [address, one] : heard) {
     FoundSensor sensor{to_string(address), recordings::kUnknownDeviceType, address};
     if (const auto known = named.find(address); known != named.end()) {
       sensor = known->second;
     } else {
-      sensor.device_type = one.packets.device_type();
+      sensor.device_type = one.numbered_type.value_or(one.packets.device_type());
     }
-    found.push_back(std::move(sensor));
+    add_sensor(sensor, one.numbered_type.has_value());
   }
-  return found;
 }
 
 void Recorder::find() {
-  std::vector<FoundSensor> found;
   if (options_.passive) {
     passive_data_ = std::make_unique<wire::UdpSocket>(
         wire::Endpoint{interface_.address, options_.data_port}, kReceiveBuffer);
     waiting_.push_back(passive_data_.get());
-    found = find_passively();
-    if (found.empty()) {
+    find_passively();
+    if (sensors_.empty()) {
       throw wire::NetworkError(fmt::format(
           "{}: no packet came in {} s; a passive recording hears only what sensors send to this "
           "address and port: name the port that the other host told them with {}",
@@ -191,7 +253,7 @@ void Recorder::find() {
           risley::name_of(kSetting.data_port)));
     }
   } else {
-    found = search_sensors(listener_, options_, progress_.silent());
+    const std::vector<FoundSensor> found = search_sensors(listener_, options_, progress_.silent());
     std::vector<std::string> missing = options_.serials;
     for (const FoundSensor& sensor : found) std::erase(missing, sensor.serial);
     if (found.empty() || !missing.empty()) {
@@ -203,11 +265,8 @@ void Recorder::find() {
                           : fmt::format("nothing was heard of {}", fmt::join(missing, ", ")),
           options_.find_time));
     }
-  }
-  for (const FoundSensor& sensor : found) {
-    sensors_.push_back(std::make_unique<LiveSensor>(sensor));
-    if (sensor.device_type == recordings::kUnknownDeviceType) {
-      sensors_.back()->order.set_grid(recordings::livox::kGrid240kHz);
+    for (const FoundSensor& sensor : found) {
+      add_sensor(sensor, recordings::is_second_generation(sensor.device_type));
     }
   }
 }
@@ -240,9 +299,14 @@ void Recorder::begin_session(LiveSensor& live, std::int64_t now) {
   settings.command_port = live.commands->local().port;
   settings.spherical = options_.spherical;
   settings.return_mode = options_.return_mode;
-  if (recordings::livox::has_imu(live.result.sensor.device_type)) settings.imu = options_.imu;
+  const std::uint8_t type = live.result.sensor.device_type;
+  if (recordings::livox::has_imu(type)) settings.imu = options_.imu;
   if (live.session) live.session_rejected += live.session->rejected();
-  live.session.emplace(settings, now);
+  if (live.numbered) {
+    live.session = std::make_unique<wire::ControlClient>(settings, type, now);
+  } else {
+    live.session = std::make_unique<wire::HandshakeClient>(settings, now);
+  }
   live.session_begin_ns = now;
 }
 
@@ -251,13 +315,13 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
     case ClientEvent::Kind::connected:
       // What is there was sent before; the sensor sends nothing more until it is started again.
       take_data(live, steady_ns());
-      live.order.flush();
+      live.order->flush();
       ++live.result.sessions;
       break;
     case ClientEvent::Kind::firmware:
       live.result.firmware = event.text;
       if (const auto grid = recordings::livox::grid_of_firmware(event.text)) {
-        live.order.set_grid(*grid);
+        live.order->set_grid(*grid);
         if (optics_) optics_->set_grid(live.place, *grid);
       }
       break;
@@ -281,6 +345,9 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
         }
       }
       break;
+    case ClientEvent::Kind::report:
+      take_report(live, event.report);
+      break;
     case ClientEvent::Kind::refused:
       note_(fmt::format("{}: it refuses the command \"{}\"", name_of(live), event.text), true);
       break;
@@ -293,15 +360,37 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
       break;
     case ClientEvent::Kind::lost:
       note_(fmt::format("{}: lost, {}; waiting for it", name_of(live), event.text), true);
-      live.order.flush();
+      live.order->flush();
       break;
   }
+}
+
+/// What a sensor of the second generation says of itself: changes are kept, and troubles told.
+void Recorder::take_report(LiveSensor& live, const wire::SensorReport& report) {
+  if (report.temperature_cdeg) {
+    const double temperature = 1e-2 * *report.temperature_cdeg;
+    live.result.coldest = std::min(live.result.coldest.value_or(temperature), temperature);
+    live.result.warmest = std::max(live.result.warmest.value_or(temperature), temperature);
+  }
+  // The temperature changes all the time.
+  wire::SensorReport before = live.report.value_or(wire::SensorReport{});
+  before.temperature_cdeg = report.temperature_cdeg;
+  if (live.report && before == report) {
+    live.report = report;
+    return;
+  }
+  const auto words = wire::trouble_words(report);
+  if (!words.empty() && words != wire::trouble_words(before)) {
+    note_(fmt::format("{}: it reports {}", name_of(live), fmt::join(words, ", ")), true);
+  }
+  live.report = report;
+  if (live.reports.size() < kMostReports) live.reports.emplace_back(host_ns(), report);
 }
 
 void Recorder::step_session(LiveSensor& live, std::int64_t now) {
   if (!live.session) return;
   live.session->advance(now);
-  const wire::Endpoint to{live.result.sensor.address, wire::kSensorPort};
+  const wire::Endpoint to{live.result.sensor.address, live.result.sensor.command_port};
   for (const auto& datagram : live.session->take_datagrams()) live.commands->send(to, datagram);
   for (const ClientEvent& event : live.session->take_events()) take_event(live, event);
 }
@@ -322,28 +411,35 @@ void Recorder::tell_of_newcomer(const FoundSensor& heard) {
         true);
 }
 
-/// A sensor that broadcasts has no host: it is new, or it came back.
+/// A sensor of the first generation that broadcasts has no host: it is new, or it came back. One of
+/// the second answers every search.
 void Recorder::take_broadcasts(std::int64_t now) {
+  if (!options_.passive) listener_.search(now);
   for (const FoundSensor& heard : listener_.take()) {
     tell_of_newcomer(heard);
     for (const auto& live : sensors_) {
       if (live->result.sensor.serial != heard.serial || !live->session || live->stopped) continue;
       const bool lost = live->session->state() == ClientState::lost;
-      const bool settled = now - live->session_begin_ns > kBroadcastSettles &&
+      const bool settled = !live->numbered && now - live->session_begin_ns > kBroadcastSettles &&
                            now - live->session->heard_ns() > kBroadcastSettles / 2 &&
                            heard.address == live->result.sensor.address;
       if (!lost && !settled) continue;
-      if (!lost) live->order.flush();
+      if (!lost) live->order->flush();
       live->result.sensor.address = heard.address;
+      live->result.sensor.command_port = heard.command_port;
       begin_session(*live, now);
     }
   }
 }
 
 void Recorder::take_commands(LiveSensor& live, std::int64_t now) {
-  const wire::Endpoint sensor{live.result.sensor.address, wire::kSensorPort};
+  const FoundSensor& sensor = live.result.sensor;
   live.commands->receive([&](const wire::UdpSocket::Datagram& datagram) {
-    if (datagram.from == sensor && live.session) {
+    const bool from_it =
+        datagram.from.address == sensor.address &&
+        (datagram.from.port == sensor.command_port ||
+         (live.numbered && datagram.from.port == wire::control_ports(sensor.device_type).push));
+    if (from_it && live.session) {
       live.session->receive(datagram.bytes, now);
     } else {
       ++live.result.rejected;
@@ -354,7 +450,7 @@ void Recorder::take_commands(LiveSensor& live, std::int64_t now) {
 std::size_t Recorder::take_data(LiveSensor& live, std::int64_t now) {
   const auto take = [&](LiveSensor& whose, const wire::UdpSocket::Datagram& datagram) {
     if (!first_packet_ns_) first_packet_ns_ = now;
-    if (!whose.order.add(datagram.bytes, datagram.kernel_ns)) return;
+    if (!whose.order->add(datagram.bytes, datagram.kernel_ns)) return;
     if (!first_data_ns_) first_data_ns_ = now;
     last_data_ns_ = now;
     whose.data_ns = now;
@@ -392,20 +488,18 @@ void Recorder::watch_silence(LiveSensor& live, std::int64_t now) {
 void Recorder::write_frame(bool last) {
   for (std::size_t i = 0; i < sensors_.size(); ++i) {
     LiveSensor& live = *sensors_[i];
-    if (last) live.order.flush();
-    for (const auto& packet : live.order.take()) {
-      file_->add(static_cast<std::uint8_t>(i), packet);
+    if (last) live.order->flush();
+    for (const auto& packet : live.order->take()) {
+      files_[live.result.file]->add(live.index, packet);
       if (optics_) optics_->add(i, packet);
     }
   }
-  file_->end_frame();
+  for (const auto& file : files_) file->end_frame();
 }
 
 void Recorder::step(std::int64_t now, std::int64_t wait_until) {
-  const auto host_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
-                           std::chrono::system_clock::now().time_since_epoch())
-                           .count();
-  const std::int64_t begin = steady_ns();  // behind host_ns, so that no standstill hides between
+  const std::int64_t host = host_ns();
+  const std::int64_t begin = steady_ns();  // behind host, so that no standstill hides between
   if (begin - std::exchange(step_ns_, begin) > kStoodStill) {
     patient_until_ns_ = begin + recordings::livox::PacketOrder::kLongestWait;
   }
@@ -420,7 +514,7 @@ void Recorder::step(std::int64_t now, std::int64_t wait_until) {
   }
   if (now >= frame_due_ns_) {
     if (begin >= patient_until_ns_) {
-      for (const auto& live : sensors_) live->order.advance(host_ns);
+      for (const auto& live : sensors_) live->order->advance(host);
     }
     write_frame(false);
     frame_due_ns_ = now + kFramePeriod;
@@ -456,19 +550,40 @@ void Recorder::stop_all() {
   }
 }
 
-RecordedSensors Recorder::run() {
-  find();
-  open_sockets();
-  std::vector<recordings::Device> devices;
+/// One for each generation that there is.
+void Recorder::open_files() {
+  std::array<std::vector<recordings::Device>, 2> devices;  // by generation
   for (const auto& live : sensors_) {
+    auto& table = devices[live->numbered ? 1 : 0];
     recordings::Device device;
     device.serial = live->result.sensor.serial;
     device.type = live->result.sensor.device_type;
-    device.index = static_cast<std::uint8_t>(devices.size());
-    devices.push_back(device);
+    device.address = live->numbered ? to_string(live->result.sensor.address) : "";
+    live->index = device.index = static_cast<std::uint8_t>(table.size());
+    table.push_back(device);
   }
-  begin_watch(devices);
-  file_ = std::make_unique<PacketFile>(options_.output, devices);
+  if (is_converted(options_.output) && !devices[0].empty() && !devices[1].empty()) {
+    throw InvalidArgument(fmt::format(
+        "{} = {}: sensors of both generations were found, and NetCDF is made of one recording; "
+        "choose sensors with {}, or record LVX, which writes one file for each generation",
+        risley::name_of(kSetting.output), options_.output, risley::name_of(kSetting.serial)));
+  }
+  for (const bool numbered : {false, true}) {
+    const auto& table = devices[numbered ? 1 : 0];
+    if (table.empty()) continue;
+    for (const auto& live : sensors_) {
+      if (live->numbered == numbered) live->result.file = files_.size();
+    }
+    files_.push_back(
+        std::make_unique<PacketFile>(file_name(options_.output, numbered), table, numbered));
+  }
+}
+
+RecordedSensors Recorder::run() {
+  find();
+  open_sockets();
+  begin_watch();
+  open_files();
   const std::int64_t begin = steady_ns();
   if (!passive_data_) {
     for (const auto& live : sensors_) begin_session(*live, begin);
@@ -503,31 +618,36 @@ RecordedSensors Recorder::run() {
   }
   if (failure) std::rethrow_exception(failure);
   write_frame(true);
-  if (file_->frames() == 0) {
+  const bool nothing = std::all_of(sensors_.begin(), sensors_.end(), [](const auto& live) {
+    return live->order->counts().packets == 0;
+  });
+  if (nothing) {
     std::uint64_t rejected = 0;
     for (const auto& live : sensors_) rejected += rejected_by(*live);
     if (first_packet_ns_) {
       throw wire::NetworkError(fmt::format(
-          "{}: all {} packets that came from {} were rejected, because they are not of the first "
-          "generation's protocol or hold no times in order; nothing was recorded",
+          "{}: all {} packets that came from {} were rejected, because they are not of Livox's "
+          "protocol or hold no times in order; nothing was recorded",
           to_string(interface_.address), rejected, name_of(*sensors_.front())));
     }
     throw wire::NetworkError(fmt::format("{}: no packet came from {}; nothing was recorded",
                                          to_string(interface_.address),
                                          name_of(*sensors_.front())));
   }
-  finish_file();
+  finish_files();
   if (optics_) optics_->finish(kLongestFinish);
   tell_watch(last_data_ns_, true);
   return result();
 }
 
-void Recorder::begin_watch(const std::vector<recordings::Device>& devices) {
+void Recorder::begin_watch() {
   for (std::size_t i = 0; i < sensors_.size(); ++i) sensors_[i]->place = i;
   if (!options_.watch_optics) return;
   std::vector<WatchedSensor> watched;
-  watched.reserve(devices.size());
-  for (const recordings::Device& device : devices) watched.push_back({device.serial, device.type});
+  watched.reserve(sensors_.size());
+  for (const auto& live : sensors_) {
+    watched.push_back({live->result.sensor.serial, live->result.sensor.device_type});
+  }
   optics_ = std::make_unique<OpticsWatch>(watched, options_.optics_reference);
 }
 
@@ -548,11 +668,12 @@ void Recorder::tell_watch(std::int64_t now, bool over) {
   for (const auto& live : sensors_) {
     LiveSensorState one;
     one.sensor = live->result.sensor;
-    one.counts = live->order.counts();
+    one.counts = live->order->counts();
     one.kernel_drops = (passive_data_ ? *passive_data_ : *live->data).kernel_drops();
     one.rejected = rejected_by(*live);
     one.silent = live->silent;
     one.status = live->status;
+    one.report = live->report;
     if (live->place < optics.size()) one.optics = optics[live->place];
     state.sensors.push_back(std::move(one));
   }
@@ -560,40 +681,43 @@ void Recorder::tell_watch(std::int64_t now, bool over) {
 }
 
 std::uint64_t Recorder::rejected_by(const LiveSensor& live) const {
-  return live.result.rejected + live.order.counts().rejected + live.session_rejected +
+  return live.result.rejected + live.order->counts().rejected + live.session_rejected +
          (live.session ? live.session->rejected() : 0);
 }
 
-/// Gives the file its name, or makes what was asked for of it.
-void Recorder::finish_file() {
+/// Gives the files their names, or makes what was asked for of the only one.
+void Recorder::finish_files() {
   if (!is_converted(options_.output)) {
-    file_->close();
+    for (const auto& file : files_) file->close();
     return;
   }
-  file_->settle();
+  PacketFile& file = *files_.front();
+  file.settle();
   try {
     ConvertRecordingOptions wanted;
-    wanted.recording = file_->unfinished_path();
+    wanted.recording = file.unfinished_path();
     wanted.output = options_.output;
     const ConvertedRecording converted = convert_recording(wanted);
     if (converted.damage) throw FileError(*converted.damage);
   } catch (const FileError& error) {
     throw FileError(
         error.path(), error.place(),
-        fmt::format("{}; the recording is whole in {}", error.problem(), file_->unfinished_path()));
+        fmt::format("{}; the recording is whole in {}", error.problem(), file.unfinished_path()));
   }
-  file_->discard();
+  file.discard();
 }
 
 RecordedSensors Recorder::result() {
   RecordedSensors recorded;
-  recorded.output = file_->path();
   recorded.interface = interface_.address;
   recorded.duration = 1e-9 * static_cast<double>(last_data_ns_ - first_data_ns_.value_or(0));
-  recorded.frames = file_->frames();
-  std::error_code gone;
-  recorded.bytes = is_converted(options_.output) ? std::filesystem::file_size(options_.output, gone)
-                                                 : file_->size();
+  for (const auto& file : files_) {
+    std::error_code gone;
+    recorded.files.push_back({file->path(), file->frames(),
+                              is_converted(options_.output)
+                                  ? std::filesystem::file_size(options_.output, gone)
+                                  : file->size()});
+  }
   recorded.receive_buffer_asked = kReceiveBuffer;
   recorded.receive_buffer_granted = kReceiveBuffer;
   recorded.strangers = listener_.strangers() + passive_strangers_;
@@ -601,7 +725,7 @@ RecordedSensors Recorder::result() {
   if (optics_) optics = optics_->health();
   std::int64_t first_host_ns = std::numeric_limits<std::int64_t>::max();
   for (const auto& live : sensors_) {
-    if (const auto first = live->order.first_host_ns()) {
+    if (const auto first = live->order->first_host_ns()) {
       first_host_ns = std::min(first_host_ns, *first);
     }
   }
@@ -610,11 +734,11 @@ RecordedSensors Recorder::result() {
     const wire::UdpSocket& data = passive_data_ ? *passive_data_ : *live->data;
     recorded.receive_buffer_granted =
         std::min(recorded.receive_buffer_granted, data.receive_buffer());
-    one.counts = live->order.counts();
+    one.counts = live->order->counts();
     one.kernel_drops = data.kernel_drops();
     one.rejected = rejected_by(*live);
     if (live->place < optics.size()) one.optics = optics[live->place];
-    for (const recordings::livox::PacketGap& gap : live->order.gaps()) {
+    for (const recordings::livox::PacketGap& gap : live->order->gaps()) {
       one.gaps.push_back({1e-9 * static_cast<double>(gap.host_from_ns - first_host_ns),
                           1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost,
                           gap.imu, gap.cause});
@@ -622,15 +746,21 @@ RecordedSensors Recorder::result() {
     const auto since_first = [&](std::int64_t host_ns) {
       return 1e-9 * static_cast<double>(host_ns - first_host_ns);
     };
-    const recordings::livox::ClockWatch& clock = live->order.clock();
+    const recordings::livox::ClockWatch& clock = live->order->clock();
     for (const recordings::livox::ClockStretch& stretch : clock.stretches()) {
       one.clocks.push_back({recordings::livox::time_reference_of(stretch.timestamp_type),
                             since_first(stretch.host_from_ns), since_first(stretch.host_to_ns),
                             1e-9 * static_cast<double>(stretch.least_offset_ns),
                             1e-9 * static_cast<double>(stretch.greatest_offset_ns), stretch.drift});
     }
+    // Packets of the second generation have no status.
     for (const recordings::livox::StatusChange& change : clock.status_changes()) {
-      one.status_changes.push_back({since_first(change.host_ns), change.status});
+      if (!live->numbered) {
+        one.status_changes.push_back({since_first(change.host_ns), change.status});
+      }
+    }
+    for (const auto& [host_ns, report] : live->reports) {
+      one.reports.push_back({std::max(since_first(host_ns), 0.0), report});
     }
     recorded.sensors.push_back(one);
   }
@@ -643,10 +773,11 @@ RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& n
                                const Progress& progress, const RecordWatch& watch) {
   if (options.duration) require_positive(kSetting.duration, *options.duration);
   require_find_time(options);
-  if (!is_converted(options.output) && !lower_case(options.output).ends_with(".lvx")) {
+  if (!is_converted(options.output) && !lower_case(options.output).ends_with(".lvx") &&
+      !lower_case(options.output).ends_with(".lvx2")) {
     throw InvalidArgument(
-        fmt::format("{} = {}: packets are recorded as LVX or NetCDF, expected the ending .lvx or "
-                    ".nc; convert the recording afterwards",
+        fmt::format("{} = {}: packets are recorded as LVX or NetCDF, expected the ending .lvx, "
+                    ".lvx2 or .nc; convert the recording afterwards",
                     name_of(kSetting.output), options.output));
   }
   if (options.watch_optics)

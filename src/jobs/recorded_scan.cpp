@@ -11,6 +11,7 @@
 #include "risley/core/error.hpp"
 #include "risley/core/saturating.hpp"
 #include "risley/core/setting.hpp"
+#include "risley/recordings/livox/numbered_packet.hpp"
 
 namespace risley::jobs {
 namespace {
@@ -26,6 +27,25 @@ double interval_ns(const recordings::livox::ShotGrid& grid) {
 
 }  // namespace
 
+std::optional<recordings::livox::ShotGrid> grid_of_type(int device_type) {
+  const auto type = static_cast<std::uint8_t>(device_type);
+  if (type != device_type) return std::nullopt;
+  if (const auto grid = recordings::livox::numbered_grid(type)) return grid;
+  // Of packets with tags; those without are of the Mid-40, whose grid is the same.
+  constexpr std::uint8_t kTagged = 2;
+  return recordings::livox::shot_grid(type, kTagged);
+}
+
+std::string emulated_types_text() {
+  std::string text = recordings::livox_types_text();
+  for (const recordings::LivoxType& type : recordings::kLivoxTypes) {
+    if (!type.first_generation && grid_of_type(type.number)) {
+      text += fmt::format(", {} ({})", type.number, type.name);
+    }
+  }
+  return text;
+}
+
 RecordedScan::RecordedScan(std::string path, std::uint8_t sensor_type)
     : path_(std::move(path)), source_(recordings::Source(path_).held_open()) {
   open();
@@ -40,15 +60,12 @@ RecordedScan::RecordedScan(std::string path, std::uint8_t sensor_type)
                        header.devices.size()));
   }
   device_ = header.devices.front();
-  constexpr std::uint8_t kTagged = 2;
-  if (device_.type_inferred || !recordings::livox::shot_grid(device_.type, kTagged)) {
-    device_.type = sensor_type;
-  }
-  const auto grid = recordings::livox::shot_grid(device_.type, kTagged);
+  if (device_.type_inferred || !grid_of_type(device_.type)) device_.type = sensor_type;
+  const auto grid = grid_of_type(device_.type);
   if (!grid) {
     refuse(
         fmt::format("its device type {} is none that can be emulated, allowed {}; name the sensor",
-                    device_.type, recordings::livox_types_text()));
+                    device_.type, emulated_types_text()));
   }
   grid_ = *grid;
   if (!find_row()) throw FileError(path_, {}, "holds no shots that could be sent");
@@ -112,8 +129,10 @@ void RecordedScan::next(recordings::Observations& record) {
     record.range[number] = rows.range[row_];
     record.intensity[number] = rows.intensity[row_];
     record.valid[number] = 1;
+    // The second generation's tags do not say which return it is.
+    const bool as_it_is = rows.tag[row_] != 0 || recordings::is_second_generation(device_.type);
     record.tag[number] =
-        rows.tag[row_] != 0 ? rows.tag[row_] : static_cast<std::uint8_t>((number + 1) << kEchoAt);
+        as_it_is ? rows.tag[row_] : static_cast<std::uint8_t>((number + 1) << kEchoAt);
   }
   ++slot_;
 }

@@ -13,6 +13,12 @@
 
 namespace risley::jobs {
 
+/// How the shots of a type of sensors follow each other; empty where that is not known.
+/// @param device_type  Device::type
+std::optional<recordings::livox::ShotGrid> grid_of_type(int device_type);
+/// The types that it knows, for messages.
+std::string emulated_types_text();
+
 /// The shots of a recording on the time grid of a sensor, with its gaps, over and over.
 class RecordedScan {
  public:

@@ -31,39 +31,79 @@ void require_find_time(const RecordOptions& options) {
 BroadcastListener::BroadcastListener(const wire::Interface& interface) {
   // Each hears what is sent to its address only. Broadcasts come to 255.255.255.255; those of some
   // emulators to the network, or to this host alone.
-  sockets_.emplace_back(wire::Endpoint{wire::kEverybody, wire::kBroadcastPort}, 0, interface.name);
-  if (interface.broadcast && *interface.broadcast != wire::kEverybody) {
-    sockets_.emplace_back(wire::Endpoint{*interface.broadcast, wire::kBroadcastPort}, 0,
-                          interface.name);
+  const auto listen = [&](std::vector<wire::UdpSocket>& sockets, std::uint16_t port) {
+    sockets.emplace_back(wire::Endpoint{wire::kEverybody, port}, 0, interface.name);
+    if (interface.broadcast && *interface.broadcast != wire::kEverybody) {
+      sockets.emplace_back(wire::Endpoint{*interface.broadcast, port}, 0, interface.name);
+    }
+  };
+  listen(broadcasts_, wire::kBroadcastPort);
+  broadcasts_.emplace_back(wire::Endpoint{interface.address, wire::kBroadcastPort});
+  listen(answers_, wire::kSearchPort);
+  try {
+    answers_.emplace_back(wire::Endpoint{interface.address, wire::kSearchPort});
+  } catch (const wire::NetworkError&) {
+    // Another program, such as a driver, has the port: sensors answer whoever asks.
+    answers_.emplace_back(wire::Endpoint{interface.address, 0});
   }
-  sockets_.emplace_back(wire::Endpoint{interface.address, wire::kBroadcastPort});
 }
 
 void BroadcastListener::add_to(std::vector<const wire::UdpSocket*>& waiting) const {
-  for (const wire::UdpSocket& socket : sockets_) waiting.push_back(&socket);
+  for (const auto* sockets : {&broadcasts_, &answers_}) {
+    for (const wire::UdpSocket& socket : *sockets) waiting.push_back(&socket);
+  }
+}
+
+void BroadcastListener::search(std::int64_t now_ns) {
+  constexpr std::int64_t kSearchPeriod = 1'000'000'000;
+  if (now_ns < search_due_ns_) return;
+  search_due_ns_ = now_ns + kSearchPeriod;
+  answers_.back().send(
+      {wire::kEverybody, wire::kSearchPort},
+      wire::encode_control_frame({wire::ControlCommand::search, false, false, ++sequence_, {}}));
+}
+
+std::optional<FoundSensor> BroadcastListener::sensor_of(const wire::UdpSocket::Datagram& datagram,
+                                                        bool searched) {
+  if (searched) {
+    const auto decoded = wire::decode_control_frame(datagram.bytes);
+    const auto* frame = std::get_if<wire::ControlFrame>(&decoded);
+    const auto reply = frame != nullptr ? wire::search_reply_of(*frame) : std::nullopt;
+    if (reply && reply->code == 0 && datagram.from.port == wire::kSearchPort &&
+        !reply->serial.empty()) {
+      return FoundSensor{reply->serial, reply->device_type, datagram.from.address,
+                         reply->command_port};
+    }
+    // Searches of this host and others, and what sensors say to their hosts.
+    if (frame == nullptr) ++strangers_;
+    return std::nullopt;
+  }
+  const auto decoded = wire::decode_frame(datagram.bytes);
+  const auto* frame = std::get_if<wire::Frame>(&decoded);
+  // Some sensors broadcast with the type of a command.
+  if (frame != nullptr && frame->type != wire::FrameType::reply &&
+      datagram.from.port == wire::kSensorPort) {
+    const auto meaning = wire::decode_message(*frame);
+    const auto* message = std::get_if<wire::Message>(&meaning);
+    const auto* broadcast = message != nullptr ? std::get_if<wire::Broadcast>(message) : nullptr;
+    if (broadcast != nullptr) {
+      return FoundSensor{broadcast->code, broadcast->device_type, datagram.from.address};
+    }
+  }
+  ++strangers_;
+  return std::nullopt;
 }
 
 std::vector<FoundSensor> BroadcastListener::take() {
   std::vector<FoundSensor> found;
-  for (wire::UdpSocket& socket : sockets_) {
-    socket.receive([&](const wire::UdpSocket::Datagram& datagram) {
-      const auto decoded = wire::decode_frame(datagram.bytes);
-      const auto* frame = std::get_if<wire::Frame>(&decoded);
-      // Some sensors broadcast with the type of a command.
-      const bool plausible = frame != nullptr && frame->type != wire::FrameType::reply &&
-                             datagram.from.port == wire::kSensorPort;
-      if (plausible) {
-        const auto meaning = wire::decode_message(*frame);
-        const auto* message = std::get_if<wire::Message>(&meaning);
-        const auto* broadcast =
-            message != nullptr ? std::get_if<wire::Broadcast>(message) : nullptr;
-        if (broadcast != nullptr) {
-          found.push_back({broadcast->code, broadcast->device_type, datagram.from.address});
-          return;
+  for (auto* sockets : {&broadcasts_, &answers_}) {
+    for (wire::UdpSocket& socket : *sockets) {
+      socket.receive([&](const wire::UdpSocket::Datagram& datagram) {
+        if (auto sensor = sensor_of(datagram, sockets == &answers_)) {
+          found.push_back(std::move(*sensor));
         }
-      }
-      ++strangers_;
-    });
+      });
+    }
   }
   return found;
 }
@@ -82,6 +122,7 @@ std::vector<FoundSensor> search_sensors(BroadcastListener& listener, const Recor
   for (std::int64_t passed = 0; passed < time; passed = steady_ns() - begin) {
     progress.report(static_cast<double>(passed) / static_cast<double>(time));
     constexpr std::int64_t kLongestWait = 50'000'000;
+    listener.search(begin + passed);
     wire::wait_for(waiting, std::min(time - passed, kLongestWait));
     for (FoundSensor& sensor : listener.take()) {
       if (wanted(sensor.serial) && found.size() < kMostSensors) {

@@ -14,20 +14,27 @@ namespace risley::jobs {
 /// ns of a clock that never goes back.
 std::int64_t steady_ns();
 
-/// Hears the broadcasts of sensors on one interface.
+/// Hears of sensors on one interface: the broadcasts of the first generation, and what the second
+/// answers to a search.
 class BroadcastListener {
  public:
   /// @throws NetworkError
   explicit BroadcastListener(const wire::Interface& interface);
 
-  /// Sensors that have broadcast since the last call, at most a few hundred.
+  /// Searches sensors of the second generation, once a second at most.
+  void search(std::int64_t now_ns);
+  /// Sensors that were heard since the last call, at most a few hundred.
   std::vector<FoundSensor> take();
-  /// Datagrams that were no broadcasts of sensors.
+  /// Datagrams that name no sensor.
   std::uint64_t strangers() const { return strangers_; }
   void add_to(std::vector<const wire::UdpSocket*>& waiting) const;  ///< for wait_for()
 
  private:
-  std::vector<wire::UdpSocket> sockets_;
+  std::optional<FoundSensor> sensor_of(const wire::UdpSocket::Datagram& datagram, bool searched);
+
+  std::vector<wire::UdpSocket> broadcasts_, answers_;  // the last one of answers_ asks, too
+  std::int64_t search_due_ns_ = 0;
+  std::uint32_t sequence_ = 0;
   std::uint64_t strangers_ = 0;
 };
 

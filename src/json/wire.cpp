@@ -66,6 +66,29 @@ Json statuses_json(const std::vector<jobs::RecordedStatus>& statuses) {
   return json;
 }
 
+const char* sync_name(std::uint8_t sync) {
+  constexpr const char* kNames[] = {"none", "PTP", "GPS"};
+  return sync < std::size(kNames) ? kNames[sync] : "unknown";
+}
+
+/// What a sensor of the second generation says of itself.
+Json report_json(const wire::SensorReport& report) {
+  return {
+      {"work_state", report.work_state ? Json(wire::work_state_words(*report.work_state)) : Json()},
+      {"time_sync", report.sync ? Json(sync_name(*report.sync)) : Json()},
+      {"says", wire::trouble_words(report)}};
+}
+
+Json reports_json(const std::vector<jobs::RecordedReport>& reports) {
+  Json json = Json::array();
+  for (const jobs::RecordedReport& one : reports) {
+    Json report = report_json(one.report);
+    report["begin_s"] = one.begin;
+    json.push_back(std::move(report));
+  }
+  return json;
+}
+
 /// In the unit that the parameter's name ends with.
 double per_unit(const std::string& parameter) {
   const ParameterInfo* known = find_parameter_of_any_train(parameter);
@@ -92,6 +115,21 @@ Json status_json(std::uint32_t status) {
           {"motor", level(kMotor)},
           {"window", level(kWindow)},
           {"system", level(kSystem)}};
+}
+
+/// Least and greatest that the sensor told.
+Json temperature_json(const jobs::RecordedSensor& one) {
+  if (!one.coldest) return {};
+  return {{"min", *one.coldest}, {"max", *one.warmest}};
+}
+
+/// @param report  empty where there is none
+Json live_report_json(const std::optional<wire::SensorReport>& report) {
+  if (!report) return {};
+  Json json = report_json(*report);
+  json["temperature_deg_c"] =
+      report->temperature_cdeg ? Json(1e-2 * *report->temperature_cdeg) : Json();
+  return json;
 }
 
 /// @param optics  empty where they are not watched
@@ -164,15 +202,23 @@ Json of(const jobs::RecordedSensors& recorded) {
                    {"statuses", one.statuses},
                    {"clocks", clocks_json(one.clocks)},
                    {"status_changes", statuses_json(one.status_changes)},
+                   {"reports", reports_json(one.reports)},
+                   {"temperature_deg_c", temperature_json(one)},
+                   {"output", recorded.files[one.file].path},
                    {"optics", optics_json(one.optics)}});
     sensors.push_back(std::move(sensor));
   }
+  std::uint64_t frames = 0, bytes = 0;
+  for (const auto& file : recorded.files) {
+    frames += file.frames;
+    bytes += file.bytes;
+  }
   return {
-      {"output", recorded.output},
+      {"output", recorded.files.front().path},
       {"interface", to_string(recorded.interface)},
       {"duration_s", recorded.duration},
-      {"frames", recorded.frames},
-      {"bytes", recorded.bytes},
+      {"frames", frames},
+      {"bytes", bytes},
       {"receive_buffer_bytes",
        {{"asked", recorded.receive_buffer_asked}, {"granted", recorded.receive_buffer_granted}}},
       {"strangers", recorded.strangers},
@@ -190,6 +236,7 @@ Json of(const jobs::LiveRecording& live) {
                    {"rejected", one.rejected},
                    {"silent", one.silent},
                    {"status", one.status ? status_json(*one.status) : Json()},
+                   {"report", live_report_json(one.report)},
                    {"optics", optics_json(one.optics)}});
     sensors.push_back(std::move(sensor));
   }

@@ -307,6 +307,8 @@ void bind_header(py::module_& module) {
       .def_readonly("serial", &Device::serial, "Broadcast code; empty when it is not known.")
       .def_readonly("topic", &Device::topic, "Of its messages in a bag; empty in other formats.")
       .def_readonly("hub_serial", &Device::hub_serial, "That of the hub; empty without one.")
+      .def_readonly("address", &Device::address,
+                    "IPv4 address, of the second generation; empty when it is not known.")
       .def_readonly("type", &Device::type, "Number of the Livox type; 255 when it is not known.")
       .def_property_readonly(
           "type_name",

@@ -1,12 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Compiled once per instruction set under the rules of risley/core/simd.hpp. What is read must not
-// depend on the processor: nothing here multiplies and adds in one step, which not all can.
-#if defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
-#else
-#pragma GCC optimize("fp-contract=off")
-#endif
+// depend on the processor: -ffp-contract=off, with which it is compiled, multiplies and adds in two
+// steps, because not all can do it in one.
 #include "recordings/cartesian_kernel.hpp"
 
 #include <limits>

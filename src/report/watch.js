@@ -99,6 +99,13 @@ function sensorSection(sensor, seconds) {
     section.append(element("p", "It says: " + Object.entries(sensor.status).map(([name, value]) =>
       `${name} ${value}`).join(", "), bad ? "state care" : ""));
   }
+  if (sensor.report) {
+    const { work_state: state, time_sync: sync, temperature_deg_c: temperature, says } = sensor.report;
+    const words = [state, sync && `time from ${sync === "none" ? "its own clock" : sync}`,
+      temperature !== null && `${temperature.toFixed(1)} \u00b0C`, ...says];
+    section.append(element("p", "It says: " + words.filter(Boolean).join(", "),
+      says.length > 0 || state === "error" ? "state care" : ""));
+  }
   if (sensor.optics) section.append(...opticsParts(sensor.optics));
   return section;
 }

@@ -19,7 +19,8 @@ using Bytes = std::span<const std::uint8_t>;
 constexpr std::uint8_t kControlStart = 0xAA, kControlVersion = 0;
 constexpr std::size_t kControlLengthAt = 2, kControlSequenceAt = 4, kControlCommandAt = 8,
                       kControlTypeAt = 10, kSenderAt = 11, kHeaderCrcAt = 18, kDataCrcAt = 20;
-constexpr std::size_t kSerialBytes = 16, kReplyBytes = 24, kViewBytes = 20, kEntryHead = 4;
+constexpr std::size_t kSerialBytes = 16, kReplyBytes = 24, kViewBytes = 20, kTargetBytes = 8,
+                      kEntryHead = 4;
 
 /// CCITT: polynomial 0x1021, register 0xFFFF at the start.
 std::uint16_t control_crc16(Bytes bytes) {
@@ -180,11 +181,65 @@ std::vector<std::uint8_t> encode_search_reply(const SearchReply& reply) {
 }
 
 std::array<std::uint8_t, 8> encode_target(const HostTarget& target) {
-  std::array<std::uint8_t, 8> value{};
+  std::array<std::uint8_t, kTargetBytes> value{};
   std::copy_n(target.address.bytes.begin(), 4, value.begin());
   store<std::uint16_t>(&value[4], target.host_port);
   store<std::uint16_t>(&value[6], target.sensor_port);
   return value;
+}
+
+std::optional<HostTarget> target_of(Bytes value) {
+  if (value.size() != kTargetBytes) return std::nullopt;
+  HostTarget target;
+  std::copy_n(value.begin(), 4, target.address.bytes.begin());
+  target.host_port = load<std::uint16_t>(&value[4]);
+  target.sensor_port = load<std::uint16_t>(&value[6]);
+  return target;
+}
+
+ControlPorts control_ports(std::uint8_t device_type) {
+  constexpr std::uint8_t kHap = 10, kHapT1 = 15;
+  if (device_type == kHap || device_type == kHapT1) {
+    return {kSearchPort, 56000, 56000, 57000, 58000, 59000};
+  }
+  return {};
+}
+
+void update_report(SensorReport& report, std::span<const KeyValue> list) {
+  constexpr std::size_t kMostFaults = 8;
+  for (const auto& [key, value] : list) {
+    const std::size_t size = value.size();
+    if (key == kStateKey && size == 1) report.work_state = value[0];
+    if (key == kSyncKey && size == 1) report.sync = value[0];
+    if (key == kTemperatureKey && size == 4)
+      report.temperature_cdeg = load<std::int32_t>(value.data());
+    if (key == kDiagnosisKey && size == 2) report.diagnosis = load<std::uint16_t>(value.data());
+    if (key != kFaultsKey) continue;
+    report.faults.clear();
+    for (std::size_t at = 0; at + 4 <= size && report.faults.size() < kMostFaults; at += 4) {
+      const auto fault = load<std::uint32_t>(&value[at]);
+      if (fault != 0) report.faults.push_back(fault);
+    }
+  }
+}
+
+std::vector<std::string> trouble_words(const SensorReport& report) {
+  constexpr std::array kParts{"system", "scanner", "ranging", "communication"};
+  constexpr std::array kHow{"", "warning", "error", "stopped for safety"};
+  constexpr std::array kLevels{"", "info", "warning", "error", "fatal"};
+  std::vector<std::string> words;
+  for (std::size_t i = 0; i < kParts.size(); ++i) {
+    const unsigned value = report.diagnosis.value_or(0) >> (4 * i) & 0xFU;
+    if (value == 0) continue;
+    words.push_back(
+        fmt::format("{}: {}", kParts[i], value < kHow.size() ? kHow[value] : "unknown"));
+  }
+  for (const std::uint32_t fault : report.faults) {
+    const std::uint32_t level = fault & 0xFFFFU;
+    words.push_back(fmt::format("fault {:04X}: {}", fault >> 16U,
+                                level > 0 && level < kLevels.size() ? kLevels[level] : "unknown"));
+  }
+  return words;
 }
 
 std::optional<FieldOfView> view_of(Bytes value) {

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "risley/wire/sensor_session.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,238 +9,18 @@
 #include "risley/core/error.hpp"
 
 namespace risley::wire {
-namespace {
 
-constexpr std::uint8_t kOk = 0, kFailed = 1;
-/// Of a status: something is wrong.
-constexpr unsigned kSystemAt = 30;
-constexpr std::uint8_t kMostParameterValue = 1;
-
-ResultReply result_of(const Command& command, bool ok) {
-  return {command_id(command), ok ? kOk : kFailed};
-}
-
-}  // namespace
-
-SensorSession::SensorSession(SensorIdentity identity, std::int64_t now_ns)
-    : identity_(std::move(identity)), broadcast_due_ns_(now_ns) {
+SensorSession::SensorSession(SensorIdentity identity) : identity_(std::move(identity)) {
   constexpr std::size_t kMostCharacters = 15;
   if (identity_.code.empty() || identity_.code.size() > kMostCharacters) {
     throw InvalidArgument(fmt::format("broadcast code \"{}\" has {} characters, allowed 1 to {}",
                                       identity_.code, identity_.code.size(), kMostCharacters));
   }
-  if (identity_.abilities.high_sensitivity) {
-    parameters_[static_cast<std::uint16_t>(ParameterKey::high_sensitivity)] = 0;
-  }
-  if (identity_.abilities.scan_pattern) {
-    parameters_[static_cast<std::uint16_t>(ParameterKey::scan_pattern)] = 0;
-  }
-}
-
-void SensorSession::leave(std::int64_t now_ns) {
-  host_.reset();
-  sampling_ = false;
-  broadcast_due_ns_ = now_ns;
-}
-
-void SensorSession::advance(std::int64_t now_ns) {
-  if (host_ && now_ns - heartbeat_ns_ >= kHeartbeatTimeout) leave(now_ns);
-  if (!host_ && now_ns >= broadcast_due_ns_) {
-    datagrams_.push_back({{},
-                          encode(Message(Broadcast{identity_.code, identity_.device_type,
-                                                   identity_.abilities.reserved}),
-                                 0)});
-    broadcast_due_ns_ = now_ns + kBroadcastPeriod;
-  }
-  if (host_ && (status_ >> kSystemAt) != 0 && now_ns >= status_due_ns_) {
-    datagrams_.push_back(
-        {Endpoint{*host_, command_port_}, encode(Message(AbnormalStatus{status_}), sequence_++)});
-    status_due_ns_ = now_ns + kStatusPeriod;
-  }
-}
-
-std::int64_t SensorSession::next_ns() const {
-  if (!host_) return broadcast_due_ns_;
-  const std::int64_t timeout = heartbeat_ns_ + kHeartbeatTimeout;
-  return (status_ >> kSystemAt) != 0 ? std::min(timeout, status_due_ns_) : timeout;
-}
-
-void SensorSession::receive(const Endpoint& from, std::span<const std::uint8_t> datagram,
-                            std::int64_t now_ns) {
-  const auto decoded = decode_frame(datagram);
-  const Frame* frame = std::get_if<Frame>(&decoded);
-  // Clients send commands with the type of a reply, too.
-  if (frame == nullptr || frame->type == FrameType::message) {
-    ++rejected_;
-    return;
-  }
-  const auto meaning = decode_command(*frame);
-  const auto* command = std::get_if<Command>(&meaning);
-  const auto* hand = command != nullptr ? std::get_if<Handshake>(command) : nullptr;
-  const bool is_host = host_ == from.address;
-  if (hand != nullptr && (is_host || !host_)) {
-    shake_hands(from, *hand, frame->sequence, now_ns);
-    return;
-  }
-  if (!is_host) {
-    ++rejected_;
-    return;
-  }
-  const Endpoint to{from.address, command_port_};
-  if (command == nullptr) {
-    ++rejected_;
-    if (std::get<DataFault>(meaning) != DataFault::unknown_command) {
-      datagrams_.push_back(
-          {to, encode(Reply(ResultReply{frame->command, kFailed}), frame->sequence)});
-    }
-    return;
-  }
-  if (const auto reply = obey(*command, now_ns)) {
-    datagrams_.push_back({to, encode(*reply, frame->sequence)});
-  }
-  if (std::holds_alternative<Disconnect>(*command)) leave(now_ns);
-}
-
-void SensorSession::shake_hands(const Endpoint& from, const Handshake& hand, std::uint16_t sequence,
-                                std::int64_t now_ns) {
-  const bool allowed = hand.host == from.address && hand.data_port != 0 && hand.command_port != 0;
-  const Reply reply = result_of(hand, allowed);
-  if (!allowed) {
-    ++rejected_;
-    datagrams_.push_back({from, encode(reply, sequence)});
-    return;
-  }
-  host_ = from.address;
-  data_port_ = hand.data_port;
-  command_port_ = hand.command_port;
-  imu_port_ = hand.imu_port.value_or(hand.data_port);
-  if (imu_port_ == 0) imu_port_ = data_port_;
-  sampling_ = false;
-  heartbeat_ns_ = now_ns;
-  ++handshakes_;
-  datagrams_.push_back({Endpoint{from.address, command_port_}, encode(reply, sequence)});
-}
-
-std::uint8_t SensorSession::set_return_mode(std::uint8_t mode) {
-  const auto wanted = static_cast<ReturnMode>(mode);
-  if (!identity_.abilities.return_modes) return kFailed;
-  if (wanted == ReturnMode::triple && !identity_.abilities.triple) return kFailed;
-  return_mode_ = wanted;
-  return kOk;
-}
-
-ParametersReply SensorSession::write(const WriteParameters& wanted) {
-  for (const Parameter& parameter : wanted.parameters) {
-    if (!parameters_.contains(parameter.key) || parameter.value.size() != 1 ||
-        parameter.value[0] > kMostParameterValue) {
-      return {WriteParameters::kId, kFailed, parameter.key, kFailed};
-    }
-  }
-  for (const Parameter& parameter : wanted.parameters) {
-    parameters_[parameter.key] = parameter.value[0];
-  }
-  return {WriteParameters::kId, kOk, 0, 0};
-}
-
-ParameterValues SensorSession::read(const ReadParameters& wanted) const {
-  ParameterValues values;
-  for (const std::uint16_t key : wanted.keys) {
-    const auto found = parameters_.find(key);
-    if (found == parameters_.end()) return {kFailed, key, kFailed, {}};
-    values.parameters.push_back({key, {found->second}});
-  }
-  return values;
-}
-
-ParametersReply SensorSession::reset(const ResetParameters& wanted) {
-  if (wanted.listed) {
-    for (const std::uint16_t key : wanted.keys) {
-      if (!parameters_.contains(key)) return {ResetParameters::kId, kFailed, key, kFailed};
-    }
-  }
-  for (auto& [key, value] : parameters_) {
-    if (!wanted.listed || std::ranges::find(wanted.keys, key) != wanted.keys.end()) {
-      value = 0;
-    }
-  }
-  return {ResetParameters::kId, kOk, 0, 0};
-}
-
-/// Does what a command of the host asks. @return what it is answered with
-std::optional<Reply> SensorSession::obey(const Command& command, std::int64_t now_ns) {
-  return std::visit(
-      [&](const auto& wanted) -> std::optional<Reply> {
-        using Kind = std::remove_cvref_t<decltype(wanted)>;
-        if constexpr (std::is_same_v<Kind, QueryDeviceInfo>) {
-          return DeviceInfo{kOk, identity_.firmware};
-        } else if constexpr (std::is_same_v<Kind, Heartbeat>) {
-          heartbeat_ns_ = now_ns;
-          return HeartbeatReply{kOk, state_, static_cast<std::uint8_t>(rain_filter_ ? 1 : 0),
-                                status_};
-        } else if constexpr (std::is_same_v<Kind, SetSampling>) {
-          const bool ready = state_ == static_cast<std::uint8_t>(SensorState::normal);
-          if (wanted.value == 0 || ready) sampling_ = wanted.value == 1;
-          return result_of(command, wanted.value == 0 || ready);
-        } else if constexpr (std::is_same_v<Kind, SetCoordinates>) {
-          spherical_ = wanted.value == 1;
-          return result_of(command, true);
-        } else if constexpr (std::is_same_v<Kind, SetMode>) {
-          // The modes 1 to 3 are the states 1 to 3.
-          state_ = wanted.value;
-          if (state_ != static_cast<std::uint8_t>(SensorState::normal)) sampling_ = false;
-          return result_of(command, true);
-        } else if constexpr (std::is_same_v<Kind, SetReturnMode>) {
-          return ResultReply{Kind::kId, set_return_mode(wanted.value)};
-        } else if constexpr (std::is_same_v<Kind, QueryReturnMode>) {
-          return ValueReply{Kind::kId, identity_.abilities.return_modes ? kOk : kFailed,
-                            static_cast<std::uint8_t>(return_mode_)};
-        } else if constexpr (std::is_same_v<Kind, SetImuRate>) {
-          const bool ok = identity_.abilities.imu;
-          if (ok) imu_ = wanted.value == 1;
-          return result_of(command, ok);
-        } else if constexpr (std::is_same_v<Kind, QueryImuRate>) {
-          return ValueReply{Kind::kId, identity_.abilities.imu ? kOk : kFailed,
-                            static_cast<std::uint8_t>(imu_ ? 1 : 0)};
-        } else if constexpr (std::is_same_v<Kind, SetRainFilter>) {
-          rain_filter_ = wanted.value == 1;
-          return result_of(command, true);
-        } else if constexpr (std::is_same_v<Kind, SetFan>) {
-          fan_ = wanted.value == 1;
-          return result_of(command, true);
-        } else if constexpr (std::is_same_v<Kind, QueryFan>) {
-          return ValueReply{Kind::kId, kOk, static_cast<std::uint8_t>(fan_ ? 1 : 0)};
-        } else if constexpr (std::is_same_v<Kind, WriteExtrinsics>) {
-          extrinsics_ = wanted.extrinsics;
-          return result_of(command, true);
-        } else if constexpr (std::is_same_v<Kind, ReadExtrinsics>) {
-          return ExtrinsicsReply{kOk, extrinsics_};
-        } else if constexpr (std::is_same_v<Kind, WriteParameters>) {
-          return write(wanted);
-        } else if constexpr (std::is_same_v<Kind, ReadParameters>) {
-          return read(wanted);
-        } else if constexpr (std::is_same_v<Kind, ResetParameters>) {
-          return reset(wanted);
-        } else if constexpr (std::is_same_v<Kind, QueryAddress>) {
-          return AddressReply{kOk, true, identity_.address, {}, {}};
-        } else if constexpr (std::is_same_v<Kind, Reboot>) {
-          reboot_ = std::int64_t{wanted.delay_ms} * 1'000'000;
-          return result_of(command, true);
-        } else if constexpr (std::is_same_v<Kind, SetAddress> || std::is_same_v<Kind, SetUtc>) {
-          // It has the address that it was started on, and a clock of its own.
-          return result_of(command, false);
-        } else if constexpr (std::is_same_v<Kind, Disconnect>) {
-          return result_of(command, true);
-        } else {
-          static_assert(std::is_same_v<Kind, Handshake>);
-          return std::nullopt;  // shake_hands() has answered
-        }
-      },
-      command);
 }
 
 std::optional<std::int64_t> SensorSession::take_reboot() { return std::exchange(reboot_, {}); }
 
-std::vector<SensorSession::Outgoing> SensorSession::take_datagrams() {
+std::vector<SensorSession::Outgoing> SensorSession::take_datagrams(std::int64_t /*now_ns*/) {
   return std::exchange(datagrams_, {});
 }
 

@@ -63,6 +63,7 @@ LEFT_OUT = {
     "risley record -o hall.lvx": "there is no sensor; cli.record_test has one",
     "risley record --list": "which interface it is depends on the machine; cli.record_test has one",
     "risley emulate --interface 127.0.0.5": "it takes a minute, or has no end; record.md has one",
+    "risley emulate --interface 127.0.0.7 --sensor mid-360": "it has no end; mid-360.md has one",
     "risley reproduce -o": "a minute of two cores; cli.reproduce_test runs it",
     "risley reproduce --full": "it takes many minutes",
 }

@@ -235,6 +235,12 @@ class SchemasTest(CommandTest):
                   "--optics", "mid-40")
         emulator.terminate()
         cls.outputs.append(("emulate", json.loads(emulator.communicate()[0])))
+        # The second generation says more of itself.
+        emulator = subprocess.Popen([COMMAND, "emulate", "--interface", "127.0.0.95", "--sensor", "mid-360", "--json"],
+                                    stdout=subprocess.PIPE, text=True)
+        cls.print(0, "record", "-o", "live.lvx2", "--interface", "127.0.0.94", "--duration-s", 1)
+        emulator.terminate()
+        emulator.communicate()
 
     @classmethod
     def fly(cls, bent):

@@ -5,60 +5,19 @@
 import sqlite3
 import struct
 import unittest
-import zlib
 
 import captures
 from bags_test import mcap
 from captures import HOST, framed, pcap, udp
 from command import SOURCE, CommandTest
+from control_peer import control, packet
+from lvx2_file import devices, packages
 
 HALL = SOURCE / "data" / "hall.yaml"
 BEGIN = 1_790_000_000 * 10**9
 POINT = struct.Struct("<iiiBB")
 SENSOR, POINTS, IMU, COMMAND, SEARCH = "192.168.1.112", 56300, 56400, 56200, 56000
 SERIAL = "47MDGEN2000001"
-
-
-def devices(data):
-    """(serial number, address, device type) of an LVX 2, read from its description and not with risley."""
-    assert data[:16] == b"livox_tech".ljust(16, b"\0") and data[16:24] == bytes.fromhex("0200000067A70EAC")
-    assert struct.unpack_from("<I", data, 24)[0] == 50
-    places = (29 + 63 * i for i in range(data[28]))
-    return [(data[at:at + 16].rstrip(b"\0").decode(), ".".join(map(str, data[at + 32:at + 36])), data[at + 37])
-            for at in places]
-
-
-def packages(data):
-    """(frame, time in ns, number, data type, time type, points) of every package."""
-    at, index = 29 + 63 * data[28], 0
-    while at < len(data):
-        current, following, number = struct.unpack_from("<QQQ", data, at)
-        assert current == at and following <= len(data) and number == index
-        at += 24
-        while at < following:
-            assert data[at] == 0
-            time_type, time_ns, count, kind, length = struct.unpack_from("<BQHBI", data, at + 6)
-            yield index, time_ns, count, kind, time_type, data[at + 27:at + 27 + length]
-            at += 27 + length
-        index += 1
-
-
-def packet(time_ns, number, points, kind=1, interval=4750, time_type=0):
-    """As the sensor sends it."""
-    records = 1 if kind == 0 else len(points) // {1: 14, 2: 8, 3: 10}[kind]
-    body = struct.pack("<Q", time_ns) + points
-    return struct.pack("<BHHHHBBBB11xI", 0, 36 + len(points), interval if kind else 0, records, number, 0, kind,
-                       time_type, 0, zlib.crc32(body)) + body
-
-
-def control(command, data, reply=0, sequence=1):
-    head = struct.pack("<BBHIHBB6x", 0xAA, 0, 24 + len(data), sequence, command, reply, 1)
-    rest = 0xFFFF
-    for byte in head:
-        rest ^= byte << 8
-        for _ in range(8):
-            rest = (rest << 1 ^ 0x1021 if rest & 0x8000 else rest << 1) & 0xFFFF
-    return head + struct.pack("<HI", rest, zlib.crc32(data)) + data
 
 
 def search_reply(kind=9):

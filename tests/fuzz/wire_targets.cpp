@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: MIT
 // Datagrams of strangers, given to both sides of a session.
 #include <algorithm>
+#include <array>
 
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
-#include "risley/wire/client_session.hpp"
+#include "risley/wire/control_client.hpp"
 #include "risley/wire/control_frame.hpp"
-#include "risley/wire/sensor_session.hpp"
+#include "risley/wire/control_sensor.hpp"
+#include "risley/wire/handshake_client.hpp"
+#include "risley/wire/handshake_sensor.hpp"
 
 #include "fuzz/invariants.hpp"
 #include "fuzz/targets.hpp"
@@ -104,16 +107,16 @@ void run_control_frames(std::span<const std::uint8_t> bytes) {
 
 void run_sensor(std::span<const std::uint8_t> bytes) {
   std::int64_t now = 0;
-  SensorSession sensor(
-      {"0TFDG3B006H2Z11", 7, {}, kHostAddress, {true, true, true, true, true, kSensorPort}}, now);
+  HandshakeSensor sensor({"0TFDG3B006H2Z11", 7, {}, kHostAddress},
+                         {true, true, true, true, true, kSensorPort}, now);
   std::optional<Address> host;
   for_each_datagram(bytes, [&](std::span<const std::uint8_t> datagram, std::uint8_t how) {
     constexpr unsigned kFromStranger = 2, kLater = 4;
     const bool stranger = (how & kFromStranger) != 0;
     const bool was_sampling = sensor.sampling(), was_connected = sensor.connected();
     const Endpoint data = sensor.data_target();
-    sensor.receive({stranger ? kStrangerAddress : kHostAddress, 1000}, datagram, now);
-    const auto replies = sensor.take_datagrams();
+    sensor.receive({stranger ? kStrangerAddress : kHostAddress, 1000}, kSensorPort, datagram, now);
+    const auto replies = sensor.take_datagrams(now);
     require(replies.size() <= 1, "one reply to a command");
     for (const auto& reply : replies) {
       require(reply.to.has_value(), "replies are not broadcast");
@@ -127,13 +130,13 @@ void run_sensor(std::span<const std::uint8_t> bytes) {
     if ((how & kLater) == 0) return;
     now += kStep * (how >> 3U);
     sensor.advance(now);
-    require(sensor.take_datagrams().size() <= 2, "a sensor says little on its own");
+    require(sensor.take_datagrams(now).size() <= 2, "a sensor says little on its own");
   });
 }
 
 void run_client(std::span<const std::uint8_t> bytes) {
   std::int64_t now = 0;
-  ClientSession client({kHostAddress, 1, 2, true, ReturnMode::dual, true}, now);
+  HandshakeClient client({kHostAddress, 1, 2, true, ReturnMode::dual, true}, now);
   for_each_datagram(bytes, [&](std::span<const std::uint8_t> datagram, std::uint8_t how) {
     constexpr unsigned kAnswer = 2, kLater = 4;
     std::vector<std::uint8_t> answer(datagram.begin(), datagram.end());
@@ -155,13 +158,65 @@ void run_client(std::span<const std::uint8_t> bytes) {
   });
 }
 
+/// A datagram of the second generation: no fuzzer finds checksums, so that what stands there is the
+/// data of a command.
+std::vector<std::uint8_t> control_datagram(std::span<const std::uint8_t> bytes, std::uint8_t how,
+                                           std::uint16_t sequence, bool reply) {
+  constexpr std::array kCommands = {ControlCommand::get,    ControlCommand::set,
+                                    ControlCommand::push,   ControlCommand::search,
+                                    ControlCommand::reboot, ControlCommand::factory_reset};
+  const auto command = kCommands.at((how >> 1U & 7U) % kCommands.size());
+  return encode_control_frame({command, reply, reply, sequence, bytes});
+}
+
+void run_control_sensor(std::span<const std::uint8_t> bytes) {
+  std::int64_t now = 0;
+  std::size_t heard = 0, said = 0;
+  ControlSensor sensor({"47MDGEN2000001", 9, {13, 18, 2, 44}, kHostAddress}, now);
+  for_each_datagram(bytes, [&](std::span<const std::uint8_t> datagram, std::uint8_t how) {
+    constexpr unsigned kBare = 0x80;
+    const auto framed = control_datagram(datagram, how, 7, false);
+    sensor.receive({kHostAddress, 1000}, kSearchPort,
+                   (how & kBare) != 0 ? datagram : std::span<const std::uint8_t>(framed), now);
+    now += kStep * (how >> 4U & 7U);
+    sensor.advance(now);
+    said += sensor.take_datagrams(now).size();
+    require(said <= 3 * ++heard, "two replies to a search, one to others, and a push now and then");
+    if (sensor.connected()) {
+      const Address to = sensor.data_target().address;
+      require(to == kHostAddress || (to.bytes[0] >= 224 && to.bytes[0] <= 239),
+              "nobody is sent what somebody else asked for");
+    }
+    require(sensor.data_type() >= 1 && sensor.data_type() <= 3, "a data type of points");
+  });
+}
+
+void run_control_client(std::span<const std::uint8_t> bytes) {
+  std::int64_t now = 0;
+  ControlClient client({kHostAddress, 1, 2, true, ReturnMode::dual, true}, 9, now);
+  std::uint16_t sequence = 0;
+  for_each_datagram(bytes, [&](std::span<const std::uint8_t> datagram, std::uint8_t how) {
+    for (const auto& asked : client.take_datagrams()) {
+      const auto decoded = decode_control_frame(asked);
+      sequence = static_cast<std::uint16_t>(std::get<ControlFrame>(decoded).sequence);
+    }
+    client.receive(control_datagram(datagram, how, sequence, (how & 0x80U) == 0), now);
+    require(client.take_events().size() <= 6, "few events of a datagram");
+    now += kStep * (how >> 4U & 7U);
+    client.advance(now);
+    client.take_events();
+  });
+}
+
 }  // namespace
 
 std::vector<Target> wire_targets() {
   return {{"wire-frames", run_frames},
           {"control-frames", run_control_frames},
           {"wire-sensor", run_sensor},
-          {"wire-client", run_client}};
+          {"wire-client", run_client},
+          {"control-sensor", run_control_sensor},
+          {"control-client", run_control_client}};
 }
 
 }  // namespace risley::fuzz

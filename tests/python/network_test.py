@@ -68,6 +68,21 @@ def test_record_writes_what_was_sent(sensors, tmp_path):
     assert np.isfinite(recording.azimuth).all()
 
 
+def test_both_generations_are_recorded(sensors, tmp_path):
+    start, end = sensors
+    start("127.0.0.67", serial="PYTHON000000071", sensor="mid-360")
+    start("127.0.0.68", serial="PYTHON000000081")
+    recorded = risley.record(tmp_path / "both.lvx", interface=HOST, duration=1.0,
+                             serial=["PYTHON000000071", "PYTHON000000081"])
+    truths = [truth["sensors"][0] for truth in end()]
+    for truth, ending, address in zip(truths, (".lvx2", ".lvx"), ("127.0.0.67", "")):
+        one = of_serial(recorded["sensors"], truth["serial"])
+        assert one["output"] == str(tmp_path / f"both{ending}")
+        recording = risley.read(one["output"])
+        assert len(recording) == one["rows"] == truth["rows"]
+        assert [device.address for device in recording.header.devices] == [address]
+
+
 def test_a_recording_is_sent_again_with_a_clock_that_is_faster(sensors, tmp_path):
     risley.simulate(tmp_path / "made.lvx", duration=0.5, seed=8, scene=DATA / "room.yaml")
     start, end = sensors

@@ -227,6 +227,43 @@ TEST(NumberedOrder, ASensorThatBeginsAnewLosesNothing) {
   EXPECT_EQ(counts.packets, 200U);
 }
 
+TEST(NumberedOrder, AfterAPauseAnyTimeThatGoesBackIsANewBeginning) {
+  NumberedOrder order;
+  std::int64_t host_ns = 0;
+  const auto take = [&](std::size_t place, std::size_t number) {
+    order.add(packet({.number = static_cast<std::uint16_t>(number), .time_ns = time_of(place)}),
+              host_ns += 480'000);
+  };
+  order.flush();  // before there is one
+  for (const std::size_t place : {3U, 1U, 2U, 4U, 5U}) take(place, place);
+  order.flush();
+  for (const std::size_t place : {2U, 1U, 3U}) take(place, place + 500);
+  order.flush();
+  EXPECT_EQ(order.counts().packets, 8U);
+  EXPECT_EQ(order.counts().lost, 0U);
+  EXPECT_EQ(order.counts().clock_jumps, 1U);
+  ASSERT_EQ(order.gaps().size(), 1U);
+  EXPECT_EQ(order.gaps()[0].cause, GapCause::clock);
+  EXPECT_FALSE(order.gaps()[0].lost);
+}
+
+TEST(NumberedOrder, ClocksThatJumpLoseNothing) {
+  NumberedOrder order;
+  std::int64_t host_ns = 0;
+  for (std::size_t i = 0; i < 300; ++i) {
+    if (i == 50) continue;
+    const std::int64_t jumped = i < 100 ? 0 : i < 200 ? 250'000'000 : -300'000'000;
+    order.add(packet({.number = static_cast<std::uint16_t>(i),
+                      .time_ns = 10'000'000'000 + time_of(i) - time_of(0) + jumped}),
+              host_ns += 480'000);
+  }
+  order.flush();
+  EXPECT_EQ(order.counts().lost, 1U);
+  EXPECT_EQ(order.counts().clock_jumps, 2U);
+  EXPECT_EQ(order.clock().stretches().size(), 3U);
+  for (const PacketGap& gap : order.gaps()) EXPECT_EQ(gap.lost, 0U);
+}
+
 TEST(NumberedOrder, NumbersThatBeginAnewWithEveryFrame) {
   std::vector<Sent> sent;
   for (std::size_t i = 0; i < 400; ++i) {

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
-#include "risley/wire/client_session.hpp"
-#include "risley/wire/sensor_session.hpp"
+#include "risley/wire/handshake_client.hpp"
+#include "risley/wire/handshake_sensor.hpp"
 
 namespace risley::wire {
 namespace {
@@ -19,18 +19,21 @@ constexpr std::uint16_t kDataPort = 56001, kCommandPort = 55501;
 
 ClientSettings settings() { return {kHost, kDataPort, kCommandPort, true, {}, {}}; }
 SensorIdentity identity(std::uint8_t type = 1) {
+  return {"0TFDG3B006H2Z11", type, {3, 8, 0, 0}, kSensor};
+}
+SensorAbilities abilities(std::uint8_t type = 1) {
   constexpr std::uint8_t kMid40 = 1, kAvia = 7;
-  SensorAbilities abilities;
-  abilities.return_modes = type != kMid40;
-  if (type == kAvia) abilities = {true, true, true, true, true, kSensorPort};
-  return {"0TFDG3B006H2Z11", type, {3, 8, 0, 0}, kSensor, abilities};
+  SensorAbilities result;
+  result.return_modes = type != kMid40;
+  if (type == kAvia) result = {true, true, true, true, true, kSensorPort};
+  return result;
 }
 
 /// A host and a sensor, and time in steps of 10 ms.
 class Link {
  public:
   explicit Link(const ClientSettings& wanted = settings(), std::uint8_t type = 1)
-      : sensor(identity(type), 0), client(wanted, 0) {}
+      : sensor(identity(type), abilities(type), 0), client(wanted, 0) {}
 
   /// Lets time pass until something holds. @return whether it came to hold
   bool run(
@@ -39,9 +42,9 @@ class Link {
       client.advance(now);
       sensor.advance(now);
       for (const auto& bytes : client.take_datagrams()) {
-        if (to_sensor) sensor.receive({kHost, kCommandPort}, bytes, now);
+        if (to_sensor) sensor.receive({kHost, kCommandPort}, kSensorPort, bytes, now);
       }
-      for (const auto& datagram : sensor.take_datagrams()) {
+      for (const auto& datagram : sensor.take_datagrams(0)) {
         if (!datagram.to) {
           ++broadcasts;
         } else if (to_client) {
@@ -64,8 +67,8 @@ class Link {
   }
 
   std::int64_t now = 0;
-  SensorSession sensor;
-  ClientSession client;
+  HandshakeSensor sensor;
+  HandshakeClient client;
   bool to_sensor = true, to_client = true;
   int broadcasts = 0;
   std::vector<ClientEvent> events;
@@ -174,8 +177,8 @@ TEST(Session, NobodyElseCommandsTheSensor) {
   ASSERT_TRUE(link.run_until(ClientState::sampling, 3000));
   std::uint64_t refused = 0;
   const auto expect_silence = [&](const Command& command) {
-    link.sensor.receive({kStranger, kCommandPort}, encode(command, 0), link.now);
-    EXPECT_TRUE(link.sensor.take_datagrams().empty());
+    link.sensor.receive({kStranger, kCommandPort}, kSensorPort, encode(command, 0), link.now);
+    EXPECT_TRUE(link.sensor.take_datagrams(0).empty());
     EXPECT_EQ(link.sensor.rejected(), ++refused);
   };
   expect_silence(SetSampling{0});
@@ -187,10 +190,10 @@ TEST(Session, NobodyElseCommandsTheSensor) {
   EXPECT_TRUE(link.sensor.sampling());
   EXPECT_FALSE(link.sensor.take_reboot());
   // Nobody is sent data because somebody else asked for it.
-  SensorSession free(identity(), 0);
-  free.receive({kStranger, 999}, encode(Command(Handshake{kHost, 1, 2, 3}), 7), 0);
+  HandshakeSensor free(identity(), abilities(), 0);
+  free.receive({kStranger, 999}, kSensorPort, encode(Command(Handshake{kHost, 1, 2, 3}), 7), 0);
   EXPECT_FALSE(free.connected());
-  const auto answer = free.take_datagrams();
+  const auto answer = free.take_datagrams(0);
   ASSERT_EQ(answer.size(), 1U);
   EXPECT_EQ(answer[0].to, (Endpoint{kStranger, 999}));
   EXPECT_EQ(answer[0].bytes, encode(Reply(ResultReply{Handshake::kId, 1}), 7));
@@ -201,7 +204,7 @@ TEST(Session, DamagedFramesDoNothing) {
   ASSERT_TRUE(link.run_until(ClientState::sampling, 3000));
   auto stop = encode(Command(SetSampling{0}), 9);
   stop.back() ^= 1U;
-  link.sensor.receive({kHost, kCommandPort}, stop, link.now);
+  link.sensor.receive({kHost, kCommandPort}, kSensorPort, stop, link.now);
   EXPECT_TRUE(link.sensor.sampling());
   EXPECT_EQ(link.sensor.rejected(), 1U);
   // Replies to no request, of another sequence, or to another command.
@@ -216,15 +219,15 @@ TEST(Session, DamagedFramesDoNothing) {
 }
 
 TEST(Session, AClientThatStartsAgainGetsItsReply) {
-  SensorSession sensor(identity(), 0);
-  sensor.receive({kHost, 1}, encode(Command(Handshake{kHost, 1, 2, {}}), 1), 0);
-  sensor.receive({kHost, 1}, encode(Command(SetSampling{1}), 2), 0);
+  HandshakeSensor sensor(identity(), abilities(), 0);
+  sensor.receive({kHost, 1}, kSensorPort, encode(Command(Handshake{kHost, 1, 2, {}}), 1), 0);
+  sensor.receive({kHost, 1}, kSensorPort, encode(Command(SetSampling{1}), 2), 0);
   EXPECT_TRUE(sensor.sampling());
   EXPECT_EQ(sensor.imu_target(), (Endpoint{kHost, 1})) << "early clients name no such port";
-  sensor.take_datagrams();
-  sensor.receive({kHost, 5}, encode(Command(Handshake{kHost, 11, 12, 13}), 1), 0);
+  sensor.take_datagrams(0);
+  sensor.receive({kHost, 5}, kSensorPort, encode(Command(Handshake{kHost, 11, 12, 13}), 1), 0);
   EXPECT_FALSE(sensor.sampling());
-  const auto answer = sensor.take_datagrams();
+  const auto answer = sensor.take_datagrams(0);
   ASSERT_EQ(answer.size(), 1U);
   EXPECT_EQ(answer[0].to, (Endpoint{kHost, 12}));
   EXPECT_EQ(sensor.imu_target(), (Endpoint{kHost, 13}));
@@ -232,9 +235,10 @@ TEST(Session, AClientThatStartsAgainGetsItsReply) {
 }
 
 TEST(Session, CommandsWithTheTypeOfReplies) {
-  SensorSession sensor(identity(), 0);
+  HandshakeSensor sensor(identity(), abilities(), 0);
   const std::vector<std::uint8_t> data = {192, 168, 1, 5, 1, 0, 2, 0, 3, 0};
-  sensor.receive({kHost, 2}, encode_frame({FrameType::reply, 1, Handshake::kId, data}), 0);
+  sensor.receive({kHost, 2}, kSensorPort, encode_frame({FrameType::reply, 1, Handshake::kId, data}),
+                 0);
   EXPECT_TRUE(sensor.connected());
 }
 
@@ -243,8 +247,8 @@ TEST(Session, ASensorAnswersEveryCommand) {
   ASSERT_TRUE(link.run_until(ClientState::sampling, 3000));
   const auto expect_answer = [&](const Command& command, const Reply& expected) {
     SCOPED_TRACE(to_string(command_id(command)));
-    link.sensor.receive({kHost, kCommandPort}, encode(command, 321), link.now);
-    const auto datagrams = link.sensor.take_datagrams();
+    link.sensor.receive({kHost, kCommandPort}, kSensorPort, encode(command, 321), link.now);
+    const auto datagrams = link.sensor.take_datagrams(0);
     ASSERT_EQ(datagrams.size(), 1U);
     EXPECT_EQ(datagrams[0].bytes, encode(expected, 321));
   };
@@ -282,7 +286,7 @@ TEST(Session, AnAbnormalStatusIsToldTenTimesASecond) {
   for (int step = 0; step < 100; ++step) {
     link.now += 10 * kMs;
     link.sensor.advance(link.now);
-    for (const auto& datagram : link.sensor.take_datagrams()) {
+    for (const auto& datagram : link.sensor.take_datagrams(0)) {
       ++told;
       link.client.receive(datagram.bytes, link.now);
     }
@@ -295,8 +299,8 @@ TEST(Session, AnAbnormalStatusIsToldTenTimesASecond) {
 }
 
 TEST(Session, CodesOfSensors) {
-  EXPECT_THROW(SensorSession({"", 1, {}, kSensor, {}}, 0), InvalidArgument);
-  EXPECT_THROW(SensorSession({"sixteen letters.", 1, {}, kSensor, {}}, 0), InvalidArgument);
+  EXPECT_THROW(HandshakeSensor({"", 1, {}, kSensor}, {}, 0), InvalidArgument);
+  EXPECT_THROW(HandshakeSensor({"sixteen letters.", 1, {}, kSensor}, {}, 0), InvalidArgument);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "risley/jobs/optics_watch.hpp"
 #include "risley/recordings/livox/packet_order.hpp"
 #include "risley/wire/commands.hpp"
+#include "risley/wire/control_frame.hpp"
 
 namespace risley::jobs {
 
@@ -24,10 +25,12 @@ struct RecordOptions {
   bool passive = false;              ///< only listens, on data_port, and sends nothing
   std::uint16_t data_port = 56001;   ///< where another host receives the data, of a passive one
   std::optional<double> duration;    ///< s from the first data on; empty: until it is cancelled
-  std::optional<bool> spherical = true;         ///< empty: as the sensors are
+  /// Empty: as the sensors are. Those of the second generation send coordinates otherwise.
+  std::optional<bool> spherical = true;
   std::optional<wire::ReturnMode> return_mode;  ///< empty: as the sensors are
   bool imu = true;                              ///< inertial samples, where the sensor has them
-  /// Path; ends in .lvx, or in .nc for what is converted at the end.
+  /// Path; ends in .lvx or .lvx2, or in .nc for what is converted at the end. Sensors of the first
+  /// generation are written to the .lvx of this name, those of the second to the .lvx2.
   std::string output;
   bool watch_optics = false;     ///< see OpticsWatch
   GivenSensor optics_reference;  ///< as OpticsWatch's
@@ -38,6 +41,13 @@ struct FoundSensor {
   std::string serial;  ///< broadcast code; of a passive recording the address where none was heard
   std::uint8_t device_type = 0;  ///< as recordings::Device::type
   wire::Address address;
+  std::uint16_t command_port = wire::kSensorPort;  ///< at which it listens
+};
+
+/// What a sensor of the second generation says of itself from some time on.
+struct RecordedReport {
+  double begin = 0;  ///< s since the first data of the recording, by the host's clock
+  wire::SensorReport report;
 };
 
 /// A time without data of a sensor, by the host's clock; s since the first data of the recording.
@@ -77,15 +87,23 @@ struct RecordedSensor {
   std::vector<std::uint32_t> statuses;
   std::vector<RecordedClock> clocks;           ///< one after the other, the first 100
   std::vector<RecordedStatus> status_changes;  ///< as packets have them, the first 1000
-  std::optional<OpticsHealth> optics;          ///< where they were watched
+  std::vector<RecordedReport> reports;         ///< changes but for the temperature, the first 1000
+  /// Temperatures that it told, deg C; empty where it told none.
+  std::optional<double> coldest, warmest;
+  std::size_t file = 0;                ///< that it is in: RecordedSensors::files
+  std::optional<OpticsHealth> optics;  ///< where they were watched
 };
 
 /// What came of a recording.
 struct RecordedSensors {
-  std::string output;
+  /// A file that was written.
+  struct File {
+    std::string path;
+    std::uint64_t frames = 0, bytes = 0;
+  };
+  std::vector<File> files;  ///< of the first generation, of the second; those that there are
   wire::Address interface;
-  double duration = 0;                  ///< s from the first data to the end
-  std::uint64_t frames = 0, bytes = 0;  ///< of the file
+  double duration = 0;  ///< s from the first data to the end
   std::size_t receive_buffer_asked = 0, receive_buffer_granted = 0;  ///< bytes per sensor
   std::vector<RecordedSensor> sensors;
   std::uint64_t strangers = 0;  ///< datagrams at the broadcast port that name no sensor
@@ -98,7 +116,9 @@ struct LiveSensorState {
   std::uint64_t kernel_drops = 0, rejected = 0;
   bool silent = false;                  ///< nothing came for a second
   std::optional<std::uint32_t> status;  ///< the last one, as recordings::Packet::status
-  std::optional<OpticsHealth> optics;   ///< where they are watched
+  /// The last one, of the second generation.
+  std::optional<wire::SensorReport> report;
+  std::optional<OpticsHealth> optics;  ///< where they are watched
 };
 
 /// A recording while it runs.
@@ -114,16 +134,17 @@ using RecordWatch = std::function<void(const LiveRecording&)>;
 /// Told at once: words about a sensor, and whether something is wrong.
 using RecordNote = std::function<void(const std::string& words, bool is_wrong)>;
 
-/// Sensors that broadcast on the interface, by serial number. Sends nothing.
+/// Sensors that broadcast on the interface, or answer a search of the second generation, by serial
+/// number. Tells them nothing.
 /// @throws InvalidArgument, NetworkError, Cancelled
 std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progress& progress = {});
 
-/// Finds sensors, starts them, and writes what they send into one LVX 1.1 file while it comes, see
-/// recordings::livox::PacketFile, also where that is converted to NetCDF at the end: until the time
-/// is over or the progress is cancelled: that is the clean end of a recording, for which the
-/// sensors are stopped. A sensor that falls silent is told of, waited for, and goes on in the same
-/// file; one that is found later than the others is not taken: the table of sensors stands before
-/// the data.
+/// Finds sensors of both generations, starts them, and writes what they send into one LVX 1.1 and
+/// one LVX 2 file while it comes, see recordings::livox::PacketFile, also where that is converted
+/// to NetCDF at the end, which can be of one generation only: until the time is over or the
+/// progress is cancelled: that is the clean end of a recording, for which the sensors are stopped.
+/// A sensor that falls silent is told of, waited for, and goes on in the same file; one that is
+/// found later than the others is not taken: the table of sensors stands before the data.
 /// @throws InvalidArgument; NetworkError also where there is no sensor, or none sends anything;
 ///         FileError
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,

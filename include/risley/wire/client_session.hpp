@@ -1,18 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // The host's side of a session with one sensor, without sockets and clocks: time and datagrams in,
-// datagrams and events out.
+// datagrams and events out. Each generation of sensors has its own: HandshakeClient, ControlClient.
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "risley/wire/commands.hpp"
+#include "risley/wire/control_frame.hpp"
 
 namespace risley::wire {
 
@@ -27,22 +26,23 @@ struct ClientSettings {
 
 /// Where a session stands.
 enum class ClientState : std::uint8_t {
-  connecting,  ///< handshake, device info, until the sensor is ready
-  setting_up,  ///< coordinates, return mode, inertial samples, start
+  connecting,  ///< until the sensor has answered and is ready
+  setting_up,  ///< what it is to send and to whom, start
   sampling,
-  stopping,  ///< stop, disconnect
-  closed,    ///< as was asked
-  lost,      ///< the sensor does not answer, or refuses
+  stopping,
+  closed,  ///< as was asked
+  lost,    ///< the sensor does not answer, or refuses
 };
 
 /// Something that happened in a session.
 struct ClientEvent {
   /// What happened.
   enum class Kind : std::uint8_t {
-    connected,     ///< the handshake was answered
+    connected,     ///< the sensor has answered
     firmware,      ///< text is its number
-    sensor_state,  ///< value is a SensorState
-    status,        ///< value is a status, as recordings::Packet::status
+    sensor_state,  ///< value is a SensorState; first generation
+    status,        ///< value is a status, as recordings::Packet::status; first generation
+    report,        ///< report differs from the one before; second generation
     refused,       ///< text names the command; the session goes on
     sampling,      ///< data come from now on
     closed,        ///< as was asked
@@ -51,30 +51,36 @@ struct ClientEvent {
   Kind kind = Kind::connected;
   std::uint32_t value = 0;
   std::string text;
+  SensorReport report = {};
 };
 
-/// A session from the handshake to its end. All times are ns of any clock that never goes back.
+/// A session from the first request to its end: requests are repeated until they are answered, and
+/// a sensor that says nothing is lost. All times are ns of any clock that never goes back.
 class ClientSession {
  public:
-  /// Time between two heartbeats, ns.
+  /// Time between two signs of life that are asked for, ns.
   static constexpr std::int64_t kHeartbeatPeriod = 800'000'000;
-  /// Time after which a command is sent again, ns.
+  /// Time after which a request is sent again, ns.
   static constexpr std::int64_t kCommandTimeout = 500'000'000;
   /// Time without any reply after which a sensor is lost, ns.
   static constexpr std::int64_t kSilence = 2'500'000'000;
 
-  ClientSession(const ClientSettings& settings, std::int64_t now_ns);
+  virtual ~ClientSession() = default;
+  ClientSession(const ClientSession&) = delete;
+  ClientSession& operator=(const ClientSession&) = delete;
 
-  /// Lets time pass: commands and heartbeats that are due go out, and a silent sensor is lost. By
-  /// how much the call comes after next_ns() is no silence of the sensor.
+  /// Lets time pass: requests that are due go out, and a silent sensor is lost. By how much the
+  /// call comes after next_ns() is no silence of the sensor.
   void advance(std::int64_t now_ns);
-  /// A datagram that the sensor sent to the command port. What is no reply to a command of this
+  /// A datagram that the sensor sent to the command port. What is no reply to a request of this
   /// session is counted and does nothing else.
   void receive(std::span<const std::uint8_t> datagram, std::int64_t now_ns);
-  /// Ends the session: stops the data and disconnects. Goes on until closed or lost.
+  /// Ends the session: stops the data and leaves the sensor. Goes on until closed or lost.
   void stop(std::int64_t now_ns);
 
   ClientState state() const { return state_; }  ///< where it stands
+  /// closed or lost
+  bool over() const { return state_ == ClientState::closed || state_ == ClientState::lost; }
   /// When advance() has something to do next.
   std::int64_t next_ns() const;
   /// Datagrams for the sensor since the last call.
@@ -87,25 +93,56 @@ class ClientSession {
   /// Datagrams that were no frames, or none that a sensor sends now.
   std::uint64_t rejected() const { return rejected_; }
 
- private:
-  void ask(const Command& command, std::int64_t now_ns);
-  void send_pending(std::int64_t now_ns);
-  void go_on(std::int64_t now_ns);
-  void send_heartbeat(std::int64_t now_ns);
-  void take_reply(const Frame& frame, std::int64_t now_ns);
-  void note_heartbeat(const HeartbeatReply& reply);
-  void lose(std::string why);
+ protected:
+  ClientSession(const ClientSettings& settings, std::int64_t now_ns)
+      : settings_(settings), heard_ns_(now_ns) {}
+
+  /// Sends the next of the requests that have to be answered one after the other, if there is one.
+  virtual void ask_next(std::int64_t now_ns) = 0;
+  /// Puts the requests that end a session in place of those that are left.
+  virtual void ask_for_the_end() = 0;
+  /// Bytes of a request for a sign of life.
+  virtual std::vector<std::uint8_t> heartbeat(std::uint16_t sequence) = 0;
+  /// receive(), of a session that is not over.
+  virtual void take(std::span<const std::uint8_t> datagram, std::int64_t now_ns) = 0;
+
+  /// Of the next request.
+  std::uint16_t next_sequence() { return ++sequence_; }
+  /// Sends a request until its reply comes.
+  void send(std::vector<std::uint8_t> request, std::uint16_t sequence, std::int64_t now_ns);
+  void send_heartbeat(std::int64_t now_ns);  ///< asks for a sign of life
+  /// Takes a reply of this sequence. @return whether it answers the request that waits
+  bool answers(std::uint16_t sequence, std::int64_t now_ns);
+  bool answers_heartbeat(std::uint16_t sequence, std::int64_t now_ns);  ///< the same of that
+  void go_on(std::int64_t now_ns);  ///< asks what comes next, once the last request was answered
+  void lose(std::string why);       ///< and tells it
+  /// An event.
   void tell(ClientEvent::Kind kind, std::uint32_t value = 0, std::string text = {});
+  void tell(const SensorReport& report);  ///< that it differs
+  void reject() { ++rejected_; }          ///< a datagram
+  /// The sensor has answered.
+  void connect(std::int64_t now_ns);
+  bool connected() const { return connected_; }  ///< connect() was called
+  /// From now on.
+  void set_heartbeat_period(std::int64_t period_ns) { heartbeat_period_ns_ = period_ns; }
+  void set_state(ClientState state) { state_ = state; }         ///< that it is in now
+  void close();                                                 ///< and tells it
+  const ClientSettings& settings() const { return settings_; }  ///< as they were given
+
+ private:
+  /// A request that waits for its reply.
+  struct Pending {
+    std::uint16_t sequence = 0;
+    std::vector<std::uint8_t> bytes;
+    std::int64_t sent_ns = 0;
+  };
 
   ClientSettings settings_;
   ClientState state_ = ClientState::connecting;
-  std::deque<Command> to_ask_;
-  std::optional<Command> pending_;
-  std::uint16_t sequence_ = 0, pending_sequence_ = 0, heartbeat_sequence_ = 0;
-  std::int64_t pending_sent_ns_ = 0, heard_ns_ = 0, heartbeat_due_ns_ = 0;
-  bool connected_ = false, identified_ = false, heartbeat_open_ = false;
-  std::optional<std::uint8_t> sensor_state_;
-  std::optional<std::uint32_t> status_;
+  std::optional<Pending> pending_;
+  std::uint16_t sequence_ = 0, heartbeat_sequence_ = 0;
+  std::int64_t heard_ns_ = 0, heartbeat_due_ns_ = 0, heartbeat_period_ns_ = kHeartbeatPeriod;
+  bool connected_ = false, heartbeat_open_ = false;
   std::uint64_t rejected_ = 0;
   std::vector<std::vector<std::uint8_t>> datagrams_;
   std::vector<ClientEvent> events_;

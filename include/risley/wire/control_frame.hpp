@@ -32,6 +32,8 @@ enum class ControlCommand : std::uint16_t {
   gps_time = 0x0202,       ///< of the last PPS edge
   log_data = 0x0300,       ///< a piece of a log
   log_switch = 0x0301,     ///< logs on and off
+  log_time = 0x0302,       ///< of the host
+  raw_data = 0x0303,       ///< other data on and off
 };
 
 /// A control frame without what only carries it.
@@ -50,8 +52,9 @@ std::vector<std::uint8_t> encode_control_frame(const ControlFrame& frame);
 /// @return the frame, whose data are a part of the bytes, or why they are none
 std::variant<ControlFrame, FrameRefusal> decode_control_frame(std::span<const std::uint8_t> bytes);
 
-/// Keys of a sensor's settings and state.
+/// Keys of a sensor's settings and state. Those from kSerialKey on can only be read.
 inline constexpr std::uint16_t kDataTypeKey = 0x0000,  ///< of points, 1 byte
+    kAddressKey = 0x0004,                              ///< address, mask and gateway
     kPushTargetKey = 0x0005,                           ///< HostTarget of pushes
     kPointTargetKey = 0x0006,                          ///< HostTarget of points
     kImuTargetKey = 0x0007,                            ///< HostTarget of inertial samples
@@ -64,8 +67,27 @@ inline constexpr std::uint16_t kDataTypeKey = 0x0000,  ///< of points, 1 byte
     kFirmwareKey = 0x8002,                             ///< version, 4 bytes
     kStateKey = 0x8006,                                ///< work state, 1 byte
     kTemperatureKey = 0x8007,                          ///< of the core, 0.01 degrees Celsius
+    kClockKey = 0x8009,                                ///< time of the sensor, ns
     kSyncKey = 0x800C,                                 ///< 0 none, 1 PTP, 2 GPS
-    kFirmwareTypeKey = 0x8010;                         ///< 0 loader, 1 application
+    kDiagnosisKey = 0x800E,                            ///< SensorReport::diagnosis
+    kFirmwareTypeKey = 0x8010,                         ///< 0 loader, 1 application
+    kFaultsKey = 0x8011;                               ///< 8 of SensorReport::faults
+
+/// Work states, as kStateKey and kTargetStateKey have them.
+inline constexpr std::uint8_t kSamplingState = 1,  ///< it sends data
+    kIdleState = 2,                                ///< nothing runs
+    kStartingState = 6,                            ///< the motors start
+    kReadyState = 9;                               ///< the motors run, the laser is off
+
+/// Where a sensor listens, and from where it sends. Several may be the same.
+struct ControlPorts {
+  std::uint16_t search = 56000, command = 56100, push = 56200, points = 56300, imu = 56400,
+                log = 56500;
+};
+/// Of a type of sensors. @param device_type  as recordings::Device::type
+ControlPorts control_ports(std::uint8_t device_type);
+/// Port of hosts and sensors for searches.
+inline constexpr std::uint16_t kSearchPort = ControlPorts{}.search;
 
 /// One entry of a list.
 struct KeyValue {
@@ -105,6 +127,8 @@ struct HostTarget {
 };
 /// Value of a target's key.
 std::array<std::uint8_t, 8> encode_target(const HostTarget& target);
+/// The inverse. @return empty for another length
+std::optional<HostTarget> target_of(std::span<const std::uint8_t> value);
 
 /// A part of the directions in which a sensor measures, degrees: yaw 0 to 360, pitch -10 to 60.
 struct FieldOfView {
@@ -115,6 +139,24 @@ struct FieldOfView {
 std::optional<FieldOfView> view_of(std::span<const std::uint8_t> value);
 /// The inverse.
 std::array<std::uint8_t, 20> encode_view(const FieldOfView& view);
+
+/// What a sensor says of itself. Empty: it did not.
+struct SensorReport {
+  std::optional<std::uint8_t> work_state;        ///< see work_state_words()
+  std::optional<std::int32_t> temperature_cdeg;  ///< of the core, 0.01 degrees Celsius
+  std::optional<std::uint8_t> sync;              ///< 0 none, 1 PTP, 2 GPS
+  /// Four bits each, from the lowest on: system, scanner, ranging, communication; 0 good, 1
+  /// warning, 2 error, 3 stopped for safety.
+  std::optional<std::uint16_t> diagnosis;
+  std::vector<std::uint32_t> faults =
+      {};  ///< number << 16 | level: 1 info, 2 warning, 3 error, 4 fatal
+  friend bool operator==(const SensorReport&, const SensorReport&) = default;
+};
+/// Takes what a list says; the rest stays as it was.
+void update_report(SensorReport& report, std::span<const KeyValue> list);
+/// What is not well, each in words: "scanner: warning", "fault 0104: error". Empty for a sensor
+/// that is well.
+std::vector<std::string> trouble_words(const SensorReport& report);
 
 /// "13.18.2.44" of the value of kFirmwareKey; empty for another length.
 std::string version_text(std::span<const std::uint8_t> value);

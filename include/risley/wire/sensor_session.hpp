@@ -1,114 +1,91 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // The sensor's side of a session, without sockets and clocks: time and datagrams in, datagrams out.
+// Each generation of sensors has its own: HandshakeSensor, ControlSensor.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "risley/wire/commands.hpp"
+#include "risley/wire/address.hpp"
 
 namespace risley::wire {
 
-/// What only some types of sensors can do.
-struct SensorAbilities {
-  bool return_modes = false;      ///< the host may choose returns: first, strongest, dual
-  bool triple = false;            ///< three returns among them
-  bool imu = false;               ///< inertial samples
-  bool high_sensitivity = false;  ///< as a parameter
-  bool scan_pattern = false;      ///< as a parameter
-  std::uint16_t reserved = 0;     ///< Broadcast::reserved
-};
-
 /// Who a virtual sensor is.
 struct SensorIdentity {
-  std::string code;              ///< broadcast code, at most 15 characters
+  std::string code;              ///< serial number (broadcast code), at most 15 characters
   std::uint8_t device_type = 1;  ///< as recordings::Device::type
   std::array<std::uint8_t, 4> firmware{};
-  Address address;  ///< what QueryAddress is answered with
-  SensorAbilities abilities;
+  Address address;  ///< what it says that its address is
 };
 
-/// A sensor as hosts see it through commands: it broadcasts until a host shakes hands, then obeys
-/// that host alone until it disconnects or its heartbeats stay away. All times are ns of any clock
-/// that never goes back.
+/// A sensor as hosts see it through commands. All times are ns of any clock that never goes back.
 class SensorSession {
  public:
-  /// Time between two broadcasts, ns.
-  static constexpr std::int64_t kBroadcastPeriod = 1'000'000'000;
-  /// Time without a heartbeat after which the host is forgotten, ns.
-  static constexpr std::int64_t kHeartbeatTimeout = 5'000'000'000;
-  /// Shortest time between two messages of an abnormal status, ns.
-  static constexpr std::int64_t kStatusPeriod = 100'000'000;
+  virtual ~SensorSession() = default;
+  SensorSession(const SensorSession&) = delete;
+  SensorSession& operator=(const SensorSession&) = delete;
 
-  /// @throws InvalidArgument for a broadcast code that is empty or too long
-  SensorSession(SensorIdentity identity, std::int64_t now_ns);
-
-  /// A datagram for the network; without `to` it is broadcast to kBroadcastPort.
+  /// A datagram for the network.
   struct Outgoing {
-    std::optional<Endpoint> to;
+    std::uint16_t from = 0;      ///< port of the sensor
+    std::optional<Endpoint> to;  ///< empty: everybody, at broadcast_port()
     std::vector<std::uint8_t> bytes;
   };
 
-  /// Lets time pass: broadcasts, heartbeats that stay away, messages of an abnormal status.
-  void advance(std::int64_t now_ns);
-  /// A datagram that arrived at kSensorPort. Only commands with right checksums and lengths act,
-  /// only those of the host, and only a handshake where there is none: whose payload names the
-  /// address that it comes from, so that nobody is sent what somebody else asked for.
-  void receive(const Endpoint& from, std::span<const std::uint8_t> datagram, std::int64_t now_ns);
-  /// As the sensor knows itself from now on, see recordings::Packet::status.
-  void set_status(std::uint32_t status) { status_ = status; }
+  /// Ports at which the sensor listens.
+  virtual std::vector<std::uint16_t> ports() const = 0;
+  /// That of them at which it hears what is sent to everybody; 0: none.
+  virtual std::uint16_t public_port() const { return 0; }
+  /// Port of hosts to which it broadcasts.
+  virtual std::uint16_t broadcast_port() const = 0;
+  /// Lets time pass.
+  virtual void advance(std::int64_t now_ns) = 0;
+  /// A datagram that arrived at a port. What is not for this sensor in its state is counted and
+  /// does nothing else.
+  virtual void receive(const Endpoint& from, std::uint16_t port,
+                       std::span<const std::uint8_t> datagram, std::int64_t now_ns) = 0;
+  /// Data type of the packets that are to be sent.
+  virtual std::uint8_t data_type() const = 0;
+  virtual std::uint16_t data_port() const = 0;  ///< from which points are sent
+  virtual std::uint16_t imu_port() const = 0;   ///< from which inertial samples are sent
+  /// What the sensor's clock follows from now on, as SensorReport::sync, and by how much it is
+  /// ahead of that of the session, ns.
+  virtual void set_clock(std::uint8_t /*sync*/, std::int64_t /*ahead_ns*/) {}
+  /// When advance() or take_datagrams() has something to do next.
+  virtual std::int64_t next_ns() const = 0;
+  /// Datagrams that are due since the last call.
+  virtual std::vector<Outgoing> take_datagrams(std::int64_t now_ns);
 
-  bool connected() const { return host_.has_value(); }  ///< a host has shaken hands
-  bool sampling() const { return sampling_; }           ///< data are to be sent
-  /// Of data, as commands have set it.
-  bool spherical() const { return spherical_; }
-  ReturnMode return_mode() const { return return_mode_; }  ///< as commands have set it
-  bool imu() const { return imu_; }                        ///< inertial samples are to be sent
+  bool connected() const { return connected_; }  ///< a host has said where data go
+  bool sampling() const { return sampling_; }    ///< data are to be sent
+  bool imu() const { return imu_; }              ///< inertial samples are to be sent
   /// Where data go; of use while connected.
-  Endpoint data_target() const { return {host_.value_or(Address{}), data_port_}; }
+  const Endpoint& data_target() const { return data_target_; }
   /// Where inertial samples go; of use while connected.
-  Endpoint imu_target() const { return {host_.value_or(Address{}), imu_port_}; }
-  /// Takes a Reboot that was commanded: its delay, ns.
+  const Endpoint& imu_target() const { return imu_target_; }
+  /// Takes a reboot that was commanded: its delay, ns.
   std::optional<std::int64_t> take_reboot();
+  std::uint64_t rejected() const { return rejected_; }      ///< datagrams
+  std::uint64_t handshakes() const { return handshakes_; }  ///< times that a host connected
 
-  std::int64_t next_ns() const;  ///< when advance() has something to do next
-  /// Datagrams since the last call.
-  std::vector<Outgoing> take_datagrams();
-  /// Datagrams that were no frames, or not for this sensor in its state.
-  std::uint64_t rejected() const { return rejected_; }
-  /// Sessions that were begun.
-  std::uint64_t handshakes() const { return handshakes_; }
+ protected:
+  /// @throws InvalidArgument for a code that is empty or too long
+  explicit SensorSession(SensorIdentity identity);
+  const SensorIdentity& identity() const { return identity_; }  ///< as it was given
 
- private:
-  void leave(std::int64_t now_ns);
-  void shake_hands(const Endpoint& from, const Handshake& hand, std::uint16_t sequence,
-                   std::int64_t now_ns);
-  std::optional<Reply> obey(const Command& command, std::int64_t now_ns);
-  ParametersReply write(const WriteParameters& wanted);
-  ParameterValues read(const ReadParameters& wanted) const;
-  ParametersReply reset(const ResetParameters& wanted);
-  std::uint8_t set_return_mode(std::uint8_t mode);
-
-  SensorIdentity identity_;
-  std::optional<Address> host_;
-  std::uint16_t data_port_ = 0, imu_port_ = 0, command_port_ = 0;
-  bool sampling_ = false, spherical_ = false, imu_ = false, rain_filter_ = false, fan_ = true;
-  ReturnMode return_mode_ = ReturnMode::first;
-  std::uint8_t state_ = static_cast<std::uint8_t>(SensorState::normal);
-  Extrinsics extrinsics_;
-  std::map<std::uint16_t, std::uint8_t> parameters_;
-  std::uint32_t status_ = 0;
+  bool connected_ = false, sampling_ = false, imu_ = false;
+  Endpoint data_target_, imu_target_;
   std::optional<std::int64_t> reboot_;
-  std::uint16_t sequence_ = 0;
-  std::int64_t broadcast_due_ns_ = 0, heartbeat_ns_ = 0, status_due_ns_ = 0;
   std::uint64_t rejected_ = 0, handshakes_ = 0;
   std::vector<Outgoing> datagrams_;
+
+ private:
+  SensorIdentity identity_;
 };
 
 }  // namespace risley::wire

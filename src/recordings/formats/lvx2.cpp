@@ -27,6 +27,7 @@
 #include "risley/wire/address.hpp"
 
 #include "recordings/formats/format.hpp"
+#include "recordings/formats/lvx2_frames.hpp"
 #include "recordings/formats/lvx_reader.hpp"
 
 namespace risley::recordings {
@@ -38,19 +39,6 @@ namespace {
 using io::load;
 using io::store;
 
-using LidarId = std::array<std::uint8_t, 4>;
-
-constexpr std::size_t kLvx2DurationAt = kLvxPublicHeaderBytes, kLvx2CountAt = 28, kLvx2TableAt = 29,
-                      kLvx2DeviceBytes = 63, kLvx2FrameHeaderBytes = 24;
-// In an entry of the device table.
-constexpr std::size_t kLvx2SerialBytes = 16, kIdAt = 32, kLidarTypeAt = 36, kDeviceTypeAt = 37,
-                      kEnableAt = 38, kPoseAt = 39;
-// In front of the points of a package.
-constexpr std::size_t kLvx2PackageBytes = 27, kPackageIdAt = 1, kPackageLidarTypeAt = 5,
-                      kPackageTimeTypeAt = 6, kPackageTimeAt = 7, kPackageNumberAt = 15,
-                      kPackageDataTypeAt = 17, kPackageLengthAt = 18, kPackageFrameAt = 22;
-constexpr std::uint8_t kPackageLidarType = 8;  // what Viewer 2 writes
-constexpr std::uint32_t kLvx2FrameMs = 50;
 /// A package is what a datagram held.
 constexpr std::uint32_t kMostPointBytes = 65'535;
 constexpr auto kLatestPackage =
@@ -378,36 +366,6 @@ void require_time(std::int64_t time_ns, std::uint64_t row_number) {
                                     row_number, time_ns, kLatestPackage));
 }
 
-/// What stands in front of the first frame.
-std::vector<std::uint8_t> lvx2_head(const std::vector<Device>& devices,
-                                    const std::vector<LidarId>& ids) {
-  std::vector<std::uint8_t> head(kLvx2TableAt + devices.size() * kLvx2DeviceBytes);
-  std::copy(kLvxName.begin(), kLvxName.end(), head.begin());
-  head[kLvxName.size()] = 2;
-  store<std::uint32_t>(&head[20], kLvxMagicCode);
-  store<std::uint32_t>(&head[kLvx2DurationAt], kLvx2FrameMs);
-  head[kLvx2CountAt] = static_cast<std::uint8_t>(devices.size());
-  std::uint8_t* bytes = &head[kLvx2TableAt];
-  for (std::size_t row = 0; row < devices.size(); ++row, bytes += kLvx2DeviceBytes) {
-    const Device& device = devices[row];
-    if (device.serial.size() > kLvx2SerialBytes) {
-      throw InvalidArgument(fmt::format("serial '{}' has {} characters, allowed at most 16",
-                                        device.serial, device.serial.size()));
-    }
-    std::copy(device.serial.begin(), device.serial.end(), bytes);
-    std::copy(ids[row].begin(), ids[row].end(), bytes + kIdAt);
-    constexpr std::uint8_t kUsual = 247, kOfHap = 246;  // what files of these sensors have
-    bytes[kLidarTypeAt] = device.type == kHap || device.type == kHapT1 ? kOfHap : kUsual;
-    bytes[kDeviceTypeAt] = device.type;
-    bytes[kEnableAt] = device.extrinsic_enabled ? 1 : 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      store<float>(bytes + kPoseAt + 4 * axis, device.roll_pitch_yaw_deg[axis]);
-      store<float>(bytes + kPoseAt + 12 + 4 * axis, device.translation_m[axis]);
-    }
-  }
-  return head;
-}
-
 class Lvx2Writer final : public Writer {
  public:
   Lvx2Writer(const std::string& path, const RecordingHeader& header);
@@ -432,7 +390,6 @@ class Lvx2Writer final : public Writer {
     OpenPackage open;
     std::optional<std::int64_t> last_ns, last_imu_ns;  ///< of the packages that were formed
     std::uint16_t number = 0, imu_number = 0;          ///< of the next of them
-    std::optional<std::int64_t> frame_ns;              ///< of the first package of the frame
   };
 
   void write_packets(const Chunk& chunk);
@@ -444,7 +401,7 @@ class Lvx2Writer final : public Writer {
   void flush_all();
   void write_imu(const ImuSample& sample);
   void end_frame();
-  std::uint8_t* package(State& state, const NumberedHeader& header);
+  std::uint8_t* package(std::size_t device, const NumberedHeader& header);
   State& state_of(std::uint8_t device, std::uint64_t row_number);
   std::uint16_t records() const { return data_type_ == kNumberedTwoReturns ? 48 : 96; }
   std::int64_t length_ns(const State& state) const { return state.grid.offset_ns(records()); }
@@ -454,30 +411,25 @@ class Lvx2Writer final : public Writer {
   std::uint8_t data_type_ = kNumberedPoints;  ///< of packages that are formed
   io::BlockOutput output_;
   std::uint64_t rows_written_ = 0;
+  Lvx2FrameCut cut_;
   std::optional<std::uint64_t> frame_at_;  ///< position of the frame being written
   std::uint64_t frames_ = 0;
 };
 
 Lvx2Writer::Lvx2Writer(const std::string& path, const RecordingHeader& header)
-    : header_(header), output_(path) {
+    : header_(header), output_(path), cut_(header.devices.size()) {
   if (!header_.has_range) {
     throw InvalidArgument(fmt::format(
         "{}: LVX needs ranges, and this recording holds directions only; write a scan sequence "
         "(.sequence.csv) or .nc instead",
         path));
   }
-  constexpr std::size_t kMostDevices = 255;
-  if (header_.devices.empty() || header_.devices.size() > kMostDevices) {
-    throw InvalidArgument(
-        fmt::format("number of devices = {}, allowed 1 to 255 in LVX", header_.devices.size()));
-  }
   if (header_.returns_per_shot < 1 || header_.returns_per_shot > 2) {
     throw InvalidArgument(
         fmt::format("returns_per_shot = {}, allowed 1 and 2 in LVX 2", header_.returns_per_shot));
   }
   if (header_.returns_per_shot == 2) data_type_ = kNumberedTwoReturns;
-  std::set<LidarId> taken;
-  std::vector<LidarId> ids;
+  const Lvx2Head head = lvx2_head(header_.devices);
   for (std::size_t row = 0; row < header_.devices.size(); ++row) {
     const Device& device = header_.devices[row];
     const auto grid = numbered_grid(device.type);
@@ -489,17 +441,10 @@ Lvx2Writer::Lvx2Writer(const std::string& path, const RecordingHeader& header)
     }
     State state;
     state.grid = grid.value_or(kUsualGrid);
-    const auto address = wire::address_from(device.address);
-    // The factory's addresses of the Mid-360 begin so.
-    state.id =
-        address ? address->bytes : LidarId{192, 168, 1, static_cast<std::uint8_t>(100 + row)};
-    for (int i = 0; i < 256 && taken.contains(state.id); ++i) ++state.id[3];
-    taken.insert(state.id);
-    ids.push_back(state.id);
+    state.id = head.ids[row];
     states_.push_back(std::move(state));
   }
-  const auto head = lvx2_head(header_.devices, ids);
-  std::copy(head.begin(), head.end(), output_.append(head.size()));
+  std::copy(head.bytes.begin(), head.bytes.end(), output_.append(head.bytes.size()));
 }
 
 void Lvx2Writer::end_frame() {
@@ -507,34 +452,19 @@ void Lvx2Writer::end_frame() {
   frame_at_.reset();
 }
 
-/// Appends a package, in a new frame where 50 ms of its sensor are full. @return where its records
-/// go
-std::uint8_t* Lvx2Writer::package(State& state, const NumberedHeader& header) {
-  constexpr std::int64_t kFrame_ns = std::int64_t{kLvx2FrameMs} * 1'000'000;
-  const auto time_ns = static_cast<std::int64_t>(header.time_ns);
-  const bool fits = !state.frame_ns || (time_ns >= *state.frame_ns - kFrame_ns &&
-                                        time_ns < *state.frame_ns + kFrame_ns);
-  if (!frame_at_ || !fits) {
+/// Appends a package, in a new frame where that is due. @return where its records go
+std::uint8_t* Lvx2Writer::package(std::size_t device, const NumberedHeader& header) {
+  if (cut_.begins_frame(device, static_cast<std::int64_t>(header.time_ns))) {
     end_frame();
-    for (State& one : states_) one.frame_ns.reset();
     frame_at_ = output_.size();
     std::uint8_t* bytes = output_.append(kLvx2FrameHeaderBytes);
     store<std::uint64_t>(bytes, *frame_at_);
     store<std::uint64_t>(bytes + kLvxFrameNextAt, 0);
     store<std::uint64_t>(bytes + kLvxFrameIndexAt, frames_++);
   }
-  if (!state.frame_ns) state.frame_ns = time_ns;
   const std::size_t length = numbered_layout(header.data_type, header.records)->bytes();
   std::uint8_t* bytes = output_.append(kLvx2PackageBytes + length);
-  std::fill_n(bytes, kLvx2PackageBytes, std::uint8_t{0});
-  std::copy(state.id.begin(), state.id.end(), bytes + kPackageIdAt);
-  bytes[kPackageLidarTypeAt] = kPackageLidarType;
-  bytes[kPackageTimeTypeAt] = header.time_type;
-  store<std::uint64_t>(bytes + kPackageTimeAt, header.time_ns);
-  store<std::uint16_t>(bytes + kPackageNumberAt, header.number);
-  bytes[kPackageDataTypeAt] = header.data_type;
-  store<std::uint32_t>(bytes + kPackageLengthAt, static_cast<std::uint32_t>(length));
-  bytes[kPackageFrameAt] = header.frame;
+  put_lvx2_package(states_[device].id, header, length, bytes);
   return bytes + kLvx2PackageBytes;
 }
 
@@ -581,8 +511,9 @@ void Lvx2Writer::write_packets(const Chunk& chunk) {
       if (imu == chunk.imu.size()) refuse("its inertial sample is missing");
       header.data_type = kNumberedImu;
       header.records = 1;
-      State& state = state_of(chunk.imu[imu].device, rows_written_ + row);
-      encode_imu(chunk.imu[imu++], package(state, header));
+      state_of(chunk.imu[imu].device, rows_written_ + row);
+      encode_imu(chunk.imu[imu], package(chunk.imu[imu].device, header));
+      ++imu;
       continue;
     }
     const RecordLayout layout = *numbered_layout(header.data_type, 1);
@@ -597,7 +528,7 @@ void Lvx2Writer::write_packets(const Chunk& chunk) {
     }
     header.records = static_cast<std::uint16_t>(packet.rows / layout.returns);
     State& state = state_of(o.device[row], rows_written_ + row);
-    std::uint8_t* bytes = package(state, header);
+    std::uint8_t* bytes = package(o.device[row], header);
     for (std::size_t record = 0; record < header.records; ++record) {
       encode_numbered_record(header.data_type, o, row, rows_written_ + row, bytes);
       bytes += layout.bytes_per_record;
@@ -705,7 +636,7 @@ void Lvx2Writer::flush(std::size_t device) {
   }
   header.number = state.number++;
   state.last_ns = open.time_ns;
-  std::uint8_t* bytes = package(state, header);
+  std::uint8_t* bytes = package(device, header);
   const RecordLayout layout = *numbered_layout(data_type_, 1);
   for (std::size_t record = 0; record < open.records; ++record) {
     encode_numbered_record(data_type_, open.rows, record * layout.returns, open.row_numbers[record],
@@ -739,7 +670,7 @@ void Lvx2Writer::write_imu(const ImuSample& sample) {
   header.time_type = time_type_of(header_.time_reference);
   header.time_ns = static_cast<std::uint64_t>(sample.time_ns);
   header.number = state.imu_number++;
-  encode_imu(sample, package(state, header));
+  encode_imu(sample, package(sample.device, header));
 }
 
 void Lvx2Writer::close() {

@@ -177,25 +177,8 @@ class PcapReader final : public Reader {
   struct Live {
     std::uint8_t type;
     bool numbered;
-    PacketOrder order;
+    std::unique_ptr<PacketSequence> order;
     PacketDecoder decoder;
-    NumberedOrder numbered_order;
-
-    const PacketCounts& counts() const {
-      return numbered ? numbered_order.counts() : order.counts();
-    }
-    bool add(Bytes bytes, std::int64_t time_ns) {
-      return numbered ? numbered_order.add(bytes, time_ns) : order.add(bytes, time_ns);
-    }
-    void flush() { numbered ? numbered_order.flush() : order.flush(); }
-    std::vector<std::vector<std::uint8_t>> take(std::int64_t now_ns) {
-      if (!numbered) {
-        order.advance(now_ns);
-        return order.take();
-      }
-      numbered_order.advance(now_ns);
-      return numbered_order.take();
-    }
   };
   struct Ready {
     std::size_t device = 0;
@@ -236,14 +219,12 @@ PcapReader::PcapReader(const io::InputFile& file, const Progress& progress) : fi
   look_through(progress);
   for (std::size_t row = 0; row < header_.devices.size(); ++row) {
     const std::uint8_t type = header_.devices[row].type;
-    live_.push_back(
-        {type,
-         endpoints_[row].port == 0,
-         PacketOrder(type),
-         PacketDecoder(
-             {.device_type = type, .device = static_cast<std::uint8_t>(row), .grid = grids_[row]}),
-         {}});
-    if (grids_[row]) live_.back().order.set_grid(*grids_[row]);
+    const bool numbered = endpoints_[row].port == 0;
+    live_.push_back({type, numbered, packet_sequence(type, numbered),
+                     PacketDecoder({.device_type = type,
+                                    .device = static_cast<std::uint8_t>(row),
+                                    .grid = grids_[row]})});
+    if (grids_[row]) live_.back().order->set_grid(*grids_[row]);
   }
   seen_.clear();
   seen_rows_.clear();
@@ -469,13 +450,13 @@ void PcapReader::take(const CapturedDatagram& datagram) {
     if (found == devices_.end()) {
       ++strangers_;
     } else {
-      live_[found->second].add(datagram.bytes, now_ns_);
+      live_[found->second].order->add(datagram.bytes, now_ns_);
       ++pending_;
     }
   } else if (broadcast_of(datagram)) {
     // A sensor that broadcasts has no host: what it sends later is another session.
     for (std::size_t row = 0; row < live_.size(); ++row) {
-      if (endpoints_[row].address == datagram.from.address) live_[row].order.flush();
+      if (endpoints_[row].address == datagram.from.address) live_[row].order->flush();
     }
   }
 }
@@ -483,7 +464,8 @@ void PcapReader::take(const CapturedDatagram& datagram) {
 void PcapReader::give_frame() {
   bool any = false;
   for (std::size_t row = 0; row < live_.size(); ++row) {
-    for (auto& packet : live_[row].take(now_ns_)) {
+    live_[row].order->advance(now_ns_);
+    for (auto& packet : live_[row].order->take()) {
       ready_.push_back({row, frames_, std::move(packet)});
       any = true;
     }
@@ -495,14 +477,14 @@ void PcapReader::give_frame() {
 
 void PcapReader::end() {
   ended_ = true;
-  for (Live& live : live_) live.flush();
+  for (Live& live : live_) live.order->flush();
   give_frame();
   say_what_is_missing();
 }
 
 void PcapReader::say_what_is_missing() {
   for (std::size_t row = 0; row < live_.size(); ++row) {
-    const PacketCounts& counts = live_[row].counts();
+    const PacketCounts& counts = live_[row].order->counts();
     if (counts.lost > 0) {
       warn(kWarning.shots_lost, "{}: {} packets are missing between others", name_of(row),
            counts.lost);
@@ -512,11 +494,10 @@ void PcapReader::say_what_is_missing() {
            "{}: {} packets were captured twice; the second ones were left out", name_of(row),
            counts.duplicates);
     }
-    const std::uint64_t wrong = live_[row].numbered_order.wrong_checksums();
-    if (wrong > 0) {
+    if (counts.wrong_checksums > 0) {
       warn(kWarning.implausible_values,
            "{}: {} packets have another checksum than their bytes; they were kept", name_of(row),
-           wrong);
+           counts.wrong_checksums);
     }
     if (counts.rejected > 0) {
       warn(kWarning.content_left_out, "{}: {} packets that no sensor sends were left out",

@@ -292,15 +292,16 @@ PacketNumbers::Place PacketNumbers::advance(const Packet& packet, std::int64_t s
   return {kind, index_, lost};
 }
 
-PacketNumbers::Place PacketNumbers::add(const Packet& packet) {
+PacketNumbers::Place PacketNumbers::add(const Packet& packet, bool paused) {
   constexpr std::int64_t kRound = 65536, kFarBack = 1'000'000'000;  // numbers; ns
   if (!last_) return advance(packet, 1, Kind::next, 0);
   const std::int64_t passed =
       saturating_difference(numbered_time_ns(packet), numbered_time_ns(*last_));
   const bool same_clock = packet.timestamp_type == last_->timestamp_type;
-  if (same_clock && passed < -kFarBack) {
+  if (same_clock && passed < (paused ? 0 : -kFarBack)) {
     came_.reset();
-    return advance(packet, 1, Kind::restarted, 0);
+    // Room for those that this one has overtaken.
+    return advance(packet, kRemembered, Kind::restarted, 0);
   }
   // Numbers that begin anew with every frame.
   if (packet.reserved != last_->reserved && packet.number < last_->number) {

@@ -130,9 +130,10 @@ void set_shots(const RecordLayout& layout, std::int64_t time_ns, const ShotGrid&
         o.time_ns[row] = shot_time;
         shot_time += step;
       }
-      std::fill_n(at(o.beam), layout.rows(), std::uint8_t{0});
-      for (std::size_t row = 0; grid.beams > 1 && row < layout.rows(); ++row) {
-        o.beam[first_row + row] = static_cast<std::uint8_t>(row % grid.beams);
+      std::uint8_t* const beams = o.beam.data() + first_row;
+      std::fill_n(beams, layout.rows(), std::uint8_t{0});
+      for (std::uint8_t beam = 1; beam < grid.beams; ++beam) {  // without a division for each row
+        for (std::size_t row = beam; row < layout.rows(); row += grid.beams) beams[row] = beam;
       }
       std::fill_n(at(o.return_number), layout.rows(), std::uint8_t{1});
       return;

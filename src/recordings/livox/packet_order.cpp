@@ -16,7 +16,6 @@ namespace risley::recordings::livox {
 namespace {
 
 constexpr std::int64_t kImuPeriod = 5'000'000;         // ns
-constexpr std::int64_t kNotableGap = 100'000'000;      // ns
 constexpr std::int64_t kSurelyNoJump = 1'000'000'000;  // ns
 /// A clock that runs faster than that has jumped: emulated time may be faster than real time.
 constexpr std::int64_t kFastestClock = 200;
@@ -196,7 +195,7 @@ void PacketOrder::give_out(Track& track) {
       gap.lost = missing;
       notable = missing > 0 && passed > kNotableGap;
     }
-    if (notable && gaps_.size() < kMostGaps) gaps_.push_back(gap);
+    if (notable) note_gap(gap);
   }
   if (track.jumped) track.arrivals = {};
   track.arrivals.add(time, packet.host_ns);
@@ -236,6 +235,6 @@ void PacketOrder::flush() {
   }
 }
 
-std::vector<std::vector<std::uint8_t>> PacketOrder::take() { return std::exchange(ready_, {}); }
+std::vector<std::vector<std::uint8_t>> PacketSequence::take() { return std::exchange(ready_, {}); }
 
 }  // namespace risley::recordings::livox

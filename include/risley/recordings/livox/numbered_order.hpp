@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -15,46 +16,43 @@
 
 namespace risley::recordings::livox {
 
-/// Puts the packets of one sensor of the second generation into their order by their numbers, and
-/// counts what is missing exactly. Packets that overtake each other are put right as long as not
-/// more than PacketOrder::kWindow came in between.
-class NumberedOrder {
+/// Packets of the second generation: their numbers say exactly what is missing, whatever the clock
+/// does.
+class NumberedOrder final : public PacketSequence {
  public:
-  /// Takes a datagram that the sensor sent. @param host_ns  when it came
-  /// @return whether it is a packet
-  bool add(std::span<const std::uint8_t> packet, std::int64_t host_ns);
-  /// Lets time pass for packets that wait.
-  void advance(std::int64_t host_ns);
-  /// Nothing more will come: no packet waits.
-  void flush();
-  /// Packets in their order since the last call.
-  std::vector<std::vector<std::uint8_t>> take();
-
-  const PacketCounts& counts() const { return counts_; }  ///< of what take() has given
-  /// Packets whose checksum is neither 0 nor that of their bytes; they are kept.
-  std::uint64_t wrong_checksums() const { return wrong_checksums_; }
+  bool add(std::span<const std::uint8_t> packet, std::int64_t host_ns) override;
+  void advance(std::int64_t host_ns) override;
+  void flush() override;
 
  private:
   struct Held {
     std::vector<std::uint8_t> bytes;
-    std::int64_t host_ns = 0;
+    std::int64_t host_ns = 0, time_ns = 0;
     std::uint32_t rows = 0;
+    std::uint8_t time_type = 0;
   };
   /// Points, or inertial samples.
   struct Track {
     PacketNumbers numbers;
     std::map<std::int64_t, Held> held;       // by index
     std::optional<std::int64_t> last_index;  // of those given out
-    bool restarted = false;                  // before the next packet that is given out
+    std::int64_t last_ns = 0, last_host_ns = 0;
+    std::int64_t period_ns = 0;  // shortest time between neighbours so far; 0 when unknown
+    std::uint8_t last_time_type = 0;
+    bool flushed = false;    // before the next packet
+    bool paused = false;     // before the next packet that is given out
+    bool restarted = false;  // before the next packet that is given out
   };
 
   void give_out(Track& track);
+  void compare(Track& track, const Held& packet, std::int64_t index);
 
   std::array<Track, 2> tracks_;
-  PacketCounts counts_;
-  std::uint64_t wrong_checksums_ = 0;
-  std::vector<std::vector<std::uint8_t>> ready_;
   Chunk chunk_;
 };
+
+/// For packets of a sensor. @param device_type  as recordings::Device::type
+/// @param numbered  it is one of the second generation
+std::unique_ptr<PacketSequence> packet_sequence(std::uint8_t device_type, bool numbered);
 
 }  // namespace risley::recordings::livox

@@ -126,8 +126,9 @@ class PacketNumbers {
     std::uint64_t lost = 0;  ///< packets between the newest one and this
   };
 
-  /// The next packet that came.
-  Place add(const Packet& packet);
+  /// The next packet that came. @param paused  the sensor was away: if its time goes back, even by
+  /// little, it began anew
+  Place add(const Packet& packet, bool paused = false);
 
  private:
   /// Goes on by so many packets, of which only the last one came.

@@ -22,7 +22,7 @@ struct PacketCounts {
   std::uint64_t packets = 0;      ///< in order, each once, inertial samples among them
   std::uint64_t rows = 0;         ///< observations of those packets
   std::uint64_t imu_samples = 0;  ///< inertial samples of those packets
-  /// Packets that are missing between others, by the times of those.
+  /// Packets that are missing between others, by the times or numbers of those.
   std::uint64_t lost = 0;
   std::uint64_t duplicates = 0;  ///< that were left out
   std::uint64_t reordered = 0;   ///< that were put right
@@ -30,6 +30,8 @@ struct PacketCounts {
   std::uint64_t rejected = 0;    ///< that no sensor sends
   /// Places where the clock of the sensor jumped or began again, so that nothing can be counted.
   std::uint64_t clock_jumps = 0;
+  /// Packets whose checksum is not that of their bytes; they are kept. Second generation only.
+  std::uint64_t wrong_checksums = 0;
 };
 
 /// Why the times of two packets that follow each other do not.
@@ -51,12 +53,10 @@ struct PacketGap {
   GapCause cause = GapCause::loss;
 };
 
-/// Puts the packets of one sensor into their order and counts what is missing. Packets have no
-/// numbers, so everything follows from their times and the period of their data type. Packets that
-/// overtake each other are put right as long as not more than kWindow came in between. A clock that
-/// jumps ahead is told from loss by when packets come: they can be late, never early. One that
-/// jumps back by less than kWindow packets, or ahead by less than 10 ms, is not seen.
-class PacketOrder {
+/// Puts the packets of one sensor into their order and counts what is missing. Packets that
+/// overtake each other are put right as long as not more than kWindow came in between. Each
+/// generation of sensors has its own: PacketOrder, NumberedOrder.
+class PacketSequence {
  public:
   /// Packets that wait for others.
   static constexpr std::size_t kWindow = 64;
@@ -64,22 +64,20 @@ class PacketOrder {
   static constexpr std::int64_t kLongestWait = 1'000'000'000;
   /// Gaps that are kept; those behind are only counted.
   static constexpr std::size_t kMostGaps = 1000;
+  /// Shorter gaps are only counted, ns.
+  static constexpr std::int64_t kNotableGap = 100'000'000;
 
-  /// @param device_type  as recordings::Device::type
-  explicit PacketOrder(std::uint8_t device_type);
+  virtual ~PacketSequence() = default;
 
   /// How special firmware measures, where the device type does not tell.
-  void set_grid(const ShotGrid& grid) { grid_ = grid; }
-
+  virtual void set_grid(const ShotGrid& /*grid*/) {}
   /// Takes a datagram that the sensor sent to the data port.
   /// @param host_ns  when it came  @return whether it is a packet
-  bool add(std::span<const std::uint8_t> packet, std::int64_t host_ns);
+  virtual bool add(std::span<const std::uint8_t> packet, std::int64_t host_ns) = 0;
   /// Lets time pass for packets that wait.
-  void advance(std::int64_t host_ns);
-  /// Nothing more will come, or the sensor comes back: no packet waits. Times that go back behind
-  /// this are those of a clock that began again, and what is missing behind it is a pause between
-  /// two sessions.
-  void flush();
+  virtual void advance(std::int64_t host_ns) = 0;
+  /// Nothing more will come, or the sensor comes back: no packet waits.
+  virtual void flush() = 0;
   /// Packets in their order since the last call.
   std::vector<std::vector<std::uint8_t>> take();
 
@@ -89,6 +87,37 @@ class PacketOrder {
   const std::vector<PacketGap>& gaps() const { return gaps_; }  ///< the first kMostGaps
   /// When the first packet came, by the host's clock; empty before there is one.
   std::optional<std::int64_t> first_host_ns() const { return first_host_ns_; }
+
+ protected:
+  /// Keeps a gap, unless there are too many.
+  void note_gap(const PacketGap& gap) {
+    if (gaps_.size() < kMostGaps) gaps_.push_back(gap);
+  }
+
+  PacketCounts counts_;
+  std::optional<std::int64_t> first_host_ns_;
+  std::vector<std::vector<std::uint8_t>> ready_;
+  ClockWatch clock_;
+
+ private:
+  std::vector<PacketGap> gaps_;
+};
+
+/// Packets of the first generation. They have no numbers, so everything follows from their times
+/// and the period of their data type. A clock that jumps ahead is told from loss by when packets
+/// come: they can be late, never early. One that jumps back by less than kWindow packets, or ahead
+/// by less than 10 ms, is not seen.
+class PacketOrder final : public PacketSequence {
+ public:
+  /// @param device_type  as recordings::Device::type
+  explicit PacketOrder(std::uint8_t device_type);
+
+  void set_grid(const ShotGrid& grid) override { grid_ = grid; }
+  bool add(std::span<const std::uint8_t> packet, std::int64_t host_ns) override;
+  void advance(std::int64_t host_ns) override;
+  /// Times that go back behind this are those of a clock that began again, and what is missing
+  /// behind it is a pause between two sessions.
+  void flush() override;
 
  private:
   struct Held {
@@ -138,11 +167,6 @@ class PacketOrder {
   PacketDecoder decoder_;
   Chunk chunk_;
   std::array<Track, 2> tracks_;
-  PacketCounts counts_;
-  std::optional<std::int64_t> first_host_ns_;
-  std::vector<PacketGap> gaps_;
-  std::vector<std::vector<std::uint8_t>> ready_;
-  ClockWatch clock_;
 };
 
 }  // namespace risley::recordings::livox

@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: 2026 The risley authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "risley/wire/client_session.hpp"
+
+namespace risley::wire {
+
+/// A session with a sensor of the second generation. It has no handshake: the sensor is told where
+/// to send, what, and to sample, and asked for its state again and again, whose answers are the
+/// signs of life. One that no longer samples, because it was started again, is set up anew. Points
+/// come as coordinates in mm, which is what LVX 2 holds; what was set otherwise is set back at the
+/// end.
+class ControlClient final : public ClientSession {
+ public:
+  /// @param device_type  as recordings::Device::type
+  ControlClient(const ClientSettings& settings, std::uint8_t device_type, std::int64_t now_ns);
+
+ private:
+  /// What a request is for.
+  enum class Purpose : std::uint8_t { identify, targets, setting, start, restore, stop };
+  struct Asked {
+    Purpose purpose = Purpose::identify;
+    ControlCommand command = ControlCommand::get;
+    std::vector<std::uint8_t> data;
+    const char* name = "";  ///< for who is told that it is refused
+  };
+
+  void ask_next(std::int64_t now_ns) override;
+  void ask_for_the_end() override;
+  std::vector<std::uint8_t> heartbeat(std::uint16_t sequence) override;
+  void take(std::span<const std::uint8_t> datagram, std::int64_t now_ns) override;
+  bool take_reply(const ControlFrame& frame, std::int64_t now_ns);
+  void ask_to_identify();
+  void set_up();
+  void take_identity(std::span<const KeyValue> list);
+  void note(std::span<const KeyValue> list);
+  Asked set_byte(Purpose purpose, std::uint16_t key, std::uint8_t value, const char* name) const;
+
+  std::uint8_t device_type_;
+  bool all_keys_ = true;  ///< the sensor has answered for all that a report can hold
+  std::deque<Asked> to_ask_;
+  Asked asked_;
+  bool identified_ = false, is_application_ = false, told_firmware_ = false;
+  std::optional<std::uint8_t> data_type_, imu_;                ///< as the sensor was
+  std::optional<std::uint8_t> data_type_before_, imu_before_;  ///< that were changed
+  SensorReport report_;
+};
+
+}  // namespace risley::wire
