@@ -144,7 +144,7 @@ inline constexpr std::uint8_t kMid40 = 1,  ///< Mid-40
     kAvia = 7,                             ///< Avia
     kMid360 = 9,                           ///< Mid-360
     kHap = 10,                             ///< HAP (TX)
-    kHapT1 = 15,                           ///< HAP (T1)
+    kHapT1 = 15,                           ///< HAP-T1
     kPa = 16,                              ///< PA
     kMid360s = 35,                         ///< Mid-360s
     kAvia2 = 40;                           ///< Avia2
@@ -160,7 +160,7 @@ inline constexpr std::array kLivoxTypes{
     LivoxType{kMid40, "Mid-40", false},     LivoxType{kTele15, "Tele-15", true},
     LivoxType{kHorizon, "Horizon", true},   LivoxType{kMid70, "Mid-70", false},
     LivoxType{kAvia, "Avia", true},         LivoxType{kMid360, "Mid-360", true, false},
-    LivoxType{kHap, "HAP", true, false},    LivoxType{kHapT1, "HAP (T1)", true, false},
+    LivoxType{kHap, "HAP", true, false},    LivoxType{kHapT1, "HAP-T1", true, false},
     LivoxType{kPa, "PA", true, false},      LivoxType{kMid360s, "Mid-360s", true, false},
     LivoxType{kAvia2, "Avia2", true, false}};
 /// One by its number, or nullptr.
