@@ -16,7 +16,7 @@ def command(*words, status=0):
 
 def help_of(verb):
     """All options of a verb."""
-    return subprocess.run([os.environ["RISLEY_COMMAND"], verb, "--help"],
+    return subprocess.run([os.environ["RISLEY_COMMAND"], verb, "--help-all"],
                           capture_output=True, text=True, check=True).stdout
 
 
