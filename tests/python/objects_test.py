@@ -208,11 +208,11 @@ def test_unknown_keywords_have_a_suggestion(recording):
 
 def test_every_option_of_the_command_is_a_keyword():
     """Under its own name, without the unit that it ends in."""
-    of_the_command = {"help", "json", "quiet", "verbose", "report", "no-report", "plan", "list", "resume", "table",
+    of_the_command = {"help", "help-all", "no-progress", "json", "quiet", "verbose", "report", "no-report", "plan", "list", "resume", "table",
                       "every-device", "coverage", "integration-s", "cell-deg", "beam-origin-map", "share", "share-ranges"}
     for verb in ("estimate", "calibrate", "cloud", "simulate", "identify", "pattern", "observability", "compare",
                  "campaign", "info"):
-        options = set(re.findall(r"^ +(?:-\w,)?--([a-z-]+)", help_of(verb), re.MULTILINE)) - of_the_command
+        options = set(re.findall(r"^ +(?:-\w, ?)?--([a-z-]+)", help_of(verb), re.MULTILINE)) - of_the_command
         keywords = set(inspect.signature(getattr(risley, verb)).parameters)
         if verb == "calibrate":
             keywords |= set(inspect.signature(risley.plan).parameters)
