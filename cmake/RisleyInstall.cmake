@@ -82,7 +82,7 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/risleyConfig.cmake.in
                               ${PROJECT_BINARY_DIR}/risleyConfig.cmake
                               INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/risleyConfigVersion.cmake
-                                 COMPATIBILITY SameMinorVersion)
+                                 COMPATIBILITY SameMajorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/risleyConfig.cmake
               ${PROJECT_BINARY_DIR}/risleyConfigVersion.cmake
               ${CMAKE_CURRENT_LIST_DIR}/RisleyPackages.cmake
