@@ -77,7 +77,7 @@ class FloodTest(unittest.TestCase):
             self.assertLess(time.monotonic(), deadline, "no data")
             time.sleep(0.05)
         targets = [(HOST, port) for port in ports_of(recording)] + [(SENSOR, port) for port in ports_of(sensor)]
-        self.assertEqual(len(targets), 4, targets)  # broadcasts, commands, data; the sensor
+        self.assertEqual(len(targets), 5, targets)  # broadcasts of two generations, commands, data; the sensor
         each = DATAGRAMS // len(targets) + 1
 
         def flood(count, seed):

@@ -118,8 +118,8 @@ TEST_F(RegistryTest, TheListOfWritableFormatsIsComplete) {
     endings.insert(format.ending);
     EXPECT_FALSE(format.name.empty() || format.description.empty());
   }
-  EXPECT_THAT(endings, ::testing::UnorderedElementsAre(".lvx", ".nc", ".csv", ".sequence.csv",
-                                                       ".openpylivox.csv"));
+  EXPECT_THAT(endings, ::testing::UnorderedElementsAre(".lvx", ".lvx2", ".nc", ".csv",
+                                                       ".sequence.csv", ".openpylivox.csv"));
 }
 
 TEST_F(RegistryTest, AWholeRecordingIsLoadedWithItsWarnings) {

@@ -631,8 +631,9 @@ void collect(const json::Json& value, const std::string& place, std::vector<std:
   if (value.is_array() && !value.empty()) collect(value.front(), place + "/0", places);
   if (!value.is_object()) return;
   for (const auto& [name, one] : value.items()) {
-    places.push_back(place + "/" + name);
-    collect(one, places.back(), places);
+    const std::string inside = place + "/" + name;
+    places.push_back(inside);
+    collect(one, inside, places);
   }
 }
 
