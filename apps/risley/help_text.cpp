@@ -131,7 +131,8 @@ std::string value_of(const CLI::Option& option, const std::vector<std::string>& 
   if (const auto joined = fmt::format("{}", fmt::join(choices, "|")); !choices.empty()) {
     return joined.size() <= kRoom ? joined : "NAME";
   }
-  const std::string name = option.get_name(), type = option.get_type_name();
+  const std::string name = option.get_name();
+  std::string type = option.get_type_name();
   const std::string own = type.substr(0, type.find(':'));
   const bool is_number = own == "FLOAT" || own == "INT" || own == "UINT";
   if (own != "TEXT" && !is_number) return type;  // declared with the option
@@ -285,9 +286,8 @@ std::string HelpFormatter::make_help(const CLI::App* app, std::string name,
   }
   text += section(kCommonGroup, options_of(*app, kCommonGroup));
   if (mode != CLI::AppFormatMode::All && !headings.empty()) {
-    std::vector<std::string> words;
-    for (const std::string& one : headings) words.push_back(lower_case(one));
-    text += wrapped(fmt::format("\n{} --help-all shows more: {}.\n", name, fmt::join(words, ", ")),
+    text += wrapped(fmt::format("\n{} --help-all shows more: {}.\n", name,
+                                lower_case(fmt::format("{}", fmt::join(headings, ", ")))),
                     kHelpColumns);
   }
   if (!is_verb) text += '\n' + app->get_footer() + '\n';

@@ -151,8 +151,8 @@ class PointArrays {
         visit(kEntry, terms, {3, 3});
       } else if constexpr (std::is_same_v<Column, std::vector<PointColumn::Numbers>>) {
         if (column.empty()) return;
-        std::vector<const double*> numbers;
-        for (const auto& one : column) numbers.push_back(one.data());
+        std::vector<const double*> numbers(column.size());
+        std::ranges::transform(column, numbers.begin(), [](const auto& one) { return one.data(); });
         visit(kEntry, numbers, {static_cast<py::ssize_t>(column.size())});
       } else if constexpr (std::is_same_v<Column,
                                           std::vector<std::array<PointColumn::Numbers, 3>>>) {
