@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "risley/algebra/symmetric.hpp"
@@ -105,18 +106,21 @@ Eigen::MatrixXd changes_of_constants(const SmootherSolution& solution,
 /// The second order of what one sigma of a held parameter does: how far the mean of both signs is
 /// from no change, by one step from either end of the first order.
 /// @param solution  of free and held parameters together, from which the rotors follow
+/// @param centre    step of the constants [free] from no change
 /// @param change    of the constants [free + held]
 /// @return of the constants [free] and of the states of the knots
 std::pair<Eigen::VectorXd, std::vector<double>> second_order(const Estimate& estimate,
                                                              const Sample& sample,
                                                              const SmootherSolution& solution,
+                                                             const SmootherSolution& centre,
                                                              const std::vector<FreeParameter>& all,
                                                              const Eigen::VectorXd& change) {
   const std::vector<FreeParameter>& constants = constants_of(estimate);
   const Eigen::VectorXd values = free_values(estimate.train, all);
-  Eigen::VectorXd curve = Eigen::VectorXd::Zero(static_cast<Index>(constants.size()));
-  std::vector<double> states(sample.knots.state.size(), 0.0);
-  for (const auto& [sign, weight] : {std::pair{1.0, 0.5}, {-1.0, 0.5}, {0.0, -1.0}}) {
+  Eigen::VectorXd curve = -centre.parameter_step;
+  std::vector<double> states(centre.state_step.size());
+  std::ranges::transform(centre.state_step, states.begin(), std::negate());
+  for (const double sign : {1.0, -1.0}) {
     RotorTrajectory moved = sample.knots;
     for (std::size_t knot = 0; knot < moved.size(); ++knot) {
       const auto state = moved.state_of(knot);
@@ -125,8 +129,8 @@ std::pair<Eigen::VectorXd, std::vector<double>> second_order(const Estimate& est
     }
     const PrismTrain train = with_free_values(estimate.train, all, values + sign * change);
     const SmootherSolution step = step_of(estimate, sample, moved, train, constants);
-    curve += weight * step.parameter_step;
-    for (std::size_t i = 0; i < states.size(); ++i) states[i] += weight * step.state_step[i];
+    curve += 0.5 * step.parameter_step;
+    for (std::size_t i = 0; i < states.size(); ++i) states[i] += 0.5 * step.state_step[i];
   }
   return {std::move(curve), std::move(states)};
 }
@@ -188,8 +192,12 @@ HeldChanges changes_by_held_parameters(const Estimate& estimate, const sensors::
   result.mean_angles /= static_cast<double>(knots.size());
 
   // Only behind a reflection do the others follow a held parameter along a visible curve.
-  for (Index j = 0; sensor.shape().prisms.reflects() && j < count; ++j) {
-    const auto [curve, states] = second_order(estimate, sample, solution, all, constants.col(j));
+  if (!sensor.shape().prisms.reflects()) return result;
+  const SmootherSolution centre =
+      step_of(estimate, sample, knots, estimate.train, constants_of(estimate));
+  for (Index j = 0; j < count; ++j) {
+    const auto [curve, states] =
+        second_order(estimate, sample, solution, centre, all, constants.col(j));
     const auto curve_of_angles = [&, &steps = states](std::size_t knot) -> Eigen::MatrixXd {
       Eigen::MatrixXd angles(prisms, 1);
       for (Index k = 0; k < prisms; ++k) {
