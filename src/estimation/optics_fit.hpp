@@ -17,7 +17,7 @@ enum class Priors { of_the_type, wide };
 /// are not where they are believed to be.
 /// @param series  in the sensor's frame
 /// @return the start at its own time with what was found, `residual_rms` included; nothing if the
-///         shots do not determine
+///         shots do not determine it
 std::optional<Start> fit_optics(const AngleSeries& series, const Start& start,
                                 const sensors::Sensor& sensor, Priors priors);
 

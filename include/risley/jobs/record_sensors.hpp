@@ -143,8 +143,8 @@ std::vector<FoundSensor> find_sensors(const RecordOptions& options, const Progre
 /// one LVX 2 file while it comes, see recordings::livox::PacketFile, also where that is converted
 /// to NetCDF at the end, which can be of one generation only: until the time is over or the
 /// progress is cancelled: that is the clean end of a recording, for which the sensors are stopped.
-/// A sensor that falls silent is told of, waited for, and goes on in the same file; one that is
-/// found later than the others is not taken: the table of sensors stands before the data.
+/// A sensor that falls silent is reported, and continues in the same file when it returns; one that
+/// is found later than the others is not recorded: the table of sensors stands before the data.
 /// @throws InvalidArgument; NetworkError also where there is no sensor, or none sends anything;
 ///         FileError
 RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& note,

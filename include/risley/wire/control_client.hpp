@@ -12,11 +12,10 @@
 
 namespace risley::wire {
 
-/// A session with a sensor of the second generation. It has no handshake: the sensor is told where
-/// to send, what, and to sample, and asked for its state again and again, whose answers are the
-/// signs of life. One that no longer samples, because it was started again, is set up anew. Points
-/// come as coordinates in mm, which is what LVX 2 holds; what was set otherwise is set back at the
-/// end.
+/// A session with a sensor of the second generation. There is no handshake: the client sets where
+/// and what the sensor sends, starts it, and polls its state; the answers are its signs of life. A
+/// sensor that restarted, and so no longer samples, is set up again. Points are set to coordinates
+/// in mm, which LVX 2 holds; settings that were changed are restored at the end.
 class ControlClient final : public ClientSession {
  public:
   /// @param device_type  as recordings::Device::type
@@ -29,7 +28,7 @@ class ControlClient final : public ClientSession {
     Purpose purpose = Purpose::identify;
     ControlCommand command = ControlCommand::get;
     std::vector<std::uint8_t> data;
-    const char* name = "";  ///< for who is told that it is refused
+    const char* name = "";  ///< for the message if it is refused
   };
 
   void ask_next(std::int64_t now_ns) override;

@@ -15,8 +15,8 @@
 
 namespace risley::wire {
 
-/// A sensor of the second generation: it answers who searches it, and is set and asked by keys, by
-/// any host. It samples when it is told to, whether somebody still listens or not.
+/// A sensor of the second generation: it answers searches, and any host may set and query its keys.
+/// It samples in the work state that it was set to, whether or not a host still listens.
 class ControlSensor final : public SensorSession {
  public:
   /// Time between two pushes of its settings and state, ns.

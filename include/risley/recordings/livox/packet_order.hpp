@@ -104,7 +104,7 @@ class PacketSequence {
 };
 
 /// Packets of the first generation. They have no numbers, so everything follows from their times
-/// and the period of their data type. A clock that jumps ahead is told from loss by when packets
+/// and the period of their data type. A clock that jumps ahead differs from loss in when packets
 /// come: they can be late, never early. One that jumps back by less than kWindow packets, or ahead
 /// by less than 10 ms, is not seen.
 class PacketOrder final : public PacketSequence {
