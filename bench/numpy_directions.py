@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: MIT
 """Azimuth and zenith of many shots: the Python package and numpy in turn, in one process and on one core each.
 
-The peer is numpy as somebody writes it who knows it: one array per component, blocks that stay in a cache (the fastest
+The peer is numpy as an expert writes it: one array per component, blocks that stay in a cache (the fastest
 of several sizes is taken), every operation into an array that is there already, and all constants of the sensor
 prepared beforehand. Both write to arrays that exist. Prints one JSON object.
 

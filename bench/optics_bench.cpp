@@ -169,7 +169,7 @@ void sequence(benchmark::State& state, InstructionSet set) {
 }
 
 /// Both angles and their derivatives by nine parameters and two rotation angles against Jets, block
-/// by block, as whoever sums them up calls it: columns of all shots at once measure the memory.
+/// by block, as code that sums them calls it: columns of all shots at once measure the memory.
 /// @param every_shot  see peers::jet_jacobians()
 void jacobian(benchmark::State& state, InstructionSet set, bool every_shot) {
   constexpr std::size_t kBlock = 2048;

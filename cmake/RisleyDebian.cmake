@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 # Debian packages of the components, by CPack. scripts/package builds them: it writes the changelog to
-# <build>/debian, and tells cpack version, revision and maintainer.
+# <build>/debian, and gives cpack the version, revision and maintainer.
 if(NOT BUILD_SHARED_LIBS OR NOT RISLEY_BUILD_APPS OR NOT RISLEY_BUILD_PYTHON)
   message(FATAL_ERROR "Debian packages hold shared libraries, the command and the Python package: use the preset "
                       "package, or scripts/package")
@@ -38,7 +38,7 @@ risley_debian_compress(${PROJECT_SOURCE_DIR}/CHANGELOG.md ${PROJECT_BINARY_DIR}/
 add_custom_target(risley_debian_changelogs ALL DEPENDS ${changelogs})
 install(FILES ${PROJECT_BINARY_DIR}/debian/changelog.gz DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT command)
 
-# What somebody needs who includes the headers.
+# Dependencies of programs that include the headers.
 set(header_packages "")
 foreach(layer IN LISTS RISLEY_LAYERS)
   foreach(key IN LISTS RISLEY_${layer}_PUBLIC)

@@ -4,13 +4,14 @@
 # What only building needs is named here, what users of the installed library need in RisleyPackages.
 include(RisleyPackages)
 risley_package(random123 TARGET risley_random123 DEBIAN librandom123-dev)
+risley_package(boost TARGET Boost::headers DEBIAN libboost-dev FIND Boost 1.74)
 risley_package(cli11 TARGET CLI11::CLI11 DEBIAN libcli11-dev FIND CLI11)
 risley_package(spdlog TARGET spdlog::spdlog DEBIAN libspdlog-dev FIND spdlog)
 risley_package(gtest TARGET GTest::gmock DEBIAN libgmock-dev FIND GTest)
 risley_package(ceres TARGET Ceres::ceres DEBIAN libceres-dev FIND Ceres)
 risley_package(benchmark TARGET benchmark::benchmark DEBIAN libbenchmark-dev FIND benchmark)
-# The interpreter is the system's, never whichever python3 stands first in the path; scikit-build-core
-# and whoever sets Python_EXECUTABLE choose another.
+# The interpreter is the system's, never the first python3 in the path; scikit-build-core
+# and a set Python_EXECUTABLE choose another.
 if(NOT DEFINED Python_EXECUTABLE AND NOT SKBUILD AND EXISTS /usr/bin/python3)
   set(Python_EXECUTABLE /usr/bin/python3)
 endif()

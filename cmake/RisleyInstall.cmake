@@ -106,6 +106,7 @@ if(TARGET risley)
           DESTINATION ${CMAKE_INSTALL_DATADIR}/risley COMPONENT data FILES_MATCHING PATTERN *.yaml)
   install(FILES ${echarts}/LICENSE ${echarts}/NOTICE DESTINATION ${notices_dir}/echarts COMPONENT data)
   install(FILES ${echarts_gl}/LICENSE DESTINATION ${notices_dir}/echarts-gl COMPONENT data)
+  install(FILES ${three}/LICENSE DESTINATION ${notices_dir}/three COMPONENT data)
   install(TARGETS risley RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
   install(DIRECTORY ${RISLEY_DOCUMENTS}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT command)
   install(FILES ${RISLEY_DOCUMENTS}/completions/risley.bash RENAME risley

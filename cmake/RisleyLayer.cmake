@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-# Layers are declared lowest first with risley_add_layer, told what they need with risley_layer_needs,
+# Layers are declared lowest first with risley_add_layer, get their dependencies with risley_layer_needs,
 # and made by risley_make_layers: the components that are asked for, with the layers below them.
 set(RISLEY_LAYERS "")
 
@@ -32,7 +32,7 @@ endfunction()
 
 # Headers of other libraries that most sources include, parsed once: by a target that lends them to others,
 # which must have all its definitions and the same flags.
-# ccache must be told of them (CCACHE_SLOPPINESS, as in scripts/build); who does not, leaves them out.
+# ccache needs to know them (CCACHE_SLOPPINESS, as in scripts/build); otherwise they are not used.
 set(precompile ON)
 if(CMAKE_CXX_COMPILER_LAUNCHER)
   set(precompile OFF)

@@ -2,12 +2,17 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cctype>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <ostream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "risley/core/error.hpp"
@@ -35,6 +40,40 @@ std::string line_and_problem(Call&& call) {
   }
   return {};
 }
+
+/// Matches a message that names a field, parameter, column or the like as a whole, whatever its
+/// other words; with a line from 1 on also "line N" or "N: ", as line_and_problem() begins.
+struct NamesField {
+  using is_gtest_matcher = void;
+
+  explicit NamesField(std::string named, std::uint64_t in_line = 0)
+      : field(std::move(named)), line(in_line) {}
+
+  bool MatchAndExplain(std::string_view message, std::ostream*) const {
+    const std::string number = std::to_string(line);
+    if (line > 0 && message.find(number + ": ") == message.npos &&
+        message.find("line " + number) == message.npos) {
+      return false;
+    }
+    for (std::size_t at = message.find(field); at != message.npos;
+         at = message.find(field, at + 1)) {
+      const std::size_t end = at + field.size();
+      const auto is_part = [](char c) {
+        return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
+      };
+      if (end == message.size() || !is_part(message[end])) return true;
+    }
+    return false;
+  }
+  void DescribeTo(std::ostream* stream) const {
+    *stream << "names " << field;
+    if (line > 0) *stream << " of line " << line;
+  }
+  void DescribeNegationTo(std::ostream* stream) const { *stream << "does not name " << field; }
+
+  std::string field;
+  std::uint64_t line;
+};
 
 /// A text with its first `what` replaced.
 inline std::string replaced(std::string text, const std::string& what, const std::string& by) {

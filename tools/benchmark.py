@@ -252,7 +252,7 @@ def job_list(jobs, seconds):
         return "back to LVX: the same bytes" if same else "back to LVX: OTHER BYTES"
 
     def judged(*words):
-        """What a run with the truth prints; who measures has none, so that one is not timed."""
+        """What a run with the truth prints; users have no truth, so this run is not timed."""
         return json.loads(jobs.risley(*words, "-o", jobs.path("judged"))["printed"])
 
     def estimated(result):

@@ -4,7 +4,8 @@
 """Every public header may be included alone: it compiles when nothing of ours stands before it.
 
 Headers of other libraries that the build parses once are there already, which makes this quick; so
-a public header must include those that it names itself.
+a public header must include those that it names itself. For the same reason a header is compiled
+after others of ours only where it includes all of them anyway: they can lend it nothing.
 
 Usage: tools/check_headers.py BUILD_FOLDER
   BUILD_FOLDER  holds compile_commands.json, as the presets dev and test write it
@@ -39,11 +40,50 @@ def missing_includes(header):
                    if re.search(names, text) and f'#include <{include}' not in text)
 
 
-def compile_alone(header, directory, command):
-    """Returns what the compiler says of a header, nothing if all is well."""
+def included_by(headers):
+    """The headers of ours that each includes, also through others."""
+    direct = {header: [each for each in map(Path, re.findall(
+        r'^#include "(.*)"', (ROOT / 'include' / header).read_text(), re.M)) if each in headers]
+        for header in headers}
+    closed = {}
+
+    def close(header):
+        if header not in closed:
+            closed[header] = set(direct[header]).union(*map(close, direct[header]))
+        return closed[header]
+    return {header: close(header) for header in headers}
+
+
+def chains_of(headers):
+    """As few lists as possible of headers that include all before them in their list."""
+    included = included_by(set(headers))
+    after = {}  # the header that follows one in its list
+
+    def follow(header, seen):
+        """Finds a header to put before this one; others may have to change theirs."""
+        for each in sorted(included[header] - seen):
+            seen.add(each)
+            if each not in after or follow(after[each], seen):
+                after[each] = header
+                return True
+        return False
+    firsts = set(headers)
+    for header in headers:
+        follow(header, set())
+    firsts -= set(after.values())
+    chains = []
+    for header in sorted(firsts):
+        chains.append([header])
+        while chains[-1][-1] in after:
+            chains[-1].append(after[chains[-1][-1]])
+    return chains
+
+
+def compile_chain(chain, directory, command):
+    """Returns what the compiler says of headers, nothing if all is well."""
     return subprocess.run(f'{command} -fsyntax-only -x c++ -', shell=True, cwd=directory, text=True,
-                          input=f'#include "{header}"\n', stdout=subprocess.PIPE,
-                          stderr=subprocess.STDOUT).stdout
+                          input=''.join(f'#include "{header}"\n' for header in chain),
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT).stdout
 
 
 def main(arguments):
@@ -54,8 +94,9 @@ def main(arguments):
                 if source.is_relative_to(ROOT / 'src') and not source.stem.endswith('_kernel')}
     include = ROOT / 'include'
     headers = sorted(path.relative_to(include) for path in include.rglob('*.hpp'))
-    said = at_once(lambda header: missing_includes(header) +
-                   compile_alone(header, *of_layer[header.parts[1]]), headers)
+    said = list(map(missing_includes, headers))
+    said += at_once(lambda chain: compile_chain(chain, *of_layer[chain[-1].parts[1]]),
+                    chains_of(headers))
     for words in filter(None, said):
         print(words)
     if any(said):

@@ -3,14 +3,14 @@
 # SPDX-License-Identifier: MIT
 """Runs clang-tidy with the checks of .clang-tidy on the sources in src/, studies/ and apps/.
 
-Most of its time goes into the headers of libraries, so the sources of a folder are looked at in one
-piece, as one file that includes them all. That also finds a name which stands for two things, or
-twice for the same, within a folder. Kernels, which have a compiler command of their own, are looked
-at alone.
+Most of its time goes into the headers of libraries, so the sources of a layer, or of several small ones, are
+looked at in one piece, as one file that includes them all. That also finds a name which stands for
+two things, or twice for the same, within a layer. Kernels, which have a compiler command of their
+own, are looked at alone.
 
 Usage: tools/check_tidy.py BUILD_FOLDER [--changed [COMMIT]]
   BUILD_FOLDER  holds compile_commands.json, as the presets dev and test write it
-  --changed     only the folders of sources that differ from COMMIT (without it: from the last one)
+  --changed     only the pieces of sources that differ from COMMIT (without it: from the last one)
 RISLEY_JOBS limits the number of processes. Exit status: 0 all well, 1 a check fails, 77 skipped for
 want of clang-tidy.
 """
@@ -25,6 +25,8 @@ from pathlib import Path
 
 from compile_commands import ROOT, at_once, commands_of
 
+LARGEST = 60  # sources of a piece of several layers: more leave a processor without work at the end
+
 
 def changed_sources(commit):
     def git(*words):
@@ -37,14 +39,30 @@ def changed_sources(commit):
 
 def pieces_of(sources, commands):
     """Lists of sources that are looked at as one file, those that take longest first."""
-    groups = defaultdict(list)
+    layers, kernels = defaultdict(list), []
     for source in sources:
         if source not in commands:
             sys.exit(f'check_tidy: {source} is not in compile_commands.json; configure anew')
-        folder = source.parent.relative_to(ROOT).parts
-        alone = source.stem.endswith('_kernel')
-        groups[folder + ((source.name,) if alone else ())].append(source)
-    return sorted(groups.values(), key=len, reverse=True)
+        if source.stem.endswith('_kernel'):
+            kernels.append([source])
+        else:
+            layers[source.relative_to(ROOT).parts[:2]].append(source)
+    pieces = [[]]
+    for layer in layers.values():
+        if pieces[-1] and len(pieces[-1]) + len(layer) > LARGEST:
+            pieces.append([])
+        pieces[-1] += layer
+    return sorted(filter(None, pieces + kernels), key=len, reverse=True)
+
+
+def command_of(sources, commands):
+    """The command of the first source, with what others see besides."""
+    command = re.sub(r' -Winvalid-pch -include \S+| --param \S+', '', commands[sources[0]][1])  # for gcc alone
+    for source in sources:
+        for option in re.findall(r' (?:-[DI]|-isystem )\S+', commands[source][1]):
+            if option not in command:
+                command += option
+    return command
 
 
 def look_at(sources, number, folder, commands):
@@ -53,8 +71,7 @@ def look_at(sources, number, folder, commands):
     piece.write_text(''.join(f'#include "{source}"\n' for source in sources))
     place = folder / f'piece_{number}'
     place.mkdir()
-    directory, command = commands[sources[0]]
-    command = re.sub(r' -Winvalid-pch -include \S+| --param \S+', '', command)  # for gcc alone
+    directory, command = commands[sources[0]][0], command_of(sources, commands)
     (place / 'compile_commands.json').write_text(json.dumps(
         [{'directory': directory, 'command': f'{command} -c {piece}', 'file': str(piece)}]))
     done = subprocess.run(
@@ -64,7 +81,7 @@ def look_at(sources, number, folder, commands):
          '--extra-arg=-Wno-shadow',  # of a name in another file; the compiler looks for real ones
          str(piece)],
         capture_output=True, text=True)
-    # Nobody asks how many warnings system headers would have given.
+    # Without the number of warnings in system headers.
     said = [line for line in (done.stdout + done.stderr).splitlines()
             if not re.match(r'\d+ (warning|error).* (generated|treated)', line)]
     return done.returncode == 0, '\n'.join(said)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Tells which lines of layers a run of the preset coverage has reached, from what gcov counted.
+"""Reports which lines of layers a run of the preset coverage has reached, from what gcov counted.
 
 Usage: tools/line_coverage.py BUILD [--missing] [--least PERCENT] LAYER...
   --missing  names the lines of each file that were not reached

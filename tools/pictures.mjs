@@ -72,10 +72,7 @@ const pictures = [
            { figure: /^(Walls (before|after)|Thickness over the (angle of incidence|rotation angle of prism A))/ }],
   },
   {
-    file: 'cloud.png', needs: ['cloud'], page: 'out/hall.html', width: 1100, keep: [{ css: '.overview' }],
-    before: () => window.risley.charts[0].chart.setOption({
-      grid3D: { viewControl: { alpha: 22, beta: -62, distance: 140 } },
-    }),
+    file: 'cloud.png', needs: ['cloud'], page: 'out/hall.html', width: 1100, show: '#viewer',
   },
   {
     file: 'reproduce.png', needs: ['reproduce'], page: 'out/reproduction/report.html', width: 1160,
@@ -233,7 +230,7 @@ async function take(browser, picture) {
   if (picture.before) await tab.evaluate(picture.before);
   await tab.waitForTimeout(500); // diagrams follow their places
   const out = join(images, picture.file);
-  await tab.locator('main').screenshot({ path: out });
+  await tab.locator(picture.show ?? 'main').screenshot({ path: out });
   await context.close();
   if (complaints.length > 0) throw new Error(`${picture.file}: ${complaints.join('; ')}`);
   console.log(`${picture.file}: ${Math.round(statSync(out).size / 1024)} KB`);

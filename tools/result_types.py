@@ -4,7 +4,7 @@
 """Makes python/risley/_answers.pyi, the types of the attributes of results, from docs/schemas.
 
 Usage: tools/result_types.py [--check]
-  --check  only tell whether it is up to date
+  --check  only report whether it is up to date
 Exit status: 0 all well, 1 it is not up to date.
 """
 import json
@@ -15,6 +15,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 STUB = ROOT / "python" / "risley" / "_answers.pyi"
 RESULTS = {"Estimate": "estimate.json#/$defs/found", "Calibration": "calibrate.json#/$defs/found_on_walls",
            "FlightCalibration": "calibrate.json#/$defs/found_in_flight", "Cloud": "cloud.json#/$defs/one",
+           "CloudOfStations": "cloud.json#/$defs/stations",
            "Simulation": "simulate.json#/$defs/result", "Identification": "identify.json#/$defs/result",
            "Pattern": "pattern.json#/$defs/written"}
 # Of the command alone, or made something better of by the classes of risley/_results.py.

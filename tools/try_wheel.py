@@ -20,6 +20,7 @@ import tarfile
 
 BARE = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "HOME": "/root", "LANG": "C.UTF-8",
         "PROJ_DATA": "/nowhere"}  # as if another program's PROJ were installed
+LAZ = ("hall.laz",)  # which what Debian 12's libraries make does not have
 FLIGHT = """risley_flight: 1
 origin: {latitude_deg: 50, longitude_deg: 8.5, ellipsoidal_height_m: 250}
 start: {scale: gps-second-of-week, time_s: 208800, gps_week: 2400}
@@ -47,12 +48,13 @@ print(points)
 """
 
 
-def use(run, work, data):
+def use(run, work, data, also=()):
     """Does every job once and has each library read or write a file.
 
     @param run   runs the command with some words and returns what it prints
     @param work  the folder that it works in
     @param data  folder of the scenes, as the command sees it
+    @param also  further names of clouds
     """
     (work / "flight.yaml").write_text(FLIGHT, encoding="utf-8")
     run("simulate", "-o", "hall.lvx", "--sensor", "mid-40-table3", "--reported", "nominal", "--scene",
@@ -70,7 +72,7 @@ def use(run, work, data):
         "EPSG:25832+5773", "--json"))  # heights above the geoid: a grid beside PROJ's database
     assert cloud["points"] > 3000, cloud
     assert (work / "result/report.html").stat().st_size > 100_000
-    for name in ("hall.bag", "hall.pcd"):
+    for name in ("hall.bag", "hall.pcd", *also):
         run("cloud", "hall.lvx", "--calibration", "calibration/", "-o", name)
         run("info", name)
 
@@ -114,7 +116,7 @@ def try_archive(system, archive):
         file.extractall(system / "opt")
     top = only(system / "opt", "risley-*").name
     data = f"/opt/{top}/share/risley/data"
-    use(lambda *words: in_system(system, f"/opt/{top}/bin/risley", *words), system / "root/work", data)
+    use(lambda *words: in_system(system, f"/opt/{top}/bin/risley", *words), system / "root/work", data, LAZ)
     shutil.rmtree(system / "root/work")
     (system / "root/work").mkdir()
 
@@ -131,7 +133,7 @@ def try_wheel(system, wheel):
     print(in_system(system, "/root/venv/bin/pip", "install", "--no-index", f"/root/{wheel.name}"), end="")
     package = only(system / "root/venv/lib", "python3.*/site-packages/risley")
     data = f"/{package.relative_to(system)}/share/risley/data"
-    use(lambda *words: in_system(system, "/root/venv/bin/risley", *words), system / "root/work", data)
+    use(lambda *words: in_system(system, "/root/venv/bin/risley", *words), system / "root/work", data, LAZ)
     print(in_system(system, "/root/venv/bin/python", "-c", IN_PYTHON, data))
     in_system(system, "env", "DEBIAN_FRONTEND=noninteractive", *install, "python3-numpy")
     print(in_system(system, "/root/venv/bin/python", "-c", WITH_NUMPY))

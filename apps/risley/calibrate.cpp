@@ -48,7 +48,7 @@ struct CalibrateCommandOptions {
   ReadingWishes reading;
 };
 
-/// What all kinds of calibrations share; `Job` is the options of one.
+/// Options common to all kinds of calibrations; `Job` is the options of one.
 template <class Job>
 void take_common(const CalibrateCommandOptions& options, Job& job) {
   if (options.range_offset_sigma_m) job.range_offset_sigma = *options.range_offset_sigma_m;
@@ -60,14 +60,14 @@ void take_common(const CalibrateCommandOptions& options, Job& job) {
   job.range_noise = options.noise_range_m;
 }
 
-/// What flights share, flown and planned.
+/// Options common to flown and planned flights.
 template <class Job>
 void take_grid(const CalibrateCommandOptions& options, Job& job) {
   if (options.knot_spacing_s) job.knot_spacing = *options.knot_spacing_s;
   if (options.cell_size_m) job.cell_size = *options.cell_size_m;
 }
 
-/// What recordings of walls and of a flight share.
+/// Options common to recordings of walls and of a flight.
 template <class Job>
 void take_recordings(const CalibrateCommandOptions& options, const CommonOptions& common,
                      Job& job) {
@@ -107,15 +107,15 @@ jobs::CalibrateRecordingsOptions job_of(const CalibrateCommandOptions& options,
 const char* why_not_written(CalibrationCode code) {
   switch (code) {
     case CalibrationCode::as_believed:
-      return "what the sensor believes is as good";
+      return "the sensor's own parameters are as good";
     case CalibrationCode::not_better:
       return "it is not better";
     default:
-      return "it is not to be trusted";
+      return "it cannot be trusted";
   }
 }
 
-/// Runs a calibration, on walls or in flight, and says what came of it.
+/// Runs a calibration, on walls or in flight, and prints the result.
 template <class Calibrate, class Print>
 ExitStatus run_job(const CalibrateCommandOptions& options, const CommonOptions& common,
                    const Calibrate& calibrate, const Print& print) {
@@ -148,10 +148,10 @@ ExitStatus calibrate_each(CalibrateCommandOptions& options, const CLI::App& verb
   const jobs::InputPlan plan = jobs::plan_inputs(options.many, work, cancellable());
   const auto one_alone = [&](bool given, const char* option) {
     if (!given || plan.jobs.size() == 1) return;
-    throw InvalidArgument(fmt::format(
-        "{} is of one recording, and there are {}: with --table or --resume each is calibrated on "
-        "its own",
-        option, plan.jobs.size()));
+    throw InvalidArgument(
+        fmt::format("{} is for one recording, and there are {}: with --table or --resume each is "
+                    "calibrated separately",
+                    option, plan.jobs.size()));
   };
   one_alone(!options.truths.empty(), "--truth");
   one_alone(!options.stations.empty(), "--stations");
@@ -216,30 +216,6 @@ ExitStatus run_plan(const CalibrateCommandOptions& options, const CommonOptions&
   return kDone;
 }
 
-/// Replaces patterns, folders and a list by the recordings that they stand for; files stay as they
-/// were typed, in their order.
-/// @return the common options with these
-CommonOptions with_recordings_found(CalibrateCommandOptions& options, CommonOptions common) {
-  std::vector<std::string> found;
-  const auto add = [&found](const jobs::InputNames& names) {
-    for (jobs::Input& input : jobs::find_inputs(names, cancellable())) {
-      found.push_back(std::move(input.path));
-    }
-  };
-  for (const std::string& name : options.many.names) {
-    jobs::are_many({{name}, "", {}}) ? add({{name}, "", {}}) : found.push_back(name);
-  }
-  if (!options.many.list.empty()) {
-    add({{}, options.many.list, {}});
-    common.files.push_back(options.many.list);
-  }
-  if (found == options.many.names) return common;
-  options.many.names = std::move(found);
-  common.inputs.clear();
-  for (const std::string& name : options.many.names) add_files(name, common.inputs);
-  return common;
-}
-
 }  // namespace
 
 Run declare_calibrate(CLI::App& verb) {
@@ -249,19 +225,19 @@ Run declare_calibrate(CLI::App& verb) {
                    "Recordings of one sensor with ranges to plane walls, or from a flight, for one "
                    "calibration; with --table one each");
   verb.get_option("--table")->description(
-      "Calibrate every recording on its own, and write a table with one row for each; the ending "
+      "Calibrate each recording separately, and write a table with one row for each; the ending "
       "chooses the format: .csv or .nc (NetCDF)");
   verb.get_option("--resume")
       ->description(
-          "Calibrate every recording on its own, but skip those whose results are whole and were "
-          "made from the same bytes with the same options and version");
+          "Calibrate each recording separately, but skip those whose results are complete and come "
+          "from the same bytes, options and version");
   verb.add_option("-o,--output", o.many.output,
                   "Folder for calibration.yaml, states.nc (states_1.nc, ...), report.json and "
                   "report.html; with --table, a folder of such folders (default: none)");
-  verb.add_flag("--no-report", o.no_report, "Write no report.json and report.html");
+  verb.add_flag("--no-report", o.no_report, "Do not write report.json and report.html");
   add_choice(verb, "--method", o.method, {"adjustment", "paper"},
-             "adjustment: weighted, of all recordings together; paper: unweighted distances "
-             "from planes fitted by SVD");
+             "adjustment: weighted, of all recordings together; paper: unweighted distances from "
+             "planes fitted by SVD");
   verb.add_option(
       "--planes", o.planes,
       "Walls by name (YAML); the normal of a wall with sigma_deg is known (default: walls "
@@ -278,7 +254,7 @@ Run declare_calibrate(CLI::App& verb) {
       ->take_all();
   verb.add_option("--plan", o.plan,
                   "Predict a calibration in this scene or flight (YAML) and, for a flight, how its "
-                  "points would lie on the ground")
+                  "points would be distributed on the ground")
       ->excludes("--output", "--method", "--planes", "--stations", "--station", "--list");
   verb.add_option("--duration-s", o.duration_s, "Length of each planned recording, s")
       ->needs("--plan")
@@ -291,7 +267,7 @@ Run declare_calibrate(CLI::App& verb) {
           "Diameter, m, of circles that the points of a planned flight should not leave empty")
       ->needs("--plan")
       ->capture_default_str();
-  verb.add_option("--report", o.page, "Page (HTML) to write about the points of a planned flight")
+  verb.add_option("--report", o.page, "Page (HTML) to write on the points of a planned flight")
       ->needs("--plan");
   add_platform_options(verb, o.platform);
   verb.get_option("--trajectory")
@@ -320,21 +296,20 @@ Run declare_calibrate(CLI::App& verb) {
   add_parameter_choice(verb, o.parameters);
   verb.add_option(
       "--prior-sigma-deg", o.prior_sigma_deg,
-      "Prior: 1 sigma of every error angle about what the sensor believes, deg (default: no "
-      "prior)");
+      "Prior: 1 sigma of every error angle about the sensor's own value, deg (default: no prior)");
   verb.add_option("--range-offset-sigma-m", o.range_offset_sigma_m,
-                  "Prior: 1 sigma of the range offset about what the sensor states, m; 0 holds it "
-                  "there (default: 0.05, for a flight 0.02)");
+                  "Prior: 1 sigma of the range offset about the sensor's stated value, m; 0 holds "
+                  "it there (default: 0.05, for a flight 0.02)");
   add_choice(
       verb, "--walls", o.walls, {"uneven", "flat"},
-      "'uneven': walls wave by millimetres, and ranges have errors near the sensor, on tilted "
-      "and on dark surfaces; 'flat': exact planes and a constant error, as in the paper");
+      "'uneven': walls wave by millimetres, and ranges have errors near the sensor, on tilted and "
+      "on dark surfaces; 'flat': exact planes and a constant error, as in the paper");
   verb.add_option("--patch-thickness-m", o.patch_thickness_m,
-                  "1 sigma of how far dark or light patches stand off their wall, m: 0 for paint, "
-                  "which makes the range error that depends on intensity exact (default: 0.01)");
+                  "1 sigma of the thickness of dark or light patches on their wall, m: 0 for "
+                  "paint, which makes the intensity-dependent range error exact (default: 0.01)");
   verb.add_flag("--same-walls", o.same_walls,
-                "The recordings show the same walls from poses that differ by a turn, ideally a "
-                "roll of 180 degrees on the spot, so that the walls' shape cancels (default: if "
+                "The recordings show the same walls from poses that differ by a rotation, ideally "
+                "a roll of 180 degrees on the spot, so that the walls' shape cancels (default: if "
                 "their planes match in only one way)");
   verb.add_option("--tolerance-deg", o.tolerance_deg,
                   "RMS error of directions up to which a unit counts as sound, deg (default: the "
@@ -347,7 +322,7 @@ Run declare_calibrate(CLI::App& verb) {
       verb, "--mirror", o.mirror, {"auto", "yes", "no"},
       "Whether the elevation in the files has the opposite sign; 'auto' decides from the data");
   verb.add_flag("--force", o.force,
-                "Write calibration.yaml even if it does not improve on what the sensor believes")
+                "Write calibration.yaml even if it does not improve on the sensor's own parameters")
       ->excludes("--plan");
   verb.add_option("--truth", o.truths,
                   "Truth of each simulated recording (OUT.truth.yaml) to compare the calibration "
@@ -366,7 +341,7 @@ Run declare_calibrate(CLI::App& verb) {
     if (!options->many.table.empty() || options->many.resume) {
       return calibrate_each(*options, verb, typed);
     }
-    const CommonOptions common = with_recordings_found(*options, typed);
+    const CommonOptions common = with_recordings_found(options->many, typed);
     if ((options->knot_spacing_s || options->cell_size_m) && !moves(options->platform)) {
       throw InvalidArgument("--knot-spacing-s and --cell-size-m go with --trajectory or --plan");
     }

@@ -17,8 +17,10 @@
 #include "risley/core/text.hpp"
 #include "risley/io/text_file.hpp"
 #include "risley/json/many_results.hpp"
+#include "risley/report/campaign_page.hpp"
 
 #include "command.hpp"
+#include "result_folder.hpp"
 #include "table.hpp"
 #include "warning_log.hpp"
 
@@ -42,7 +44,7 @@ jobs::ChunkNumber chunk_number_from(const std::string& text) {
     if (second == std::errc() && last == end) return which;
   }
   throw InvalidArgument(
-      fmt::format("--chunk: found {}, wanted I/N, as in 3/40: chunk 3 of 40", text));
+      fmt::format("--chunk: found {}, expected I/N, as in 3/40: chunk 3 of 40", text));
 }
 
 std::string ratio(double value) {
@@ -67,8 +69,9 @@ void print_parameters(const jobs::SettingSummary& summary) {
   table.print();
 }
 
-void print_merged(const jobs::CampaignResult& merged) {
-  say("{} of {} cells\ntable: {}\n", grouped(merged.done), grouped(merged.cells), merged.table);
+void print_merged(const jobs::CampaignResult& merged, const std::string& page) {
+  say("{} of {} cells\ntable: {}\npage: {}\n\n{}\n", grouped(merged.done), grouped(merged.cells),
+      merged.table, page, report::campaign_words(merged));
   const auto words = [](const jobs::SettingSummary& one) {
     return one.grid.empty() ? std::string("all") : jobs::grid_words(one.grid);
   };
@@ -85,11 +88,11 @@ void print_merged(const jobs::CampaignResult& merged) {
       print_parameters(one);
     }
   }
-  say("\nbound: root mean square of the sigmas that were stated, given what was held; 95 of 100: "
-      "where so many campaigns find the figure before it, if the covariances are true\n");
+  say("\nbound: root mean square of the stated sigmas, given the held parameters; 95 of 100: "
+      "the range of the preceding figure in 95 of 100 campaigns if the covariances are correct\n");
 }
 
-/// What is missing, in words; nothing where all is there.
+/// The missing cells, in words; empty if none is missing.
 std::optional<FileError> damage_of(const jobs::CampaignResult& merged, const std::string& folder) {
   if (merged.missing.empty()) return std::nullopt;
   std::string ranges;
@@ -101,10 +104,18 @@ std::optional<FileError> damage_of(const jobs::CampaignResult& merged, const std
     if (!ranges.empty()) ranges += ", ";
     ranges += first == last ? fmt::format("{}", first) : fmt::format("{}-{}", first, last);
   }
-  return FileError(folder, {},
-                   fmt::format("{} of {} cells have no result ({}): run the chunks that have them "
-                               "again, those that are whole take no time",
-                               merged.cells - merged.done, merged.cells, ranges));
+  return FileError(
+      folder, {},
+      fmt::format(
+          "{} of {} cells have no result ({}): rerun their chunks; complete chunks are skipped",
+          merged.cells - merged.done, merged.cells, ranges));
+}
+
+std::string summary_in(const std::string& folder) {
+  return (std::filesystem::path(folder) / "summary.json").string();
+}
+std::string page_in(const std::string& folder) {
+  return (std::filesystem::path(folder) / "report.html").string();
 }
 
 ExitStatus tell_merged(const jobs::CampaignResult& merged, const CampaignCommandOptions& options,
@@ -112,14 +123,17 @@ ExitStatus tell_merged(const jobs::CampaignResult& merged, const CampaignCommand
   const std::optional<FileError> damage = damage_of(merged, options.folder);
   Json json = json::of(merged);
   if (damage) json["error"] = damage->what();
-  const std::string summary = (std::filesystem::path(options.folder) / "summary.json").string();
+  const std::string summary = summary_in(options.folder);
   io::write_text_file(summary, with_head(common, json).dump(2) + "\n");
   json["summary"] = summary;
+  const std::string page = page_in(options.folder);
+  write_page_file(page, report::campaign_page(merged, provenance_of(common)));
+  json["html"] = page;
   log_warnings(merged.warnings);
   if (common.json) {
     print_json(common, json::with_status(json, damage));
   } else {
-    print_merged(merged);
+    print_merged(merged, page);
   }
   if (!damage) return kDone;
   spdlog::error(damage->what());
@@ -128,7 +142,8 @@ ExitStatus tell_merged(const jobs::CampaignResult& merged, const CampaignCommand
 
 ExitStatus run_campaign(CampaignCommandOptions options, const CommonOptions& typed) {
   if (!options.chunk.empty() && options.merge) {
-    throw InvalidArgument("--chunk and --merge cannot be combined: merge when all chunks are done");
+    throw InvalidArgument(
+        "--chunk and --merge cannot be combined: merge when all chunks are complete");
   }
   if (!options.chunk.empty() && !options.table.empty()) {
     throw InvalidArgument("--table goes with --merge, not with --chunk");
@@ -139,8 +154,7 @@ ExitStatus run_campaign(CampaignCommandOptions options, const CommonOptions& typ
   const jobs::CampaignPlan plan = jobs::load_campaign_plan(options.plan, typed.seed);
   CommonOptions common = typed;
   common.files.insert(common.files.end(), plan.files.begin(), plan.files.end());
-  require_apart(common,
-                {options.table, (std::filesystem::path(options.folder) / "summary.json").string()});
+  require_apart(common, {options.table, summary_in(options.folder), page_in(options.folder)});
   const jobs::CampaignOptions job{options.folder, "risley " RISLEY_VERSION};
   if (!options.chunk.empty()) {
     const jobs::ChunkNumber which = chunk_number_from(options.chunk);
@@ -172,11 +186,11 @@ Run declare_campaign(CLI::App& verb) {
   const auto options = std::make_shared<CampaignCommandOptions>();
   CampaignCommandOptions& o = *options;
   verb.add_option("PLAN", o.plan,
-                  "Plan (YAML): what to simulate, what to do with it, a grid of settings, and the "
+                  "Plan (YAML): what to simulate, how to process it, a grid of settings, and the "
                   "number of seeds")
       ->required();
   verb.add_option("-o,--output", o.folder,
-                  "Folder for the results: chunks/, cells.csv and summary.json")
+                  "Folder for the results: chunks/, cells.csv, summary.json and report.html")
       ->required();
   verb.add_option("--chunk", o.chunk,
                   "Compute only chunk I of N; complete chunks are not computed again (default: all "

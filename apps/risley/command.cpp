@@ -86,7 +86,7 @@ void watch_signals() {
   std::thread(wait_for_interruption).detach();
   std::signal(SIGINT, note_signal);
   std::signal(SIGTERM, note_signal);
-  // nohup and the like want it ignored.
+  // nohup and similar programs need it ignored.
   if (std::signal(SIGHUP, note_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
@@ -113,7 +113,7 @@ void end_in_own_time() { in_own_time = true; }
 void hold_standard_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
-    // Gets the lowest free number, which is this one. What is written to stdout fails there.
+    // Gets the lowest free number, which is this one. Writing to stdout then fails.
     ::open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY);
   }
 }
@@ -208,7 +208,7 @@ void note_files(const CLI::App& verb, CommonOptions& common) {
         if (fs::is_regular_file(file, ignored)) common.inputs.push_back(file);
       } else if (name == "DIR") {
         common.inputs.push_back((fs::path(value) / "report.json").string());
-        // Of two results the numbers are compared as well.
+        // For two results, compares the numbers as well.
         const std::optional<std::string> numbers = jobs::calibration_in(value);
         if (option->results().size() > 1 && numbers) common.files.push_back(*numbers);
       } else if (names_file_to_read(name) && (fs::is_regular_file(value, ignored) ||
@@ -237,7 +237,7 @@ Json with_head(const CommonOptions& common, const Json& object, const jobs::Prov
       try {
         one["sha256"] =
             hashes::sha256_of_file(path, {[](double, std::string_view) {}, &interrupted});
-      } catch (const FileError&) {  // the verb says what is wrong with it
+      } catch (const FileError&) {  // the verb reports the error
       } catch (const Cancelled&) {
       }
     }
@@ -255,7 +255,7 @@ Json with_head(const CommonOptions& common, const Json& object, const jobs::Prov
 
 void print_json(const CommonOptions& common, const Json& object, const jobs::Provenance& known) {
   const Json whole = with_head(common, object, known);
-  // Serial numbers come from files and may hold bytes that are no UTF-8.
+  // Serial numbers come from files and may hold invalid UTF-8.
   say("{}\n", whole.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
@@ -280,7 +280,7 @@ ExitStatus close_stdout(ExitStatus status) {
 
 namespace {
 
-/// Where a file will be, by whatever spelling and links.
+/// The canonical path of a future file, whatever its spelling and links.
 std::string place_of(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code ignored;
@@ -326,7 +326,7 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
       if (!is_new) other = place->second;
     }
     if (other.empty()) continue;
-    throw InvalidArgument(fmt::format("the outputs {} and {} are one file", other, output));
+    throw InvalidArgument(fmt::format("the outputs {} and {} are the same file", other, output));
   }
 }
 

@@ -46,7 +46,7 @@ struct CommonOptions {
 /// Does the work of a verb and prints its result.
 using Run = std::function<ExitStatus(const CommonOptions&)>;
 
-/// Each declares its options and gives what runs it.
+/// Each declares its options and returns the function that runs it.
 Run declare_info(CLI::App& verb);
 Run declare_convert(CLI::App& verb);
 Run declare_simulate(CLI::App& verb);
@@ -64,37 +64,36 @@ Run declare_reproduce(CLI::App& verb);
 Run declare_record(CLI::App& verb);
 Run declare_emulate(CLI::App& verb);
 
-/// Declares an option with a few values, one of which it has already.
+/// Declares an option with a few allowed values; the variable holds the default.
 CLI::Option* add_choice(CLI::App& verb, const std::string& name, std::string& value,
                         const std::vector<std::string>& choices, const std::string& words);
 
-/// From now on SIGINT, SIGTERM and SIGHUP cancel what is being computed, so that every output in
-/// the making is removed by its owner.
-/// Work that does not stop within two seconds, because it waits for a pipe or cannot be cancelled,
-/// is ended; incomplete outputs are removed then, too. Writing to a closed pipe, or
-/// beyond the limit for files, fails like any other writing.
+/// From now on SIGINT, SIGTERM and SIGHUP cancel the computation, so that every unfinished output
+/// is removed by its owner. Work that does not stop within two seconds, because it waits for a pipe
+/// or cannot be cancelled, is ended; unfinished outputs are removed then, too. Writing to a closed
+/// pipe, or beyond the file size limit, fails like any other write error.
 void watch_signals();
 
-/// What --json says in that case, before anything is computed.
+/// The --json output in that case, before any computation.
 void prepare_interruption(const CommonOptions& common);
 
-/// For verbs that end a recording when they are interrupted: they take the time that they need.
+/// For verbs that end a recording when interrupted: they may take longer.
 void end_in_own_time();
 
-/// Standard streams that the caller closed are taken, so that no file gets their numbers and what
-/// is meant for a terminal.
+/// Opens standard streams that the caller closed, so that no file gets their numbers and receives
+/// terminal output.
 void hold_standard_streams();
 
 /// Whether progress is shown: on a terminal, without --quiet and --no-progress.
 bool shows_progress(const CommonOptions& common);
 
-/// From now on print_text() prints nothing.
+/// print_text() prints nothing after this call.
 void print_no_text();
 
 /// A progress bar on stderr with the remaining time, if shows_progress(); the destructor clears it.
 class ProgressBar {
  public:
-  /// @param label  for work that does not name its stages
+  /// @param label  for work without named stages
   ProgressBar(std::string_view label, const CommonOptions& common);
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
@@ -103,7 +102,7 @@ class ProgressBar {
   /// For a library function; a signal cancels it.
   Progress progress();
 
-  /// What stands behind the bar from now on, such as how many files are done. @param text  short
+  /// Text after the bar from now on, such as the number of files done. @param text  short
   void note(std::string text);
 
  private:
@@ -119,7 +118,7 @@ class ProgressBar {
 /// Seconds on a clock that never jumps.
 double now();
 
-/// @param name  of what it is the value of. @throws InvalidArgument unless it is a finite number
+/// @param name  of the quantity. @throws InvalidArgument unless it is a finite number
 double number_from(const std::string& text, std::string_view name);
 /// A value of --rate-hz. @return nothing for 'full'  @throws InvalidArgument
 std::optional<double> rate_from(const std::string& text);
@@ -127,22 +126,22 @@ std::optional<double> rate_from(const std::string& text);
 /// The value of --noise-angle-deg, rad. @throws InvalidArgument
 std::optional<double> noise_angle(const std::optional<double>& noise_angle_deg);
 
-/// For a library function whose progress is not shown; a signal cancels it.
+/// For a library function without a progress bar; a signal cancels it.
 Progress cancellable();
 
-/// Adds a file to others, or the files of which a folder of ROS 2 consists.
+/// Adds a file, or the files in a ROS 2 folder, to others.
 void add_files(const std::string& path, std::vector<std::string>& files);
 
-/// Fills inputs and files from what was typed for a verb.
+/// Fills inputs and files from a verb's command line.
 void note_files(const CLI::App& verb, CommonOptions& common);
 
-/// An object behind what every one begins with: format_version, version, command, inputs with their
+/// An object that begins with the common head: format_version, version, command, inputs with their
 /// SHA-256, null where a file cannot be read.
-/// @param known  hashes that were computed before, as jobs::with_inputs() has them
+/// @param known  hashes computed earlier, as in jobs::with_inputs()
 Json with_head(const CommonOptions& common, const Json& object, const jobs::Provenance& known = {});
 
-/// Prints on stdout what a terminal shows and does not obey, see printable(). Whether it arrived is
-/// asked once, by close_stdout().
+/// Prints on stdout without control characters, see printable(). close_stdout() checks once whether
+/// all of it was written.
 void print_text(std::string_view text);
 template <class... Values>
 void say(fmt::format_string<Values...> format, Values&&... values) {
@@ -150,11 +149,11 @@ void say(fmt::format_string<Values...> format, Values&&... values) {
 }
 
 /// Writes what stdout still holds.
-/// @return the status, at least kBadFile where not all that was printed arrived
+/// @return the status, at least kBadFile if part of the output could not be written
 ExitStatus close_stdout(ExitStatus status);
 
-/// No output may be a file that the command reads, by whatever name or link, nor another output.
-/// @param outputs  names; those that are empty, or - for stdout, do not count
+/// No output may be a file that the command reads, under any name or link, nor another output.
+/// @param outputs  names; empty ones, or - for stdout, do not count
 /// @throws InvalidArgument
 void require_apart(const CommonOptions& common, const std::vector<std::string>& outputs);
 
@@ -162,7 +161,8 @@ void require_apart(const CommonOptions& common, const std::vector<std::string>& 
 void print_json(const CommonOptions& common, const Json& object,
                 const jobs::Provenance& known = {});
 
-/// Says on stderr that numbers failed; why only where the verdict's text on stdout does not.
+/// Reports on stderr that the numbers failed a check; the reason only if the verdict's text is not
+/// on stdout.
 void log_failure(const std::string& reason, const CommonOptions& common);
 
 /// A verdict as lines of text.

@@ -23,7 +23,7 @@
 namespace risley::app {
 namespace {
 
-/// Common options that do something for a verb, and are therefore shown; all verbs take them.
+/// Common options that affect a verb, and are therefore shown; all verbs accept them.
 enum Uses : unsigned { kNothing = 0, kThreads = 1, kSeed = 2 };
 
 struct Verb {
@@ -42,12 +42,12 @@ constexpr const char* kPoints = "Make points";
 constexpr const char* kSimulate = "Simulate";
 
 constexpr Verb kVerbs[] = {
-    {"info", kLook, "Show what a recording holds, and check its times",
+    {"info", kLook, "Show the contents of a recording, and check its times",
      "  risley info recording.lvx\n  risley info recording.lvx --json\n"
      "  risley info recording.lvx --share excerpt.nc",
      "--device --share --share-ranges --table", kThreads, declare_info},
     {"convert", kLook,
-     "Convert a recording or trajectory to the format that the output's ending names",
+     "Convert a recording or trajectory to the format given by the output's ending",
      "  risley convert recording.lvx -o recording.csv\n"
      "  risley convert 'survey/*.lvx' --format netcdf -o converted/",
      "--output --device", kThreads, declare_convert},
@@ -81,7 +81,7 @@ constexpr Verb kVerbs[] = {
      "--mount",
      kThreads | kSeed, declare_calibrate},
     {"observability", kCalibrate,
-     "Show how well a recording, planned or made, determines each parameter",
+     "Show how well a recording, planned or recorded, determines each parameter",
      "  risley observability --sensor mid-40 --duration-s 30 --rate-hz 100000\n"
      "  risley observability recording.lvx --free wedge_angle_deg",
      "--sensor --duration-s --rate-hz --fix --free", kThreads, declare_observability},
@@ -95,7 +95,7 @@ constexpr Verb kVerbs[] = {
      "--calibration --output --directions --covariance --trajectory --mount --crs "
      "--report",
      kThreads, declare_cloud},
-    {"simulate", kSimulate, "Simulate a recording whose truth is known",
+    {"simulate", kSimulate, "Simulate a recording with known truth",
      "  risley simulate -o room.lvx --sensor mid-40 --scene data/room.yaml --duration-s 10\n"
      "  risley simulate -o unit.csv --rate-hz 1000 --set prism_tilt_a_vertical_deg=0.1 --seed 7\n"
      "  risley simulate -o flight.lvx --flight data/flight-v4.yaml --mount data/mount-nadir.yaml "
@@ -120,7 +120,7 @@ constexpr Verb kVerbs[] = {
      "  risley preset list\n  risley preset show avia\n"
      "  risley preset new unit-17 --from avia -o unit-17.yaml\n  risley preset check unit-17.yaml",
      "--output --from", kNothing, declare_preset},
-    {"campaign", kSimulate, "Simulate and estimate, or calibrate, many times over, as a plan says",
+    {"campaign", kSimulate, "Simulate and estimate or calibrate repeatedly, according to a plan",
      "  risley campaign plan.yaml -o campaign/\n"
      "  risley campaign plan.yaml --chunk 3/40 -o campaign/\n"
      "  risley campaign plan.yaml --merge -o campaign/",
@@ -146,11 +146,10 @@ void add_common_options(CLI::App& verb, unsigned uses, CommonOptions& common) {
   constexpr const char* kHidden = "";
   verb.add_flag("--json", common.json, "Print the result as exactly one JSON object on stdout")
       ->group(kCommonGroup);
-  auto* quiet =
-      verb.add_flag("--quiet", common.quiet,
-                    "Print errors and the result alone: no progress, no warnings, no summary of "
-                    "what is written to --output or --table")
-          ->group(kCommonGroup);
+  auto* quiet = verb.add_flag("--quiet", common.quiet,
+                              "Print only errors and the result: no progress, no warnings, no "
+                              "summary of files written by --output or --table")
+                    ->group(kCommonGroup);
   verb.add_flag("--no-progress", common.no_progress, "Show no progress bar");
   verb.add_flag("--verbose", common.verbose, "Print more detail on stderr")->excludes(quiet);
   auto* threads =
@@ -164,7 +163,7 @@ void add_common_options(CLI::App& verb, unsigned uses, CommonOptions& common) {
   verb.set_help_all_flag("--help-all", "Print this help with all options")->group(kCommonGroup);
 }
 
-/// Whether a verb was asked for a file, so that what it prints is only a summary.
+/// Whether a verb writes a file, so that its printed output is only a summary.
 bool writes_a_file(const CLI::App& verb) {
   for (const CLI::Option* option : verb.get_options()) {
     const std::string name = option->get_name();
@@ -193,8 +192,8 @@ std::string shell_text(const std::vector<std::string>& words) {
   return command;
 }
 
-/// The first option that a verb does not have, in words; CLI11 would name its value as well. Empty:
-/// there is none.
+/// The first unknown option of a verb, in words; CLI11 would name its value as well. Empty: there
+/// is none.
 std::string unknown_option(const CLI::App& verb, const std::vector<std::string>& words) {
   std::vector<std::string> names;
   const auto add_names = [&names](const CLI::App& app) {
@@ -217,7 +216,7 @@ std::string unknown_option(const CLI::App& verb, const std::vector<std::string>&
   return {};
 }
 
-/// What was wrong, in words; CLI11 would not name an unknown verb.
+/// The error in words; CLI11 would not name an unknown verb.
 std::string usage_error(const CLI::ParseError& error, const std::vector<std::string>& words,
                         const CLI::App& app) {
   const std::string first = words.empty() ? "-" : words.front();
@@ -235,8 +234,7 @@ std::string usage_error(const CLI::ParseError& error, const std::vector<std::str
                      fmt::join(names, ", "));
 }
 
-/// Whether a text, or what stands in it between commas or behind an equals sign, is NaN or
-/// infinite.
+/// Whether a text, or part of it between commas or after an equals sign, is NaN or infinite.
 bool holds_no_number(const std::string& text) {
   std::size_t begin = 0;
   while (begin <= text.size()) {
@@ -251,8 +249,8 @@ bool holds_no_number(const std::string& text) {
   return false;
 }
 
-/// The first option whose value holds a number that is none: nothing here is computed with NaN or
-/// infinity. Names of files may be anything. Empty: there is none.
+/// The first option with a value of NaN or infinity, which no computation accepts. File names may
+/// contain anything. Empty: there is none.
 std::string not_a_number(const CLI::App& verb) {
   for (const CLI::Option* option : verb.get_options()) {
     if (option->get_lnames().empty()) continue;  // inputs
@@ -268,16 +266,20 @@ std::string not_a_number(const CLI::App& verb) {
   return {};
 }
 
-/// Options that take a calibration take the folder that `calibrate` or `estimate` wrote it to.
+/// Options for a calibration also accept the output folder of `calibrate` or `estimate`.
 void take_result_folders(CLI::App& verb) {
   for (CLI::Option* option : verb.get_options([](const CLI::Option* one) {
          return one->check_lname("sensor") || one->check_lname("calibration");
        })) {
+    const bool takes_flights = verb.get_name() == "cloud";
     option->transform(CLI::Validator(
-        [](std::string& value) {
+        [takes_flights](std::string& value) {
           std::error_code ignored;
           if (std::filesystem::is_regular_file(value, ignored)) jobs::require_settled(value);
-          value = jobs::calibration_in(value).value_or(value);
+          // A folder of a flight also stands for its mount and trajectory.
+          const bool flight =
+              std::filesystem::exists(std::filesystem::path(value) / "mount.yaml", ignored);
+          if (!(takes_flights && flight)) value = jobs::calibration_in(value).value_or(value);
           return std::string();
         },
         ""));
@@ -302,9 +304,9 @@ CommandLine::CommandLine()
   app_.get_help_ptr()->group(kCommonGroup)->description("Print this help");
   app_.get_option("--version")->group(kCommonGroup)->description("Print the version");
   app_.footer(
-      "Exit status: 0 done, 1 no trustworthy result from these data, 2 wrong usage, 3 a bad file,\n"
-      "4 a fault in the program or the machine, 130 interrupted.\n"
-      "risley VERB --help shows a verb's usual options, risley VERB --help-all all of them.");
+      "Exit status: 0 success, 1 no trustworthy result from these data, 2 wrong usage, 3 a bad "
+      "file,\n4 a fault in the program or the machine, 130 interrupted.\nrisley VERB --help shows "
+      "a verb's usual options, risley VERB --help-all all of them.");
 }
 
 CommandLine::Parsed CommandLine::parse(const std::vector<std::string>& words) {

@@ -11,12 +11,12 @@
 
 namespace risley::app {
 
-/// All verbs with their options: takes the words of the command apart and runs nothing.
+/// All verbs with their options: parses the command line and runs nothing.
 class CommandLine {
  public:
   CommandLine();
 
-  /// What the words came to: one of the three.
+  /// The result of parsing: one of the three.
   struct Parsed {
     const CLI::App* verb = nullptr;
     std::optional<std::string> help;     ///< text that was asked for

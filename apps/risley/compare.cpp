@@ -1,31 +1,39 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <system_error>
 #include <unordered_set>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "risley/core/angle.hpp"
 #include "risley/core/number_text.hpp"
+#include "risley/jobs/compare_clouds.hpp"
 #include "risley/jobs/compare_units.hpp"
 #include "risley/jobs/result_files.hpp"
+#include "risley/report/change_page.hpp"
 #include "risley/report/units_page.hpp"
+#include "risley/tables/table_file.hpp"
 
 #include "command.hpp"
 #include "result_folder.hpp"
 #include "table.hpp"
+#include "warning_log.hpp"
 
 namespace risley::app {
 namespace {
 
 struct CompareOptions {
   jobs::CompareUnitsOptions job;
-  std::string page;
+  cloud::ChangeOptions change;
+  std::string page, table;
 };
 
 NumberText degrees_text(double value, double sigma) {
@@ -46,14 +54,14 @@ void print_pairs(const jobs::ComparedUnits& compared) {
   }
   table.print();
   say("\np: probability that differences of the parameters are as large as these, or larger, by "
-      "chance; changed: p below {:.2g}, so that a series without any change is called changed "
-      "with a probability of {:g} at most\n",
+      "chance; changed: p below {:.2g}, so that an unchanged series is called changed with a "
+      "probability of at most {:g}\n",
       compared.least_p_value, compared.false_alarm);
 }
 
 void print_fleet(const jobs::ComparedFleet& one, const jobs::ComparedUnits& compared) {
-  say("\n{} units of {} against the middle of all of them, each by its last result\n",
-      one.units.size(), compared.units[one.units.front()].sensor);
+  say("\n{} units of {} against the median of all, each by its last result\n", one.units.size(),
+      compared.units[one.units.front()].sensor);
   Table table({"unit", "result", "directions apart deg", "+- sigma", "shape deg", "+- sigma",
                "furthest off in", "robust z", "p", "answer"});
   for (std::size_t i = 0; i < one.units.size(); ++i) {
@@ -68,11 +76,11 @@ void print_fleet(const jobs::ComparedFleet& one, const jobs::ComparedUnits& comp
                jobs::answer_words(found)});
   }
   table.print();
-  say("\nrobust z: distance from the middle of the fleet in units of its spread and the sigma of "
-      "the result; p: probability that chance puts any unit of the fleet so far off, at most\n");
+  say("\nrobust z: distance from the median of the fleet in units of its spread and the sigma of "
+      "the result; p: upper limit of the probability that chance puts any unit so far off\n");
 }
 
-/// Files that a table leads to are inputs, too.
+/// Files listed in a table are inputs, too.
 void add_results_of_tables(const jobs::ComparedUnits& compared, CommonOptions& common) {
   const std::unordered_set<std::string> named(common.inputs.begin(), common.inputs.end());
   for (const std::string& result : compared.results) {
@@ -84,7 +92,72 @@ void add_results_of_tables(const jobs::ComparedUnits& compared, CommonOptions& c
   }
 }
 
+/// One row per cell.
+void write_cells(const std::string& path, const jobs::ComparedClouds& compared,
+                 const CommonOptions& told) {
+  using enum tables::CellKind;
+  std::vector<tables::TableColumn> columns;
+  for (const char* axis : {"x", "y", "z"}) {
+    columns.push_back({fmt::format("{}_m", axis), real, "m", "of the middle of the cell's points"});
+  }
+  for (const char* axis : {"x", "y", "z"}) {
+    columns.push_back({fmt::format("normal_{}", axis), real, "1", "of the surface"});
+  }
+  columns.push_back({"distance_m", real, "m", "along the normal, from the first to the second"});
+  columns.push_back({"sigma_m", real, "m", "of the distance where nothing changed"});
+  columns.push_back({"significant", integer, "1", "1: beyond the level of detection"});
+  columns.push_back({"points_a", integer, "1", "of the first cloud"});
+  columns.push_back({"points_b", integer, "1", "of the second cloud"});
+  tables::TableFile table(path, columns,
+                          {{"title", "risley compare, one row per cell"},
+                           {"command", told.command},
+                           {"version", RISLEY_VERSION}});
+  for (const cloud::SurfaceCell& cell : compared.change.cells) {
+    table.add({cell.place.x(), cell.place.y(), cell.place.z(), cell.normal.x(), cell.normal.y(),
+               cell.normal.z(), cell.distance, cell.sigma, std::int64_t{cell.significant},
+               static_cast<std::int64_t>(cell.points_a), static_cast<std::int64_t>(cell.points_b)});
+  }
+  table.close();
+}
+
+ExitStatus run_compare_clouds(const std::vector<std::string>& names, const CompareOptions& options,
+                              const CommonOptions& common) {
+  CommonOptions told = common;
+  told.inputs = names;
+  require_apart(told, {options.page, options.table});
+  if (!options.table.empty()) tables::TableFile::check_name(options.table);
+  jobs::CompareCloudsOptions job{names[0], names[1], options.change};
+  job.change.false_alarm = options.job.false_alarm;
+  jobs::ComparedClouds compared;
+  {
+    ProgressBar bar("comparing", common);
+    compared = jobs::compare_clouds(job, bar.progress());
+  }
+  if (!options.table.empty()) write_cells(options.table, compared, told);
+  if (!options.page.empty()) {
+    write_page_file(options.page, report::change_page(compared, provenance_of(told)));
+  }
+  log_warnings(compared.change.warnings);
+  if (common.json) {
+    Json json = json::of(compared);
+    if (!options.table.empty()) json["table"] = options.table;
+    if (!options.page.empty()) json["html"] = options.page;
+    print_json(told, json);
+    return kDone;
+  }
+  say("{}\n", report::change_words(compared));
+  for (const auto& [name, file] :
+       {std::pair{"table", options.table}, std::pair{"page", options.page}}) {
+    if (!file.empty()) say("{}: {}\n", name, file);
+  }
+  return kDone;
+}
+
 ExitStatus run_compare(const CompareOptions& options, const CommonOptions& common) {
+  std::vector<std::string> names;
+  for (const jobs::GivenSensor& result : options.job.results) names.push_back(result.name());
+  if (jobs::are_clouds(names)) return run_compare_clouds(names, options, common);
+  if (!options.table.empty()) throw InvalidArgument("--table is for the cells of two clouds");
   require_apart(common, {options.page});
   jobs::ComparedUnits compared;
   {
@@ -122,21 +195,30 @@ Run declare_compare(CLI::App& verb) {
   CompareOptions& o = *options;
   verb.add_option(
           "RESULT", o.job.results,
-          "Folders that estimate -o or calibrate -o wrote, or calibration files, in order of "
-          "time; also tables that these wrote with --table")
+          "Folders written by estimate -o or calibrate -o, or calibration files, in order of time; "
+          "also their tables (--table). Or two clouds (LAS) from cloud, the earlier one first")
       ->required()
       ->expected(1, 1'000'000);
   verb.add_option("-o,--output", o.page, "Page (HTML) to write (default: none)");
   verb.add_flag(
       "--unlike", o.job.unlike,
-      "Also compare calibrations (where beams truly go) with estimates (what the sensor believes)");
+      "Also compare calibrations (true directions) with estimates (the sensor's own parameters)");
   verb.add_flag("--anywhere", o.job.anywhere,
-                "Also open results outside the folder of the table that names them");
-  verb.add_option(
-          "--false-alarm", o.job.false_alarm,
-          "Probability that chance is taken for a change, or a unit for an outlier, at most")
+                "Also open results outside the folder of the table that lists them");
+  verb.add_option("--false-alarm", o.job.false_alarm,
+                  "Largest probability that chance is taken for a change, or a unit for an "
+                  "outlier; for clouds the share of unchanged cells flagged as changed")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
+  verb.add_option("--cell-size-m", o.change.cell, "Edge of the cells of clouds, m")
+      ->capture_default_str();
+  verb.add_option("--reach-m", o.change.reach,
+                  "Largest expected displacement of surfaces in clouds, m")
+      ->capture_default_str();
+  verb.add_option("--table", o.table,
+                  "Table to write with one row per cell of two clouds; the ending chooses the "
+                  "format: .csv or .nc (NetCDF)")
+      ->type_name("FILE");
   return [options](const CommonOptions& common) { return run_compare(*options, common); };
 }
 

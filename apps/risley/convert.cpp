@@ -16,6 +16,7 @@
 
 #include "command.hpp"
 #include "many_files.hpp"
+#include "message_options.hpp"
 #include "reading_options.hpp"
 
 namespace risley::app {
@@ -25,6 +26,7 @@ struct ConvertOptions {
   jobs::ManyInputsOptions many;
   std::string format, sensor_type, accuracy, topic;
   ReadingWishes reading;
+  MessageWishes messages;
 };
 
 std::string recording_endings() {
@@ -76,6 +78,7 @@ json::ConvertEachOptions settings_of(const ConvertOptions& options) {
   settings.accuracy = options.accuracy;
   settings.topic = options.topic;
   settings.format = options.format;
+  settings.writing.messages = message_options(options.messages);
   if (!options.sensor_type.empty()) settings.sensor_type = sensor_types().at(options.sensor_type);
   return settings;
 }
@@ -108,6 +111,7 @@ Run declare_convert(CLI::App& verb) {
       ->type_name("NAME");
   add_reading_options(verb, options->reading);
   add_every_device(verb, options->reading);
+  add_message_options(verb, options->messages, "custom");
   return [options, &verb](const CommonOptions& common) {
     jobs::ManyInputsOptions& many = options->many;
     many.into_folder = output_is_folder(many);

@@ -39,7 +39,7 @@ void print_distribution(const PointDistributionSummary& d) {
   }
   table.print();
   say("\nR: half the swath; dense: width with at least half the density; squares: of twice the "
-      "spacing with a point; empty: places about which a circle of {:g} m holds no point\n",
+      "spacing with a point; empty: places with no point within a circle of {:g} m\n",
       d.empty_circle);
   say("all strips: {} points per m2 (ANPD), {} m apart (ANPS), on {:.0f} m2; {} % of its cells of "
       "{:g} m hold a point, {} % points of several\n",

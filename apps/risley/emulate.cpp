@@ -77,8 +77,8 @@ void print_emulated(const jobs::EmulatedSensor& truth) {
              grouped(truth.duplicates), grouped(truth.reordered), grouped(truth.sessions)});
   table.print();
   if (truth.lost_at_ends > 0) {
-    say("{} more packets were not sent at the beginning or end, where their loss cannot be "
-        "noticed\n",
+    say("{} more packets were dropped at the beginning or end, where their loss cannot be "
+        "detected\n",
         grouped(truth.lost_at_ends));
   }
 }

@@ -32,7 +32,7 @@ struct EstimateCommandOptions {
   std::string input, method = "map", rate_hz, sensor, states = "knots", mirror = "auto",
                      process_noise = "auto", truth;
   jobs::ManyInputsOptions many;  ///< its output is the folder
-  bool no_report = false;
+  bool no_report = false, noise_model = false;
   std::optional<double> noise_angle_deg;
   ParameterWishes parameters;
   ReadingWishes reading;
@@ -63,6 +63,7 @@ jobs::EstimateRecordingOptions job_of(const EstimateCommandOptions& options,
   job.rotor_process = rotor_process(options.process_noise);
   if (options.mirror != "auto") job.mirrored = options.mirror == "yes";
   job.truth = options.truth;
+  job.noise_model = options.noise_model;
   job.details = !options.many.output.empty() && !options.no_report;
   job.files = result_files(options.many.output, options.states, common);
   if (job.details) {
@@ -83,6 +84,31 @@ void print_noise(const Estimate& e) {
       "deg\n",
       e.noise_held ? "held" : "found", angle(e.noise.value.azimuth, e.noise.sigma.azimuth),
       angle(e.noise.value.zenith, e.noise.sigma.zenith), degrees_from_radians(e.usual_noise));
+}
+
+void print_noise_model(const estimation::NoiseModel& model) {
+  const double direction_deg = degrees_from_radians(model.direction);
+  say("\nnoise model, 1 sigma of single points: range {:.3g} m ({}), direction {:.3g} deg along "
+      "either axis across the beam (azimuth {:.3g}, zenith {:.3g} deg), {:.3g} m2 at {:.0f} m\n",
+      model.range, model.range_source, direction_deg, degrees_from_radians(model.azimuth),
+      degrees_from_radians(model.zenith), model.point_variance(), model.range_distance);
+  const auto known = [](const std::optional<double>& value, double scale, const char* unit,
+                        const std::string& source) {
+    return value ? fmt::format("{:.3g} {} ({})", scale * *value, unit, source)
+                 : std::string("not known");
+  };
+  say("shared by all points, which does not average out: direction {}, range {}\n",
+      known(model.shared_direction, degrees_from_radians(1), "deg", model.shared_direction_source),
+      known(model.shared_range, 1, "m", model.shared_range_source));
+  Table table({"program", "setting", "value", "unit"});
+  table.add({"VoxelMap", "noise_model/ranging_cov", fmt::format("{:.3g}", model.range), "m"});
+  table.add({"VoxelMap", "noise_model/angle_cov", fmt::format("{:.3g}", direction_deg), "deg"});
+  table.add({"FAST-LIVO2", "lio/dept_err", fmt::format("{:.3g}", model.range), "m"});
+  table.add({"FAST-LIVO2", "lio/beam_err", fmt::format("{:.3g}", direction_deg), "deg"});
+  table.add(
+      {"Point-LIO", "mapping/lidar_meas_cov", fmt::format("{:.3g}", model.point_variance()), "m2"});
+  table.add({"FAST-LIO", "LASER_POINT_COV", fmt::format("{:.3g}", model.point_variance()), "m2"});
+  table.print();
 }
 
 void print_outcome(const EstimatedRecording& outcome) {
@@ -140,6 +166,7 @@ void print_outcome(const EstimatedRecording& outcome) {
   say("\nresiduals: {:.3f} times the stated variance, autocorrelation factor {:.3f}; variances of "
       "single shots multiplied by {:.3f}\n",
       e.unit_variance, e.autocorrelation.factor, e.variance_factor);
+  if (outcome.noise_model) print_noise_model(*outcome.noise_model);
   if (outcome.evaluation) {
     say("\nrotation angle rmse:");
     for (std::size_t i = 0; i < outcome.evaluation->rotation_angle_rmse.size(); ++i) {
@@ -184,8 +211,8 @@ Run declare_estimate(CLI::App& verb) {
   add_many_options(verb, o.many, "Recordings, each of one sensor, of any known format");
   verb.add_option("-o,--output", o.many.output,
                   "Folder for calibration.yaml, states.nc, report.json and report.html; for "
-                  "several inputs, a folder of such folders (default: none)");
-  verb.add_flag("--no-report", o.no_report, "Write no report.json and report.html");
+                  "several inputs, one subfolder each (default: none)");
+  verb.add_flag("--no-report", o.no_report, "Do not write report.json and report.html");
   add_choice(
       verb, "--method", o.method, {"map", "ekf"},
       "map: the most probable motion of the rotors, from all shots at once; ekf: the paper's "
@@ -193,10 +220,9 @@ Run declare_estimate(CLI::App& verb) {
   verb.add_option(
       "--rate-hz", o.rate_hz,
       "Shots per second to use, Hz, or 'full' for all (default: full with map, 1000 with ekf)");
-  verb.add_option(
-      "--noise-angle-deg", o.noise_angle_deg,
-      "1 sigma of azimuth and zenith before rounding, deg, held at this (default: found in the "
-      "data; with ekf the sensor's)");
+  verb.add_option("--noise-angle-deg", o.noise_angle_deg,
+                  "1 sigma of azimuth and zenith before rounding, deg, held at this (default: "
+                  "estimated from the data; with ekf the sensor's)");
   verb.add_option("--sensor", o.sensor,
                   "Preset by name, or a preset or calibration file (default: from the recording)");
   add_reading_options(verb, o.reading);
@@ -213,6 +239,9 @@ Run declare_estimate(CLI::App& verb) {
                   "'none' (constant acceleration); or 'auto' (random walks of the speed and, with "
                   "map, of the acceleration, found by maximum likelihood)")
       ->capture_default_str();
+  verb.add_flag("--noise-model", o.noise_model,
+                "Print the errors of points, under the names used in lidar odometry, and the part "
+                "common to all points");
   verb.add_option("--truth", o.truth,
                   "Truth of a simulated recording (OUT.truth.yaml) to compare the estimate with");
   return [options, &verb](const CommonOptions& common) {
@@ -221,7 +250,7 @@ Run declare_estimate(CLI::App& verb) {
     const jobs::InputPlan plan = jobs::plan_inputs(options->many, work, cancellable());
     if (!options->truth.empty() && plan.jobs.size() > 1) {
       throw InvalidArgument(
-          fmt::format("--truth is of one recording, and there are {}", plan.jobs.size()));
+          fmt::format("--truth is for one recording, and there are {}", plan.jobs.size()));
     }
     if (plan.many) return run_inputs(plan, work, options->many, verb, common);
     options->input = plan.jobs.front().input;

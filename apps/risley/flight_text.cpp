@@ -36,7 +36,7 @@ void print_control(const FlightCalibration& c) {
   table.print();
 }
 
-/// What the strips say of the trajectory and the ground; jumps and factors are warnings.
+/// Findings of the strips on the trajectory and the ground; jumps and factors are warnings.
 void print_trajectory_fit(const FlightCalibration& c) {
   const NumberText delay = number_text(1e3 * c.attitude_delay.value, 1e3 * c.attitude_delay.sigma);
   say("\nattitudes late against positions by {} +- {} ms; jumps of the trajectory: {}", delay.value,

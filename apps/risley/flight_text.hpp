@@ -7,7 +7,7 @@
 
 namespace risley::app {
 
-/// The lines on datum and what is undetermined.
+/// The lines on the datum and the undetermined parameters.
 void print_judgement(const calibration::FlightJudgement& judgement);
 
 void print_flight(const jobs::CalibratedFlight& outcome);

@@ -43,11 +43,11 @@ constexpr std::array<Group, 10> kGroups = {{
     {"Planning", "--plan --duration-s --scene --empty-circle-m --report"},
     {"What is written",
      "--states --force --truth --covariance --beam-divergence --common-factors --las-scale-m "
-     "--time --beam-origin-map --directions --format"},
+     "--time --beam-origin-map --directions --format --topic --frame-id --frame-rate-hz --message"},
     {"Running", "--no-progress --verbose --threads --seed"},
 }};
 
-/// What stands for the value of an option whose type says too little.
+/// Placeholder for the value of an option whose type is not informative.
 constexpr std::pair<std::string_view, const char*> kValues[] = {
     {"--sensor", "NAME|FILE"},
     {"--calibration", "NAME|FILE"},
@@ -76,7 +76,7 @@ bool holds_word(std::string_view words, std::string_view word) {
   return false;
 }
 
-/// Where the text of a line's last column begins.
+/// Start of the last column's text in a line.
 std::size_t hanging_indent(std::string_view line) {
   const std::size_t begin = std::min(line.find_first_not_of(' '), line.size());
   const std::size_t gap = line.find("  ", begin);
@@ -102,7 +102,7 @@ std::string wrapped_line(std::string_view line, std::size_t columns) {
   return result + std::string(line);
 }
 
-/// The values that an option takes, empty unless they are a list of words.
+/// The allowed values of an option, empty unless they are a list of words.
 std::vector<std::string> choices_of(const CLI::Option& option) {
   const std::string type = option.get_type_name();  // such as TEXT:{map,ekf}
   const std::size_t begin = type.find(":{"), end = type.rfind('}');
@@ -124,7 +124,7 @@ std::string names_of(const CLI::Option& option) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// What stands for the value of an option. Empty: it takes none.
+/// Placeholder for the value of an option. Empty: it takes none.
 std::string value_of(const CLI::Option& option, const std::vector<std::string>& choices) {
   if (option.get_type_size() == 0) return {};
   constexpr std::size_t kRoom = 18;
@@ -195,7 +195,7 @@ std::string section(std::string_view heading, const Options& options) {
   return text;
 }
 
-/// The headings that an app's options have apart from the usual and the common ones.
+/// The headings of an app's options other than the usual and the common ones.
 std::vector<std::string> headings_of(const CLI::App& app) {
   std::vector<std::string> found, headings = app.get_groups();
   const auto take = [&](const std::string& heading) {

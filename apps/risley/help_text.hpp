@@ -10,10 +10,10 @@
 
 namespace risley::app {
 
-/// Columns of a terminal that help fits into.
+/// Width of a terminal for the help, in columns.
 inline constexpr std::size_t kHelpColumns = 100;
 
-/// Heading of the options of every verb that the short help shows.
+/// Heading, in the short help, of every verb's options.
 inline constexpr const char* kCommonGroup = "Common options";
 
 /// Sorts a verb's options into what --help shows and the headings under which --help-all shows the

@@ -99,8 +99,7 @@ ExitStatus run_identify(const IdentifyCommandOptions& options, const CommonOptio
   }
   log_warnings(outcome.warnings);
   if (!options.output.empty() && !outcome.written) {
-    spdlog::warn("{} was not written: {}; --force writes it all the same", options.output,
-                 outcome.words);
+    spdlog::warn("{} was not written: {}; --force writes it anyway", options.output, outcome.words);
   }
   if (common.json) {
     print_json(common, json::of(outcome), outcome.sensor.sensor.provenance);
@@ -118,7 +117,7 @@ Run declare_identify(CLI::App& verb) {
   verb.add_option("INPUT", o.input, "Recording of one sensor, of any known format")->required();
   verb.add_option("-o,--output", o.output,
                   "Preset to write (.yaml), which other verbs take as --sensor (default: none)");
-  verb.add_flag("--force", o.force, "Write the preset even if the answer is uncertain");
+  verb.add_flag("--force", o.force, "Write the preset even if the result is uncertain");
   verb.add_option("--most-prisms", o.most_prisms, "Largest number of prisms to try")
       ->check(CLI::Range(1, 3))
       ->capture_default_str();

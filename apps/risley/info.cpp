@@ -46,7 +46,7 @@ std::string range_text(const std::optional<ValueRange>& range, double scale, int
                      decimals, unit);
 }
 
-/// What only sensors of the second generation report.
+/// Properties that only sensors of the second generation report.
 void add_numbered(const recordings::RecordingHeader& header, const recordings::Device& device,
                   const recordings::NumberedAudit& audit, Table& table) {
   const auto add_known = [&table](const char* name, const std::string& value) {
@@ -138,8 +138,8 @@ void print_excerpt(const Excerpt& excerpt) {
   say("  holds: {}\n  does not hold: {}\n", fmt::join(contents.holds, "; "),
       fmt::join(contents.lacks, "; "));
   if (excerpt.rounded) {
-    say("  Directions are rounded because coordinates in whole steps give away their range; "
-        "it is left\n  known to a factor of two.\n");
+    say("  Directions are rounded because coordinates in whole steps reveal the range; it\n  "
+        "remains known to a factor of two.\n");
   }
 }
 
@@ -162,7 +162,7 @@ ExitStatus run_trajectory_info(const InfoCommandOptions& options, const CommonOp
 
 ExitStatus run_info(const InfoCommandOptions& options, const CommonOptions& common) {
   if (options.share_ranges && options.share.empty()) {
-    throw InvalidArgument("--share-ranges needs --share: it says what an excerpt holds");
+    throw InvalidArgument("--share-ranges needs --share: it sets the contents of an excerpt");
   }
   const recordings::ReadOptions reading = read_options(options.reading);
   if (jobs::is_trajectory({options.input, options.accuracy, options.topic}, reading,
@@ -203,7 +203,7 @@ Run declare_info(CLI::App& verb) {
                   "second, without serial number, date, intensities and ranges")
       ->type_name("OUT");
   verb.add_flag("--share-ranges", options->share_ranges,
-                "Keep the ranges in the excerpt, which show the place of the recording; only "
+                "Keep the ranges in the excerpt, which reveal the place of the recording; only "
                 "calibrations on walls need them");
   add_reading_options(verb, options->reading);
   return [options, &verb](const CommonOptions& common) {
@@ -213,7 +213,7 @@ Run declare_info(CLI::App& verb) {
     const jobs::InputPlan plan = jobs::plan_inputs(options->many, work, cancellable());
     if (!options->share.empty() && plan.many) {
       throw InvalidArgument(
-          fmt::format("--share is of one recording, and there are {}", plan.jobs.size()));
+          fmt::format("--share is for one recording, and there are {}", plan.jobs.size()));
     }
     if (plan.many) return run_inputs(plan, work, options->many, verb, common);
     options->input = plan.jobs.front().input;

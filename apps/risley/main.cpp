@@ -55,7 +55,7 @@ ExitStatus run_command(const std::vector<std::string>& words) {
   CommandLine::Parsed parsed;
   try {
     parsed = line.parse(words);
-  } catch (...) {  // a result that an option names is not to be used
+  } catch (...) {  // a result named by an option is not usable
     CommonOptions common = line.common();
     common.json = std::find(words.begin(), words.end(), "--json") != words.end();
     if (!words.empty()) common.verb = words.front();
@@ -83,7 +83,7 @@ ExitStatus run_command(const std::vector<std::string>& words) {
   return run_verb(line.run_of(*parsed.verb), common);
 }
 
-/// The message of a log entry on one line that a terminal does not obey.
+/// The message of a log entry on one line without control characters.
 class PrintableMessage final : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
@@ -106,8 +106,8 @@ void start_log() {
   spdlog::set_level(spdlog::level::warn);
 }
 
-/// Memory that was used once is used again instead of being given back and asked for anew: every
-/// page would have to be zeroed again by the kernel.
+/// Freed memory is kept for reuse instead of being returned to the kernel, which would have to zero
+/// every page again.
 void keep_freed_memory() {
 #ifdef M_MMAP_THRESHOLD
   constexpr int kColumn = 1 << 25, kAll = std::numeric_limits<int>::max();
@@ -116,7 +116,7 @@ void keep_freed_memory() {
 #endif
 }
 
-/// Runs a command on a stack that is large enough, whatever the limit for that of the process.
+/// Runs a command on a large enough stack, whatever the stack limit of the process.
 ExitStatus run_on_large_stack(const std::vector<std::string>& words) {
   struct Task {
     const std::vector<std::string>& words;
@@ -139,10 +139,10 @@ ExitStatus run_on_large_stack(const std::vector<std::string>& words) {
   return task.status;
 }
 
-/// An exception that no handler caught is a bug, or memory ran out where it could not be reported.
+/// An uncaught exception is a bug, or memory ran out where it could not be reported.
 [[noreturn]] void end_by_fault() {
   constexpr std::string_view kWords =
-      "risley: error: internal error or no memory: outputs in the making were given up\n";
+      "risley: error: internal error or out of memory: unfinished outputs were discarded\n";
   [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kWords.data(), kWords.size());
   ::_exit(kFault);
 }

@@ -23,12 +23,12 @@ using jobs::InputJob;
 using jobs::InputResult;
 using jobs::InputRun;
 
-/// Options that change where and how results are printed, not what they are.
+/// Options that affect where and how results are printed, not the results.
 constexpr std::array<std::string_view, 12> kOfPrinting = {
     "INPUT",     "--list",  "--output",      "--table",   "--resume", "--json",
     "--threads", "--quiet", "--no-progress", "--verbose", "--help",   "--help-all"};
 
-/// All that decides results apart from the inputs.
+/// Everything that determines results apart from the inputs.
 std::string settings_text(const CLI::App& verb, const CommonOptions& common) {
   std::vector<std::pair<std::string, std::vector<std::string>>> settings;
   for (const CLI::Option* option : verb.get_options()) {
@@ -102,8 +102,8 @@ ExitStatus run_several(const jobs::InputPlan& plan, const jobs::InputWork& work,
   }
   if (!whole) {
     spdlog::warn("{}; {}", summary(run, plan, work),
-                 plan.journal.empty() ? "what is not done has to be done again"
-                                      : "the same command with --resume does the rest");
+                 plan.journal.empty() ? "unfinished inputs have to be processed again"
+                                      : "the same command with --resume continues");
     throw Cancelled();
   }
   if (typed.json) {
@@ -149,8 +149,30 @@ bool are_several(const jobs::ManyInputsOptions& wishes) {
 
 bool output_is_folder(const jobs::ManyInputsOptions& wishes) {
   std::error_code ignored;
+  if (!are_several(wishes) && wishes.output.ends_with(".db3")) return false;  // a folder, and a bag
   return are_several(wishes) || wishes.output.ends_with('/') ||
          std::filesystem::is_directory(wishes.output, ignored);
+}
+
+CommonOptions with_recordings_found(jobs::ManyInputsOptions& wishes, CommonOptions common) {
+  std::vector<std::string> found;
+  const auto add = [&found](const jobs::InputNames& names) {
+    for (jobs::Input& input : jobs::find_inputs(names, cancellable())) {
+      found.push_back(std::move(input.path));
+    }
+  };
+  for (const std::string& name : wishes.names) {
+    jobs::are_many({{name}, "", {}}) ? add({{name}, "", {}}) : found.push_back(name);
+  }
+  if (!wishes.list.empty()) {
+    add({{}, wishes.list, {}});
+    common.files.push_back(wishes.list);
+  }
+  if (found == wishes.names) return common;
+  wishes.names = std::move(found);
+  common.inputs.clear();
+  for (const std::string& name : wishes.names) add_files(name, common.inputs);
+  return common;
 }
 
 void log_words(const std::string& words, bool is_wrong) {

@@ -48,7 +48,10 @@ void print_emitters(const estimation::EmitterComparison& emitters, TrainShape sh
   }
   fmt::print("\n");
   table.print();
-  fmt::print("\nalone: as many shots of emitter {}, with what is free for a single one.\n", alone);
+  fmt::print(
+      "\nalone: the same number of shots, all of emitter {}, with the free parameters of one "
+      "emitter.\n",
+      alone);
   for (const auto& weak : emitters.untold_alone) {
     fmt::print("not determined by emitter {} alone: {}\n", alone, direction_text(weak));
   }
@@ -69,8 +72,7 @@ void print_observability(const JudgedObservability& judged) {
                quantity.twins.front().first, fmt::format("{:.4f}", quantity.twins.front().second)});
   }
   table.print();
-  say("\nsigma: Cramer-Rao bound. In brackets: held fixed by default; the bound if it were "
-      "freed.\n");
+  say("\nsigma: Cramer-Rao bound. In brackets: held by default; the bound if it were freed.\n");
   if (!o.emitters.bounds.empty()) print_emitters(o.emitters, shape);
   for (const auto& weak : o.unobservable) {
     say("not determined by such data: {}\n", direction_text(weak));

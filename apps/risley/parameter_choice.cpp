@@ -64,7 +64,7 @@ void add_simulated_values(CLI::App& verb, SimulatedValues& values) {
       ->allow_extra_args(false)
       ->take_all();
   verb.add_option("--reported", values.reported,
-                  "Set what the sensor believes a parameter to be, if not the truth (repeatable); "
+                  "Set the sensor's own value of a parameter, if not the truth (repeatable); "
                   "'nominal' sets every error parameter to 0 (default: the truth)")
       ->type_name("NAME=VALUE|nominal")
       ->expected(1)

@@ -13,7 +13,7 @@
 
 namespace risley::app {
 
-/// What the user says of parameters, as typed.
+/// Options on parameters, as typed.
 struct ParameterWishes {
   std::vector<std::string> fixed, freed;
 };
@@ -34,9 +34,9 @@ void take_simulated_values(const SimulatedValues& values, jobs::SimulationOption
 /// NAME=VALUE, the value in SI units where the name is known. @throws InvalidArgument
 std::pair<std::string, double> assignment(const std::string& text);
 
-/// NAME and NAME=VALUE as jobs take them; they refuse unknown names. @throws InvalidArgument
+/// NAME and NAME=VALUE as jobs accept them; jobs refuse unknown names. @throws InvalidArgument
 jobs::HeldParameters held_parameters(const std::vector<std::string>& fixed);
-/// The same of NAME=VALUE alone.
+/// The same for NAME=VALUE alone.
 jobs::ParameterValues parameter_values(const std::vector<std::string>& assignments);
 
 }  // namespace risley::app

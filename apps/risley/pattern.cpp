@@ -83,8 +83,8 @@ void print_coverage(const sensors::PatternCoverage& coverage) {
     const double time = coverage.time_to_cover(0.01 * percent);
     if (std::isfinite(time)) say("{} % covered after {:.3g} s\n", percent, time);
   }
-  say("covered: cells of {:g} degree with a shot, of those that {:g} s reach; gap: diameter "
-      "of the largest empty circle\n",
+  say("covered: cells of {:g} degree with a shot, among those that {:g} s reach; gap: diameter of "
+      "the largest empty circle\n",
       degrees_from_radians(coverage.cell), coverage.field_after);
 }
 
@@ -95,7 +95,7 @@ void print_written(const jobs::WrittenPattern& written, const std::string& outpu
         written.format == "livox-csv" || written.format == "npy" ? " and are NaN" : "");
   }
   if (written.helios) {
-    say("against the pattern itself {:.3g} degree (root mean square; {}), {:.3g} at most, over {} "
+    say("deviation from the pattern: {:.3g} degree (root mean square; {}), {:.3g} at most, over {} "
         "shots; a shot at time t is at t {} {:.6g} s there\n",
         degrees_from_radians(written.helios->rms), offset_text(written.helios->rms),
         degrees_from_radians(written.helios->worst), grouped(written.helios->compared),

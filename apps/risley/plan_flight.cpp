@@ -64,7 +64,7 @@ ExitStatus run_flight_plan(jobs::PlanFlightOptions options, const std::string& p
                            const std::string& page, const CommonOptions& common) {
   if (!platform.accuracy.empty() || !platform.crs.empty() || !platform.datum.empty()) {
     throw InvalidArgument(
-        "--accuracy, --crs and --datum are of a trajectory that was flown: a plan has none");
+        "--accuracy, --crs and --datum are for a trajectory that was flown: a plan has none");
   }
   require_apart(common, {page});
   jobs::load_flight_plan({plan, platform.mount, platform.errors, scene}, options);

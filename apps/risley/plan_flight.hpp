@@ -11,9 +11,9 @@
 
 namespace risley::app {
 
-/// @param options   without what the files hold
+/// @param options  except those read from the files
 /// @param plan      file
-/// @param platform  mount and the errors of the trajectory; nothing else may be given
+/// @param platform  mount and the errors of the trajectory; other members must be empty
 /// @param scene     file of a terrain; may be empty
 /// @param page      to write; may be empty
 ExitStatus run_flight_plan(jobs::PlanFlightOptions options, const std::string& plan,

@@ -8,7 +8,7 @@
 
 namespace risley::app {
 
-/// Options that say how a sensor moved: trajectory, mount, and how wrong the trajectory may be.
+/// Options on the sensor's motion: trajectory, mount, and the trajectory's errors.
 void add_platform_options(CLI::App& verb, jobs::PlatformFiles& files);
 
 }  // namespace risley::app

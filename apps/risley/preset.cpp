@@ -88,7 +88,7 @@ ExitStatus check_presets(const PresetOptions& options, const CommonOptions& comm
 Run declare_preset(CLI::App& verb) {
   const auto options = std::make_shared<PresetOptions>();
   PresetOptions& o = *options;
-  const auto chosen = std::make_shared<Run>();  // apart from the options, which every run holds
+  const auto chosen = std::make_shared<Run>();  // separate from the options, which every run holds
   verb.require_subcommand(1);
   const auto action = [&](const char* name, const char* description, const Run& run) {
     CLI::App* sub = verb.add_subcommand(name, description);
@@ -109,7 +109,7 @@ Run declare_preset(CLI::App& verb) {
   show->add_option("NAME", o.name, "Name of a built-in preset")->required();
   output(show);
   CLI::App* check =
-      action("check", "Check whether files are valid presets, and say where they are not",
+      action("check", "Check preset files, and list their errors",
              [options](const CommonOptions& common) { return check_presets(*options, common); });
   check->add_option("FILE", o.files, "Preset or calibration files")->required();
   CLI::App* fresh = action(

@@ -53,13 +53,12 @@ void add_reading_options(CLI::App& verb, ReadingWishes& wishes) {
       ->type_name("SERIAL|TOPIC|INDEX");
   verb.add_option(
       "--shot-rate-hz", wishes.shot_rate_hz,
-      "Shots per second, Hz, for recordings without times or with bad ones: times are counted from "
-      "the shots, including those without a return (default: the times in the file)");
-  verb.add_option(
-          "--extrinsics", wishes.extrinsics_deg,
-          "Rotation of the sensor in the recording's frame, deg: recorded = Rz(yaw) "
-          "Ry(pitch) Rx(roll) sensor. Shots are turned back by it; 0,0,0 leaves them as they "
-          "are (default: what the recording states)")
+      "Shots per second, Hz, for recordings with missing or bad times: times are counted from the "
+      "shots, including those without a return (default: the times in the file)");
+  verb.add_option("--extrinsics", wishes.extrinsics_deg,
+                  "Rotation of the sensor in the recording's frame, deg: recorded = Rz(yaw) "
+                  "Ry(pitch) Rx(roll) sensor. The shots are rotated back by it; 0,0,0 leaves them "
+                  "unchanged (default: as stated in the recording)")
       ->type_name("YAW,PITCH,ROLL");
 }
 

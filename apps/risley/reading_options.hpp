@@ -16,7 +16,7 @@ struct ReadingWishes {
   std::string device;  ///< SERIAL, TOPIC or INDEX; empty: not given
   std::optional<double> shot_rate_hz;
   std::string extrinsics_deg;  ///< YAW,PITCH,ROLL; empty: not given
-  bool every_device = false;   ///< of a verb that makes one file of each
+  bool every_device = false;   ///< of a verb that makes one file per input
 };
 
 /// Declares --device, --shot-rate-hz and --extrinsics.
@@ -25,8 +25,8 @@ void add_reading_options(CLI::App& verb, ReadingWishes& wishes);
 /// Declares --every-device, too.
 void add_every_device(CLI::App& verb, ReadingWishes& wishes);
 
-/// Gives every sensor of recordings of several a job of its own where that was asked for; the
-/// serial number, or the number of the sensor, is added to the names of outputs.
+/// Splits recordings of several sensors into one job per sensor, if requested; the serial number,
+/// or the number of the sensor, is added to the names of outputs.
 /// @throws FileError
 void split_by_device(const ReadingWishes& wishes, jobs::InputPlan& plan);
 

@@ -20,11 +20,13 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/text.hpp"
+#include "risley/jobs/live_bags.hpp"
 #include "risley/jobs/record_sensors.hpp"
 #include "risley/report/watch_page.hpp"
 #include "risley/wire/event_server.hpp"
 
 #include "command.hpp"
+#include "message_options.hpp"
 #include "table.hpp"
 
 namespace risley::app {
@@ -37,6 +39,9 @@ struct RecordChoices {
                                                 imu = "yes";
   bool list = false, passive = false;
   std::vector<std::string> serials;
+  std::string publish;
+  jobs::LivePointsOptions points;
+  std::string calibration;
   std::optional<double> duration_s;
   double find_s = 2.5;
   std::uint16_t data_port = 56001;
@@ -68,6 +73,10 @@ jobs::RecordOptions job_of(const RecordChoices& options) {
   job.output = options.output;
   job.watch_optics = !options.optics.empty() || !options.watch.empty();
   if (options.optics != kOwnBeginning) job.optics_reference = options.optics;
+  if (!options.publish.empty()) {
+    job.publish = options.points;
+    job.publish->calibration = options.calibration;
+  }
   return job;
 }
 
@@ -83,7 +92,7 @@ void print_found(const std::vector<jobs::FoundSensor>& found) {
 std::string cause_text(const jobs::RecordedGap& gap) {
   switch (gap.cause) {
     case recordings::livox::GapCause::clock:
-      return "the sensor's clock jumped or began again";
+      return "the sensor's clock jumped or restarted";
     case recordings::livox::GapCause::session:
       return fmt::format("between two sessions, {} packets at most", grouped(gap.lost.value_or(0)));
     case recordings::livox::GapCause::loss:
@@ -92,7 +101,7 @@ std::string cause_text(const jobs::RecordedGap& gap) {
   return fmt::format("{} packets", grouped(gap.lost.value_or(0)));
 }
 
-/// What the clock of a sensor did, and what it said of itself; the first lines are enough.
+/// Clock events and reports of a sensor; the first lines are enough.
 void print_clock(const jobs::RecordedSensor& one) {
   constexpr std::size_t kMostLines = 20;
   for (std::size_t i = 0; i < std::min(one.clocks.size(), kMostLines); ++i) {
@@ -147,12 +156,24 @@ std::unique_ptr<wire::EventServer> serve_page(const RecordChoices& options,
   return server;
 }
 
-/// An event of the page: one line, whatever texts came from the network.
+/// Viewers or nodes that receive points while the recording runs.
+std::unique_ptr<jobs::LiveBag> publish_points(const RecordChoices& options,
+                                              const CommonOptions& common) {
+  if (options.publish.empty()) return nullptr;
+  auto points = jobs::open_live_bag(options.publish);
+  if (!common.quiet) {
+    fmt::print(stderr, "points at {}\n", points->place());
+    std::fflush(stderr);
+  }
+  return points;
+}
+
+/// An event of the page: one line, even if texts from the network contain line breaks.
 std::string event_of(const jobs::LiveRecording& live) {
   return json::of(live).dump(-1, ' ', true, json::Json::error_handler_t::replace);
 }
 
-/// What the optics say in a few words.
+/// State of the optics in a few words.
 std::string optics_words(const jobs::OpticsHealth& health) {
   const estimation::RunningState& state = health.state;
   if (!health.words.empty()) return "not watched";
@@ -203,6 +224,21 @@ class StatusLine {
   bool visible_, shown_ = false;
 };
 
+void print_published(const std::string& serial, const jobs::PublishedPoints& points) {
+  if (!points.words.empty()) say("{}: no points were published: {}\n", serial, points.words);
+  say("{}: {} points in {} frames published, with {}", serial, grouped(points.points),
+      grouped(points.frames), points.calibration.empty() ? "no preset" : points.calibration);
+  if (points.latency) {
+    say("; 99 % of the frames within {:.0f} ms of their first packet, all within {:.0f} ms",
+        1e3 * *points.latency, 1e3 * *points.longest_latency);
+  }
+  say("\n");
+  if (points.missing_packets > 0) {
+    say("{}: {} packets came too late or too fast for it, but are in the file\n", serial,
+        grouped(points.missing_packets));
+  }
+}
+
 void print_recorded(const jobs::RecordedSensors& recorded) {
   for (const auto& file : recorded.files) {
     say("{}: {:.1f} s, {} bytes\n", file.path, recorded.duration, grouped(file.bytes));
@@ -222,10 +258,18 @@ void print_recorded(const jobs::RecordedSensors& recorded) {
     print_clock(one);
   }
   for (const jobs::RecordedSensor& one : recorded.sensors) {
+    if (one.published) print_published(one.sensor.serial, *one.published);
+  }
+  if (recorded.viewers) {
+    say("{} viewers, {} frames sent, {} dropped for slow viewers\n",
+        grouped(recorded.viewers->connections), grouped(recorded.viewers->sent_messages),
+        grouped(recorded.viewers->dropped_messages));
+  }
+  for (const jobs::RecordedSensor& one : recorded.sensors) {
     if (!one.optics) continue;
     const jobs::OpticsHealth& health = *one.optics;
     using Phase = estimation::RunningState::Phase;
-    std::string words = "no change of the optics seen";
+    std::string words = "no change of the optics detected";
     if (!health.words.empty()) {
       words = "optics not watched: " + health.words;
     } else if (health.state.alarm) {
@@ -237,7 +281,7 @@ void print_recorded(const jobs::RecordedSensors& recorded) {
     }
     say("{}: {}\n", one.sensor.serial, words);
     if (health.dropped_packets > 0) {
-      say("{}: the watch was too slow for {} packets, which are in the file all the same\n",
+      say("{}: the watch was too slow for {} packets, which are still in the file\n",
           one.sensor.serial, grouped(health.dropped_packets));
     }
   }
@@ -254,13 +298,13 @@ Run declare_record(CLI::App& verb) {
       "FILE.unfinished. "
       "Sensors of the second generation are written to the .lvx2 of this name, others to the .lvx");
   verb.add_option("--interface", o.interface,
-                  "IPv4 address of this machine where the sensors are (default: the only one)")
+                  "IPv4 address of this machine on the sensors' network (default: the only one)")
       ->type_name("ADDRESS");
   auto* list = verb.add_flag("--list", o.list, "Only list the sensors that are found");
   verb.add_flag("--passive", o.passive,
-                "Only listen: send nothing, and record what sensors send to this address")
+                "Only listen: send nothing, and record the packets that arrive at this address")
       ->excludes(list);
-  verb.add_option("--data-port", o.data_port, "Port of the data that --passive listens to")
+  verb.add_option("--data-port", o.data_port, "Data port on which --passive listens")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   verb.add_option("--serial", o.serials,
@@ -275,8 +319,8 @@ Run declare_record(CLI::App& verb) {
                   "Length of the recording, s (default: until Ctrl-C or SIGTERM)")
       ->excludes(list);
   add_choice(verb, "--coordinates", o.coordinates, {"spherical", "cartesian", "as-is"},
-             "What the sensors are to send; those of the second generation send Cartesian "
-             "coordinates unless as-is");
+             "Coordinates to request from the sensors; those of the second generation send "
+             "Cartesian coordinates unless as-is");
   add_choice(verb, "--return-mode", o.return_mode,
              {"first", "strongest", "dual", "triple", "as-is"},
              "Returns per shot to request from the sensors");
@@ -290,12 +334,24 @@ Run declare_record(CLI::App& verb) {
                   "port of 127.0.0.1 or at an address and port of this machine")
       ->type_name("[ADDRESS:]PORT")
       ->excludes(list);
-  add_choice(verb, "--imu", o.imu, {"yes", "no"}, "Inertial samples, of sensors that have them");
+  auto* publish =
+      verb.add_option("--publish", o.publish,
+                      "Send points with covariance during the recording: to Foxglove-compatible "
+                      "viewers at this port of 127.0.0.1 or at an address and port of this "
+                      "machine, or to ROS 2 in this DDS domain (default: ROS_DOMAIN_ID or 0)")
+          ->type_name("foxglove:[ADDRESS:]PORT|dds[:DOMAIN]")
+          ->excludes(list);
+  verb.add_option("--calibration", o.calibration,
+                  "Calibration of the points that are published (default: the preset of the "
+                  "sensor's type, with directions as the sensor reports them)")
+      ->needs(publish);
+  add_topic_options(verb, o.points.messages, o.points.messages.topic, "that are published");
+  add_choice(verb, "--imu", o.imu, {"yes", "no"}, "Inertial samples, from sensors that have them");
   return [options](const CommonOptions& common) {
     end_in_own_time();
-    const jobs::RecordOptions job = job_of(*options);
+    jobs::RecordOptions job = job_of(*options);
     if (options->list) {
-      if (!options->output.empty()) throw InvalidArgument("--list writes no file: leave out -o");
+      if (!options->output.empty()) throw InvalidArgument("--list writes no file: omit -o");
       ProgressBar bar("looking for sensors", common);
       const auto found = jobs::find_sensors(job, bar.progress());
       if (common.json) {
@@ -309,6 +365,8 @@ Run declare_record(CLI::App& verb) {
     jobs::RecordedSensors recorded;
     {
       const auto page = serve_page(*options, common);
+      const auto points = publish_points(*options, common);
+      if (points) job.publish->bag = points.get();
       StatusLine line(common);
       recorded = jobs::record_sensors(
           job,
@@ -321,6 +379,7 @@ Run declare_record(CLI::App& verb) {
             line.show(live);
             if (page) page->send(event_of(live));
           });
+      if (points) recorded.viewers = points->viewers();
     }
     if (common.json) {
       print_json(common, json::of(recorded));

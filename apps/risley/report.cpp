@@ -29,7 +29,7 @@ struct ReportCommandOptions {
 report::Report report_of(const std::string& path) {
   const fs::path folder(path), data = folder / "report.json";
   if (!fs::is_directory(folder)) {
-    throw FileError(path, {}, "expected a folder that estimate or calibrate wrote");
+    throw FileError(path, {}, "expected a folder written by estimate or calibrate");
   }
   if (!fs::exists(data)) {
     throw FileError(data.string(), {},
@@ -78,7 +78,7 @@ ExitStatus report_two(const std::string& a, const std::string& b, const std::str
 Run declare_report(CLI::App& verb) {
   const auto options = std::make_shared<ReportCommandOptions>();
   verb.add_option("DIR", options->folders,
-                  "Folder that estimate -o or calibrate -o wrote, or two of them to compare")
+                  "Folder written by estimate -o or calibrate -o, or two of them to compare")
       ->required()
       ->expected(1, 2);
   verb.add_option("-o,--output", options->page,

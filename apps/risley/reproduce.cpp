@@ -152,7 +152,7 @@ Run declare_reproduce(CLI::App& verb) {
       ->required();
   verb.add_flag(
       "--full", o.full,
-      "Take more random draws, and all 100,000 shots per second for Table 3 (takes minutes)");
+      "Use more random draws, and all 100,000 shots per second for Table 3 (takes minutes)");
   verb.add_option("--recording", o.recording,
                   "Recording of a real, stationary Mid-40 for section 3.1");
   add_reading_options(verb, o.reading);

@@ -35,7 +35,7 @@ void require_folder_apart(const CommonOptions& common, const std::string& folder
   outputs.insert(outputs.end(), {"calibration.yaml", "report.json", "report.html"});
   for (std::string& name : outputs) name = (std::filesystem::path(folder) / name).string();
   require_apart(common, outputs);
-  // Before an hour of computing; of rotor states not all are written.
+  // Checked before an hour of computation; some rotor states are not written.
   for (const std::string& name : outputs) {
     if (!name.ends_with(".nc")) jobs::require_own_result(name);
   }
@@ -48,7 +48,7 @@ void write_page_file(const std::string& path, const std::string& html) {
     std::ifstream(path, std::ios::binary).read(head.data(), 15);
     if (lower_case(head) != "<!doctype html>" || !jobs::is_own_result(path)) {
       throw FileError(path, {},
-                      "is not a page of risley, and would be replaced by one: give another name");
+                      "is not a page of risley, and would be overwritten: give another name");
     }
   }
   io::write_text_file(path, html);

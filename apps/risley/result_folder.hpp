@@ -25,7 +25,7 @@ jobs::ResultFiles result_files(const std::string& folder, const std::string& sta
 void require_folder_apart(const CommonOptions& common, const std::string& folder,
                           std::vector<std::string> states);
 
-/// Writes a page. @throws FileError, also where it would replace a file that is none of risley's
+/// Writes a page. @throws FileError, also if it would overwrite a file that risley did not write
 void write_page_file(const std::string& path, const std::string& html);
 
 /// report.json and the page report.html.

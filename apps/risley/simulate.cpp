@@ -16,6 +16,7 @@
 #include "risley/trajectories/trajectory_file.hpp"
 
 #include "command.hpp"
+#include "message_options.hpp"
 #include "parameter_choice.hpp"
 #include "table.hpp"
 
@@ -30,6 +31,7 @@ struct SimulateOptions {
       noise_range_m;
   SimulatedValues values;
   std::vector<double> start_angles_deg;
+  MessageWishes messages;
 };
 
 jobs::SimulationOptions job_of(const SimulateOptions& options, const CommonOptions& common) {
@@ -152,9 +154,10 @@ Run declare_simulate(CLI::App& verb) {
           "--start-angles-deg", o.start_angles_deg,
           "Rotation angles of the prisms at the start, deg, as A,B or A,B,C (default: random)")
       ->delimiter(',');
+  add_message_options(verb, o.messages, "custom");
   return [options](const CommonOptions& common) {
-    const simulation::SimulationSettings settings =
-        jobs::simulation_settings(job_of(*options, common));
+    simulation::SimulationSettings settings = jobs::simulation_settings(job_of(*options, common));
+    settings.writing.messages = message_options(options->messages);
     require_apart(common, simulation::simulation_files(settings, options->output));
     spdlog::debug("{} s of sensor {}, seed {}", settings.duration, settings.truth.name,
                   settings.seed);

@@ -7,10 +7,10 @@
 
 namespace risley::app {
 
-/// Text in columns for people: the first column stands left, the others right.
+/// Text in columns for people: the first column is left-aligned, the others right.
 class Table {
  public:
-  /// @param head  empty for a table of names and values; then all columns stand left
+  /// @param head  empty for a table of names and values; then all columns are left-aligned
   explicit Table(std::vector<std::string> head = {});
   void add(std::vector<std::string> row);
   /// Prints on stdout.

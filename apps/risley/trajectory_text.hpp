@@ -10,7 +10,7 @@
 
 namespace risley::app {
 
-/// What a trajectory or a file of accuracies holds, on stdout.
+/// Prints the contents of a trajectory or a file of accuracies.
 void print_trajectory(const jobs::InspectedTrajectory& found);
 
 }  // namespace risley::app

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 // Table 3 of the paper with a noise of your own: 30 s of a Mid-40, thinned to 1000 shots a second.
 // How large are the errors, are they as large as the sigmas say, and how near to the Cramer-Rao
-// bound, which no unbiased estimator gets below on average?
+// bound, the least average error of an unbiased estimator?
 //
 //   02_table_3 [NOISE_DEG] [--folder FOLDER]     0.01 degree of noise without one
 #include <cmath>

@@ -45,17 +45,17 @@ int calibrate_a_hall(const Arguments& arguments) {
   fmt::print("before: {}\n{}\nwhat to do: {}\n", to_string(verdict.code), verdict.words,
              verdict.to_do);
 
-  // The same unit after it was given its calibration.
+  // The same unit with the calibration stored in it.
   unit.reported_nominal = false;
   for (const estimation::FreeParameter& one : found.calibration.free) {
     unit.reported.emplace_back(one.name, found.calibration.sensor.get(one.name));
   }
   unit.seed = 2;
-  const auto again = record_and_calibrate(unit, arguments.folder / "told.lvx", "");
+  const auto again = record_and_calibrate(unit, arguments.folder / "corrected.lvx", "");
   fmt::print("after: {}\n{}\n", to_string(again.calibration.verdict.code),
              again.calibration.verdict.words);
 
-  // A rotation that all beams share moves a cloud; what is left, the shape, bends it.
+  // A rotation that all beams share moves a cloud; the rest, the shape, bends it.
   fmt::print("{:16}{:>9}{:>9}{:>9}\n", "error, degree", "total", "shared", "shape");
   print_error("before", found.truth->before);
   print_error("after", found.truth->after);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Where an Avia sends its shots, for a simulator that has walls of its own, and how much of the
-// field of view they have met after a tenth of a second, half a second and a second.
+// The directions of an Avia's shots, for a simulator with its own walls, and the share of the
+// field of view that they cover after a tenth of a second, half a second and a second.
 //
 //   05_pattern_for_a_simulator [SENSOR] [--folder FOLDER]
 #include <algorithm>
@@ -33,7 +33,7 @@ int pattern_for_a_simulator(const Arguments& arguments) {
              made.rows, degrees_from_radians(*left), degrees_from_radians(*right),
              90 - degrees_from_radians(*low), 90 - degrees_from_radians(*high));
 
-  // Covered are cells of half a degree with a shot; a gap is the largest circle without one.
+  // Cells of half a degree with a shot count as covered; a gap is the largest circle without one.
   sensors::CoverageOptions coverage;
   coverage.after = {0.1, 0.5, 1.0};
   for (const auto& one : sensors::pattern_coverage(sensor, {}, coverage).after) {

@@ -3,9 +3,9 @@
 # %% [markdown]
 # # First estimate
 #
-# What does a sensor believe about its optics? A recording shows it: `estimate` finds the parameters with which the sensor
-# computed the directions that it reports. The recording is one of your own or, without one, a simulated second of a
-# Mid-40 whose prisms are a little tilted.
+# What does a sensor believe about its optics? `estimate` finds the parameters from which it computed its reported
+# directions. The recording is one of your own or, without one, a simulated second of a Mid-40 whose prisms are a
+# little tilted.
 #
 #     python3 01_first_estimate.py [RECORDING] [--folder FOLDER]
 
@@ -38,8 +38,8 @@ if not recording:
     print(f"{recording.observations} shots simulated")
 
 # %% [markdown]
-# The estimate. The sigma is one standard deviation of everything that may be off, with what the parameters that no
-# recording determines, such as the wedge angles, may be off by.
+# The estimate. The sigma is one standard deviation of all possible errors, including those of parameters that no
+# recording determines, such as the wedge angles.
 
 # %%
 result = risley.estimate(recording)
@@ -48,8 +48,8 @@ if not result.converged:
     sys.exit(f"the numbers cannot be used: {result.reason}")
 
 # %% [markdown]
-# The result can be given as `sensor` to every job, and as a file to the command. It knows where the prisms stood at
-# every shot, and how well.
+# The result can be given as `sensor` to every job, and as a file to the command. It contains the rotation angles of the
+# prisms at every shot, with sigmas.
 
 # %%
 result.sensor.write(folder / "calibration.yaml")

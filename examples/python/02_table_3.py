@@ -4,8 +4,8 @@
 # # Table 3 with a noise of your own
 #
 # Table 3 of the paper: 30 s of a Mid-40, thinned to 1000 shots a second, with 0.01 degree of noise. How large are the
-# errors of the estimate, are they as large as its sigmas say, and how near are they to the Cramér-Rao bound, which no
-# unbiased estimator gets below on average?
+# errors of the estimate, do they agree with its sigmas, and how near are they to the Cramér-Rao bound, the
+# least average error of an unbiased estimator?
 #
 #     python3 02_table_3.py [NOISE_DEG] [--folder FOLDER]
 
@@ -39,8 +39,8 @@ if not result.converged:
     sys.exit(f"the numbers cannot be used: {result.reason}")
 
 # %% [markdown]
-# The bound needs no data, only the plan. Index and angles that are held are exactly right in this simulation, so
-# the sigmas to compare with are those given what is held.
+# The bound needs no data, only the plan. The held index and angles are exact in this simulation, so compare with
+# the sigmas given the held values.
 
 # %%
 found, truth = result.to_dict()["parameters"], result.to_dict()["truth"]["parameters"]

@@ -36,19 +36,19 @@ found = risley.calibrate(bent, truth=bent, output=folder / "calibration")
 print("before:", found)
 
 # %% [markdown]
-# The same hall with the same unit after it was given its calibration: now the walls confirm what it believes.
+# The same hall and unit, now with the calibration stored in the unit: the walls confirm its parameters.
 
 # %%
 calibrated = {name: one["value"] for name, one in found.to_dict()["parameters"].items()}
-told = risley.simulate(folder / "told.lvx", reported=calibrated, seed=2, **unit)
-again = risley.calibrate(told, truth=told)
+corrected = risley.simulate(folder / "corrected.lvx", reported=calibrated, seed=2, **unit)
+again = risley.calibrate(corrected, truth=corrected)
 print("after:", again.summary())
 if found.verdict.code != "bent" or again.verdict.code != "as_believed":
     sys.exit("these are not the verdicts that a bent unit should get")
 
 # %% [markdown]
 # Only a simulation knows the truth. The error of the directions has two parts: a rotation that all beams share moves
-# a cloud and leaves it flat; what is left, the shape, bends it.
+# a cloud and leaves it flat; the rest, the shape, bends it.
 
 # %%
 truth = found.to_dict()["truth"]
@@ -58,7 +58,7 @@ for when in ("before", "after"):
     print(f"{when:16}{error['total_deg']:9.5f}{error['gauge_deg']:9.5f}{error['shape_deg']:9.5f}")
 
 # %% [markdown]
-# Walls are thinner afterwards where the beam meets them obliquely, because there an error of direction is one of range.
+# Walls are thinner afterwards where the beam meets them obliquely, because there direction errors act as range errors.
 
 # %%
 if pyplot:

@@ -3,8 +3,8 @@
 # %% [markdown]
 # # Covariance of points
 #
-# How uncertain is a point, and how much of its error does it share with its neighbour? What they share does not
-# average out, but it does not matter for the distance between them either.
+# How uncertain is a point, and how much of its error does it share with its neighbour? The shared part does not
+# average out, but it does not affect the distance between them either.
 #
 #     python3 04_covariance_of_points.py [SCENE] [--folder FOLDER]
 
@@ -32,8 +32,8 @@ folder = Path(options.folder or tempfile.mkdtemp(prefix="risley-"))
 folder.mkdir(parents=True, exist_ok=True)
 
 # %% [markdown]
-# One second of a unit in a hall, calibrated on its walls. With `common_factors` every point carries what one standard
-# deviation of each error of the calibration moves it by.
+# One second of a unit in a hall, calibrated on its walls. With `common_factors`, every point carries its
+# displacement by one standard deviation of each calibration error.
 
 # %%
 hall = risley.simulate(folder / "hall.lvx", sensor="mid-40-table3", reported_nominal=True, scene=options.scene,

@@ -3,8 +3,8 @@
 # %% [markdown]
 # # A scan pattern for a simulator
 #
-# Where an Avia sends its shots, as unit vectors for a simulator that has walls of its own and as a file, and how much
-# of the field of view they have met after a tenth of a second, half a second and a second.
+# The directions of an Avia's shots, as unit vectors for a simulator with its own walls and as a file, and the share of
+# the field of view that they cover after a tenth of a second, half a second and a second.
 #
 #     python3 05_pattern_for_a_simulator.py [SENSOR] [--folder FOLDER]
 
@@ -43,7 +43,7 @@ print(f"{len(scan)} shots, azimuth {azimuth.min():.2f} to {azimuth.max():.2f} de
       f"elevation {elevation.min():.2f} to {elevation.max():.2f} degree")
 
 # %% [markdown]
-# Covered are cells of half a degree with a shot in them; a gap is the largest circle without one.
+# Cells of half a degree with a shot count as covered; a gap is the largest circle without one.
 
 # %%
 for one in risley.coverage(options.sensor, after=[0.1, 0.5, 1.0])["after"]:

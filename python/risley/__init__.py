@@ -17,7 +17,7 @@ from risley._optics import (Directions, Inverse, Linearisation, Rays, invert, li
                             rays)
 from risley._points import Points, point_chunks, points
 from risley._recordings import from_arrays, read, read_chunks, write
-from risley._results import (Answer, Calibration, Cloud, Estimate, FlightCalibration,
+from risley._results import (Answer, Calibration, Cloud, CloudOfStations, Estimate, FlightCalibration,
                              Identification, Pattern, Plan, RotationAngles, Scan, Simulation,
                              Solution, Verdict, Warning)
 from risley._risley import (Cancelled, ChunkReader, Device, EstimationError, FileError,
@@ -26,7 +26,7 @@ from risley._risley import (Cancelled, ChunkReader, Device, EstimationError, Fil
 from risley._sensors import load_mount, load_sensor, load_trajectory, presets
 
 __all__ = [
-    "Answer", "Calibration", "Cancelled", "ChunkReader", "Cloud", "Device", "Directions",
+    "Answer", "Calibration", "Cancelled", "ChunkReader", "Cloud", "CloudOfStations", "Device", "Directions",
     "Estimate", "EstimationError", "FileError", "FlightCalibration", "Identification", "Inverse",
     "Linearisation", "ManyResults", "MissingFileError", "Mount", "NetworkError", "Pattern", "Plan",
     "Points", "PrismTrain", "Rays", "Recording", "RecordingHeader", "RotationAngles", "Scan",

@@ -18,6 +18,7 @@ class Estimate:
     fixed: Dict[str, float]
     residuals: EstimateResiduals
     noise: EstimateNoise
+    noise_model: EstimateNoiseModel
     frame: Frame
     slips: List[Slip]
     shot_clock: Optional[EstimateShotClock]
@@ -64,6 +65,23 @@ class EstimateNoise(Fields):
 class Value(Fields):
     value: float
     sigma: Optional[float]
+
+class EstimateNoiseModel(Fields):
+    range_m: float
+    range_distance_m: float
+    range_source: str
+    azimuth_deg: float
+    zenith_deg: float
+    direction_deg: float
+    point_variance_m2: float
+    shared: EstimateNoiseModelShared
+    settings: Dict[str, Dict[str, float]]
+
+class EstimateNoiseModelShared(Fields):
+    direction_deg: Optional[float]
+    direction_source: str
+    range_m: Optional[float]
+    range_source: str
 
 class Frame(Fields):
     yaw_deg: Value
@@ -495,6 +513,56 @@ class StripDistributionProfile(Fields):
     stripe_m: float
     across_m: List[float]
     density_per_m2: List[float]
+
+class CloudOfStations:
+    points: int
+    format: str
+    output: str
+    point_frame: str
+    common_factors: List[str]
+    factors_of_one_station: int
+    calibration: CloudCalibration
+    stations: List[CloudStation]
+    html: str
+
+class CloudStation(Fields):
+    name: str
+    input: str
+    points: int
+    observations: int
+    no_return: int
+    outliers: int
+    without_rotation_angle: int
+    mirrored: bool
+    residuals: CloudResiduals
+    repointing_deg: CloudRepointingDeg
+    slips: List[Slip]
+    position_m: CloudStationPositionM
+    roll_deg: CloudAngle
+    pitch_deg: CloudAngle
+    heading_deg: CloudAngle
+    targets: List[CloudStationTargets]
+    fit: CloudStationFit
+    error: str
+
+class CloudStationPositionM(Fields):
+    value: List[float]
+    sigma: List[float]
+
+class CloudAngle(Fields):
+    value: float
+    sigma: float
+
+class CloudStationTargets(Fields):
+    name: str
+    points: int
+    in_scan_m: List[float]
+    residual_m: List[float]
+
+class CloudStationFit(Fields):
+    chi2: float
+    degrees_of_freedom: int
+    p_value: float
 
 class Simulation:
     observations: int

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Jobs on recordings and files: each does what a verb of the command does."""
+"""Jobs on recordings and files, one for each verb of the command."""
 import os
 from typing import Any, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union, overload
 
 from risley import _risley
-from risley._progress import Progress, telling
-from risley._results import (Answer, Calibration, Cloud, Estimate, FlightCalibration,
-                             Identification, Pattern, Plan, Scan, Simulation, needed)
+from risley._progress import Progress, reporting
+from risley._results import (Answer, Calibration, Cloud, CloudOfStations, Estimate,
+                             FlightCalibration, Identification, Pattern, Plan, Scan, Simulation, needed)
 from risley._units import (AnyMount, AnySensor, AnyTrajectory, Fixed, Path, Rate, Source, Truth,
                            YawPitchRoll, listed, options_of, suggesting)
 
@@ -18,7 +18,7 @@ def estimate(recording: Source, *, sensor: AnySensor = "", output: Path = "", me
              noise_angle_deg: Optional[float] = None, fix: Fixed = (), free: Iterable[str] = (),
              mirror: Optional[bool] = None, process_noise: Union[float, str] = "auto",
              process_noise_deg: Optional[float] = None, truth: Truth = "", states: str = "knots",
-             shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
+             noise_model: bool = False, shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
              extrinsics_deg: YawPitchRoll = None, device: str = "", threads: int = 0,
              progress: Progress = None) -> Estimate:
     """Estimate a sensor's parameters and rotation angles from a recording.
@@ -52,6 +52,9 @@ def estimate(recording: Source, *, sensor: AnySensor = "", output: Path = "", me
         ``OUT.truth.yaml`` of the simulation that made the recording, to compare the estimate with.
     states : {'knots', 'all', 'none'}
         Rotor states to write into ``output``.
+    noise_model : bool, default False
+        Find the sigmas that programs of lidar odometry ask for, and what part of them all points
+        share.
     shot_rate, extrinsics, extrinsics_deg, device
         As in `risley.read`.
     threads : int, default 0
@@ -68,11 +71,11 @@ def estimate(recording: Source, *, sensor: AnySensor = "", output: Path = "", me
     EstimationError
         If nothing can be estimated from the data.
     FileError, ValueError
-        For damaged files, and for options that make no sense.
+        For damaged files, and for invalid options.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        return Estimate(_risley.estimate(options, threads, tell))
+    with reporting(progress) as on_progress:
+        return Estimate(_risley.estimate(options, threads, on_progress))
 
 
 @suggesting
@@ -115,9 +118,9 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: AnySensor 
     station : sequence of str
         Names of the stations in that file to use, in the order of the recordings.
     trajectory : str, path, Trajectory, FlightCalibration or Simulation
-        For a flight: where the platform was.
+        For a flight: the platform's trajectory.
     mount : str, path, Mount or FlightCalibration
-        For a flight: how the sensor sits on the platform.
+        For a flight: the mounting of the sensor on the platform.
     trajectory_topic : str
         Topic to use if the trajectory is a ROS bag with several topics of poses.
     accuracy, trajectory_errors : str or path, optional
@@ -155,8 +158,7 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: AnySensor 
     truth : str, path or a sequence of them
         ``OUT.truth.yaml`` of the simulation that made each recording, to compare with.
     force : bool, default False
-        Write calibration.yaml even if the calibration does not improve on what the sensor
-        believes.
+        Write calibration.yaml even if it does not improve on the sensor's own directions.
     states : {'knots', 'all', 'none'}
         Rotor states to write into ``output``.
     seed : int, default 0
@@ -171,18 +173,18 @@ def calibrate(recordings: Union[Source, Sequence[Source]], *, sensor: AnySensor 
     EstimationError
         If there is nothing to calibrate on.
     FileError, ValueError
-        For damaged files, and for options that make no sense.
+        For damaged files, and for invalid options.
     """
     options = options_of({**locals(), "truth": listed("truth", truth)})
-    with telling(progress) as tell:
+    with reporting(progress) as on_progress:
         if trajectory != "":
             _refuse({"planes": planes, "stations": stations, "station": station},
                     "is not for a calibration with trajectory")
-            return FlightCalibration(_risley.calibrate_flight(options, threads, tell))
+            return FlightCalibration(_risley.calibrate_flight(options, threads, on_progress))
         _refuse({"mount": mount, "accuracy": accuracy, "control": control,
                  "trajectory_errors": trajectory_errors, "knot_spacing": knot_spacing,
                  "cell_size": cell_size}, "is not for a calibration with no trajectory")
-        return Calibration(_risley.calibrate(options, threads, tell))
+        return Calibration(_risley.calibrate(options, threads, on_progress))
 
 
 def _refuse(options: Mapping[str, Any], why: str) -> None:
@@ -212,7 +214,7 @@ def plan(scene_or_flight: Path, *, sensor: AnySensor = "", duration: Optional[fl
     duration : float, optional
         Length of each recording of walls, s; by default 10.
     mount, trajectory_errors : str or path
-        For a flight: how the sensor sits on the platform, and how wrong the trajectory will be.
+        For a flight: the mounting of the sensor on the platform, and the errors of the trajectory.
     scene : str or path, optional
         For a flight: the terrain; by default level ground.
     knot_spacing, cell_size, empty_circle : float, optional
@@ -236,42 +238,52 @@ def plan(scene_or_flight: Path, *, sensor: AnySensor = "", duration: Optional[fl
         As in `risley.calibrate`.
     """
     options = options_of({**locals(), "plan": scene_or_flight})
-    with telling(progress) as tell:
+    with reporting(progress) as on_progress:
         if _risley.is_flight_plan(os.fspath(scene_or_flight)):
             if duration is not None:
                 raise ValueError("duration is not for a planned flight, whose strips say it")
-            return Plan(_risley.plan_flight(options, tell))
+            return Plan(_risley.plan_flight(options, on_progress))
         _refuse({"mount": mount, "trajectory_errors": trajectory_errors, "scene": scene,
                  "knot_spacing": knot_spacing, "cell_size": cell_size,
                  "empty_circle": empty_circle},
                 f"goes with a flight, and {scene_or_flight} is a scene")
-        return Plan(_risley.plan(options, tell))
+        return Plan(_risley.plan(options, on_progress))
 
 
 @suggesting
-def cloud(recording: Source, calibration: AnySensor, output: Path, *, format: str = "",
+def cloud(recording: Union[Source, Sequence[Source]], calibration: AnySensor, output: Path, *,
+          format: str = "", station: Path = "", replace: bool = False,
           directions: str = "smoothed", beam_origin: bool = True, beam_divergence: bool = True,
           covariance: bool = True, common_factors: bool = False, rate: Rate = None,
           noise_angle: Optional[float] = None, noise_angle_deg: Optional[float] = None,
           las_scale: Optional[float] = None, time: str = "gps", trajectory: AnyTrajectory = "",
           trajectory_topic: str = "", mount: AnyMount = "", accuracy: Path = "",
           trajectory_errors: Path = "", crs: str = "", datum: str = "", distribution: bool = False,
+          topic: str = "", frame_id: str = "livox_frame", frame_rate: float = 10.0,
+          message: Optional[str] = None,
           shot_rate: Optional[float] = None, extrinsics: YawPitchRoll = None,
           extrinsics_deg: YawPitchRoll = None, device: str = "", threads: int = 0,
-          progress: Progress = None) -> Cloud:
-    """Turn a recording into points with covariance.
+          progress: Progress = None) -> Union[Cloud, CloudOfStations]:
+    """Turn a recording into points with covariance, or those on the stations of a tripod.
 
     Parameters
     ----------
-    recording : str, path or Recording
+    recording : str, path, Recording or, with `station`, a sequence of them
         A recording of one sensor, with ranges: a file, or in memory.
     calibration : str, path, Sensor or result
-        ``calibration.yaml`` of an estimate or a calibration, the folder that holds it, the name of
-        a preset, or what a job found.
+        ``calibration.yaml`` of an estimate or a calibration, the folder that holds it (of one in
+        flight with its mount and trajectory), the name of a preset, or what a job found; empty: the
+        preset of the sensor, with directions as reported.
     output : str or path
         The file; its ending chooses the format unless `format` does.
     format : str, optional
         Name of a format; the ending then does not matter.
+    station : str or path, optional
+        Stations of a tripod (YAML), one per recording and in the same order: poses on the map, or
+        targets that determine them. All points go into one file.
+    replace : bool, default False
+        Write the recording's bag again, with the points of the lidar by the calibration and all
+        else as it is.
     directions : {'smoothed', 'reported'}
         Directions from the calibration, or as the sensor reports them.
     beam_origin, beam_divergence, covariance : bool, default True
@@ -294,23 +306,39 @@ def cloud(recording: Source, calibration: AnySensor, output: Path, *, format: st
         Map of the points and datum of the trajectory, ``EPSG:N``.
     distribution : bool, default False
         Report how the points of a flight lie on the ground.
+    topic, frame_id : str, optional
+        Topic and frame of the points in bags.
+    frame_rate : float, default 10.0
+        Messages of points in bags per second, Hz.
+    message : {'points', 'custom', 'custom2'}, optional
+        Messages of points in bags: PointCloud2 with the fields of ``livox_ros_driver2``, CustomMsg
+        of the driver of the sensor's generation, or of ``livox_ros_driver2``; by default 'points'.
     shot_rate, extrinsics, extrinsics_deg, device, threads, progress
         As in `risley.estimate`.
 
     Returns
     -------
-    Cloud
+    Cloud or CloudOfStations
 
     Raises
     ------
     EstimationError
         If the motion of the rotors cannot be found.
     FileError, ValueError
-        For damaged files, and for options that make no sense.
+        For damaged files, and for invalid options.
     """
-    options = options_of(locals())
-    with telling(progress) as tell:
-        return Cloud(_risley.cloud(options, threads, tell))
+    if station == "":
+        options = options_of(locals())
+        with reporting(progress) as on_progress:
+            return Cloud(_risley.cloud(options, threads, on_progress))
+    _refuse({"trajectory": trajectory, "mount": mount, "accuracy": accuracy, "replace": replace or None,
+             "trajectory_errors": trajectory_errors, "distribution": distribution or None},
+            "is not for a sensor on stations")
+    given = {**locals(), "recordings": recording}
+    del given["recording"]
+    options = options_of(given)
+    with reporting(progress) as on_progress:
+        return CloudOfStations(_risley.cloud_of_stations(options, threads, on_progress))
 
 
 @suggesting
@@ -324,7 +352,9 @@ def simulate(output: Path, *, sensor: AnySensor = "mid-40", duration: Optional[f
              station: str = "", trajectory: AnyTrajectory = "", trajectory_topic: str = "",
              flight: Path = "", mount: AnyMount = "", trajectory_errors: Path = "",
              trajectory_format: str = "csv", start: Optional[float] = None,
-             clock_drift: Optional[float] = None, seed: int = 0, threads: int = 0,
+             clock_drift: Optional[float] = None, topic: str = "",
+             frame_id: str = "livox_frame", frame_rate: float = 10.0,
+             message: Optional[str] = None, seed: int = 0, threads: int = 0,
              progress: Progress = None) -> Simulation:
     """Write a recording with known truth.
 
@@ -347,13 +377,13 @@ def simulate(output: Path, *, sensor: AnySensor = "mid-40", duration: Optional[f
     rotor : {'constant', 'sinusoidal', 'hunting'}
         How the rotors run.
     set : mapping of str to float
-        Parameters of the true sensor, in the unit of the name, and what it adds to ranges:
+        Parameters of the true sensor, in the unit of the name, and its range errors:
         "range_offset_m", "range_near_m", "range_incidence", "range_per_decade_m",
         "range_emitter_1_m", ...
     reported : mapping of str to float
-        Parameters for which the sensor believes another value than the true one.
+        Parameters whose value in the sensor's firmware differs from the true one.
     reported_nominal : bool, default False
-        The sensor believes that it has no errors.
+        The sensor's firmware assumes that it has no errors.
     start_angles, start_angles_deg : sequence of float, optional
         Rotation angles at the start, rad or deg; by default random, from the seed.
     scene : str or path, optional
@@ -372,6 +402,8 @@ def simulate(output: Path, *, sensor: AnySensor = "mid-40", duration: Optional[f
         Start of the recording after the first record of the trajectory, s.
     clock_drift : float, optional
         Rate at which the trajectory's time gains on the sensor's clock, s/s.
+    topic, frame_id, frame_rate, message
+        As in `risley.cloud`, with 'custom' as the usual `message`.
     seed : int, default 0
         The same seed gives the same bytes.
     threads : int, default 0
@@ -386,11 +418,11 @@ def simulate(output: Path, *, sensor: AnySensor = "mid-40", duration: Optional[f
     Raises
     ------
     FileError, ValueError
-        For files that cannot be read or written, and for options that make no sense.
+        For files that cannot be read or written, and for invalid options.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        return Simulation(_risley.simulate(options, threads, tell))
+    with reporting(progress) as on_progress:
+        return Simulation(_risley.simulate(options, threads, on_progress))
 
 
 @suggesting
@@ -424,11 +456,11 @@ def identify(recording: Source, *, output: Path = "", force: bool = False, most_
     EstimationError
         If nothing can be estimated from the data.
     FileError, ValueError
-        For damaged files, and for options that make no sense.
+        For damaged files, and for invalid options.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        return Identification(*_risley.identify(options, threads, tell))
+    with reporting(progress) as on_progress:
+        return Identification(*_risley.identify(options, threads, on_progress))
 
 
 @overload
@@ -488,19 +520,19 @@ def pattern(sensor: AnySensor, format: str = "", output: Path = "", *, start: fl
     Raises
     ------
     FileError, ValueError
-        For files that cannot be written, and for options that make no sense.
+        For files that cannot be written, and for invalid options.
     """
     if not isinstance(dtype, str) or dtype not in ("float64", "float32"):
         dtype = needed("numpy", f"dtype = {dtype!r}").dtype(dtype).name
     options = options_of(locals())
-    with telling(progress) as tell:
+    with reporting(progress) as on_progress:
         if not output:
             if format:
                 raise ValueError(f"format = {format!r} goes with output")
-            return Scan(options, _risley.pattern_directions(options, threads, tell))
+            return Scan(options, _risley.pattern_directions(options, threads, on_progress))
         if start or dtype != "float64":
             raise ValueError("start and dtype are for a scan that is returned, without output")
-        return Pattern(_risley.pattern(options, threads, tell))
+        return Pattern(_risley.pattern(options, threads, on_progress))
 
 
 @suggesting
@@ -529,8 +561,8 @@ def coverage(sensor: AnySensor, *, after: Optional[Sequence[float]] = None,
         A dictionary as ``coverage`` in ``risley pattern --coverage --json``.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        return Answer("coverage", _risley.coverage(options, threads, tell))
+    with reporting(progress) as on_progress:
+        return Answer("coverage", _risley.coverage(options, threads, on_progress))
 
 
 @suggesting
@@ -564,27 +596,34 @@ def observability(recording: Source = "", *, sensor: AnySensor = "",
         A dictionary as in ``risley observability --json``.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        return Answer("observability", _risley.observability(options, threads, tell))
+    with reporting(progress) as on_progress:
+        return Answer("observability", _risley.observability(options, threads, on_progress))
 
 
 @suggesting
 def compare(results: Sequence[AnySensor], *, false_alarm: float = 0.01, anywhere: bool = False,
-            unlike: bool = False, progress: Progress = None) -> Answer:
-    """Find out whether a unit has changed, and which units of a fleet are unlike the others.
+            unlike: bool = False, cell_size: Optional[float] = None,
+            reach: Optional[float] = None, progress: Progress = None) -> Answer:
+    """Find out whether a unit has changed, which units of a fleet are unlike the others, or what
+    has changed between two clouds.
 
     Parameters
     ----------
     results : sequence of str, path, Sensor or result
         What `estimate` or `calibrate` found, their folders, or calibration files, in order of
-        time; also tables of such results, whose rows are followed. At least two results.
+        time; also tables of such results, whose rows are followed. At least two results. Or two
+        clouds (LAS) of `cloud`, the earlier one first.
     false_alarm : float, default 0.01
-        Probability that chance is taken for a change, or a unit for an outlier, at most.
+        Probability that chance is taken for a change, or a unit for an outlier, at most; of clouds
+        the share of unchanged cells that are called changed.
     anywhere : bool, default False
         Open results that a table names outside of its own folder, too.
     unlike : bool, default False
-        Compare a calibration, which says where beams truly go, with an estimate of what the sensor
-        believes, too.
+        Also compare a calibration (true beam directions) with an estimate (the sensor's own
+        directions).
+    cell_size, reach : float, optional
+        Of clouds: edge of the cells that get a distance each, and how far surfaces may have moved,
+        m; by default 0.5.
     progress : bool or callable, optional
         As in `risley.read`.
 
@@ -600,15 +639,15 @@ def compare(results: Sequence[AnySensor], *, false_alarm: float = 0.01, anywhere
         kind of sensor.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        return Answer("compare", _risley.compare(options, tell))
+    with reporting(progress) as on_progress:
+        return Answer("compare", _risley.compare(options, on_progress))
 
 
 @suggesting
 def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = None,
              merge: bool = False, table: Path = "", seed: int = 0, threads: int = 0,
              progress: Progress = None) -> Answer:
-    """Simulate and estimate, or calibrate, many times over, as a plan says.
+    """Simulate and estimate or calibrate repeatedly, according to a plan.
 
     Parameters
     ----------
@@ -637,8 +676,8 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
     Raises
     ------
     FileError, ValueError
-        For a plan that is none or asks for what cannot be simulated; with `merge` also where there
-        is no chunk.
+        For an invalid plan or one that cannot be simulated; with `merge` also if there is no
+        chunk.
     """
     if chunk is not None and merge:
         raise ValueError("chunk and merge cannot be combined: merge when all chunks are done")
@@ -647,8 +686,8 @@ def campaign(plan: Path, output: Path, *, chunk: Optional[Tuple[int, int]] = Non
         "seed": seed, "table": os.fspath(table) or os.path.join(os.fspath(output), "cells.csv")}
     if chunk is not None:
         options["chunk"], options["chunks"] = chunk
-    with telling(progress) as tell:
-        return Answer("campaign", _risley.campaign(options, threads, tell))
+    with reporting(progress) as on_progress:
+        return Answer("campaign", _risley.campaign(options, threads, on_progress))
 
 
 @suggesting
@@ -675,5 +714,5 @@ def info(file: Source, *, accuracy: Path = "", trajectory_topic: str = "",
         A dictionary as in ``risley info --json``. Damage is reported under ``error``.
     """
     options = options_of({**locals(), "recording": file})
-    with telling(progress) as tell:
-        return Answer("info", _risley.info(options, tell))
+    with reporting(progress) as on_progress:
+        return Answer("info", _risley.info(options, on_progress))

@@ -1,19 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Jobs on many recordings in one call, as the command does them for folders, patterns and lists."""
+"""Jobs on many recordings in one call, as the command does for folders, patterns and lists."""
 import os
 from typing import Any, Callable, Dict, Iterator, List, Sequence, Tuple, Union
 
 from risley import _risley
 from risley._jobs import calibrate, cloud, estimate, info
-from risley._progress import Progress, telling
+from risley._progress import Progress, reporting
 from risley._results import _Shown, needed
 from risley._units import (AnySensor, Path, keyword_defaults, listed, options_of,
                            unknown_keyword)
 
 
 class ManyResults(_Shown, Sequence[Dict[str, Any]]):
-    """What came of many inputs: a sequence of dictionaries, one per input, in their order.
+    """Results of many inputs: a sequence of dictionaries, one per input, in order.
 
     Each has the keys of the job's own result, ``input``, ``status`` (0: it went well, otherwise the
     exit status of the command), ``message`` (why it failed) and, where it had been made before,
@@ -66,14 +66,14 @@ def _many(verb: str, job: Callable[..., Any], wanted: Dict[str, Any], options: D
     values = options_of({**of_each, **options, **more, "output": os.fspath(wanted["output"])})
     many = {"inputs": listed("inputs", wanted["inputs"]), "list": os.fspath(wanted["list"]),
             "table": os.fspath(wanted["table"]), "resume": wanted["resume"]}
-    with telling(wanted["progress"]) as tell:
-        return ManyResults(_risley.run_many(verb, values, many, wanted["threads"], tell))
+    with reporting(wanted["progress"]) as on_progress:
+        return ManyResults(_risley.run_many(verb, values, many, wanted["threads"], on_progress))
 
 
 def estimate_many(inputs: Union[Path, Sequence[Path]] = (), *, list: Path = "", output: Path = "",
                   table: Path = "", resume: bool = False, threads: int = 0,
                   progress: Progress = None, **options: Any) -> ManyResults:
-    """Estimate from each of many recordings. One that fails does not stop the rest.
+    """Estimate from each of many recordings. A failure does not stop the rest.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ def estimate_many(inputs: Union[Path, Sequence[Path]] = (), *, list: Path = "", 
     list : str or path, optional
         Text file with further inputs, one a line.
     output : str or path, optional
-        Folder in which results stand as the inputs do below the folder that all share.
+        Folder for results, laid out as the inputs are below their common folder.
     table : str or path, optional
         Table to write with a row per input, .csv or .nc.
     resume : bool, default False
-        Leave results as they are that are whole and were made from the same bytes with the same
-        options and version.
+        Keep complete results that were made from the same bytes with the same options and
+        version.
     threads : int, default 0
         Number of threads; 0 means one per core.
     progress : bool or callable, optional
@@ -103,7 +103,7 @@ def estimate_many(inputs: Union[Path, Sequence[Path]] = (), *, list: Path = "", 
     Raises
     ------
     FileError, ValueError
-        For options that make no sense, names without any recording, and outputs that cannot be
+        For invalid options, names without any recording, and outputs that cannot be
         written.
     """
     return _many("estimate", estimate, locals(), options)
@@ -112,7 +112,7 @@ def estimate_many(inputs: Union[Path, Sequence[Path]] = (), *, list: Path = "", 
 def calibrate_many(inputs: Union[Path, Sequence[Path]] = (), *, list: Path = "",
                    output: Path = "", table: Path = "", resume: bool = False, threads: int = 0,
                    progress: Progress = None, **options: Any) -> ManyResults:
-    """Calibrate on each of many recordings of walls, on its own.
+    """Calibrate on each of many recordings of walls, separately.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""Sensors on the network: record them, and be one."""
+"""Sensors on the network: record them, and emulate one."""
 import logging
 from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 from risley import _risley
-from risley._progress import Progress, telling
+from risley._progress import Progress, reporting
 from risley._risley import Stop
 from risley._units import AnySensor, Path, options_of, suggesting
 
@@ -26,7 +26,7 @@ def find_sensors(interface: str = "", *, find: float = 2.5,
     interface : str, optional
         IPv4 address of this machine on which the sensors are; by default its only one.
     find : float, default 2.5
-        How long to listen, s. A sensor tells once a second that it is there.
+        How long to listen, s. A sensor announces itself once a second.
     progress : bool or callable, optional
         As in `risley.read`.
 
@@ -40,8 +40,8 @@ def find_sensors(interface: str = "", *, find: float = 2.5,
     NetworkError, ValueError
         If the port of the broadcasts is taken, and for an address that is not of this machine.
     """
-    with telling(progress) as tell:
-        found = _risley.find_sensors(options_of({"interface": interface, "find": find}), tell)
+    with reporting(progress) as on_progress:
+        found = _risley.find_sensors(options_of({"interface": interface, "find": find}), on_progress)
     return list(found["sensors"])
 
 
@@ -50,10 +50,12 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
            interface: str = "", serial: Sequence[str] = (), find: float = 2.5,
            passive: bool = False, data_port: int = 56001, coordinates: str = "spherical",
            return_mode: str = "as-is", imu: bool = True, optics: AnySensor = "",
+           publish: Optional[str] = None, calibration: AnySensor = "", topic: str = "/risley/points",
+           frame_id: str = "livox_frame", frame_rate: float = 20.0,
            progress: Progress = None) -> Dict[str, Any]:
     """Record Livox sensors of both generations from the network.
 
-    What happens meanwhile, such as a sensor that falls silent, is told to the logger ``risley``.
+    Events, such as a sensor that falls silent, go to the logger ``risley``.
 
     Parameters
     ----------
@@ -84,9 +86,19 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
     imu : bool, default True
         Record inertial samples where the sensor has them.
     optics : str, path, Sensor or result, optional
-        Watch the optics: 'own' tells when they change while they are recorded, a preset or
-        calibration also when they are not those. An alarm is a warning of the logger and
+        Watch the optics: 'own' reports when they change during the recording, a preset or
+        calibration also when they differ from it. An alarm is a warning of the logger and
         stands in the result.
+    publish : str, optional
+        Send points with covariance while they are recorded: ``"foxglove:PORT"`` or
+        ``"foxglove:ADDRESS:PORT"`` to Foxglove-compatible viewers, ``"dds"`` or ``"dds:DOMAIN"`` to
+        nodes of ROS 2. The logger says where they are.
+    calibration : str, path, Sensor or result, optional
+        Of these points; by default the preset of the sensor, with directions as it reports them.
+    topic, frame_id : str
+        Topic and frame of these points.
+    frame_rate : float, default 20.0
+        Messages of these points per second, Hz, 10 to 50.
     progress : bool or callable, optional
         As in `risley.read`.
 
@@ -100,11 +112,11 @@ def record(output: Path, *, duration: Optional[float] = None, stop: Optional[Sto
     NetworkError
         If there is no sensor, none sends anything, or a socket is refused.
     FileError, ValueError
-        If the file cannot be written, and for options that make no sense.
+        If the file cannot be written, and for invalid options.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        return dict(_risley.record(options, _note, stop, tell))
+    with reporting(progress) as on_progress:
+        return dict(_risley.record(options, _note, stop, on_progress))
 
 
 @suggesting
@@ -182,8 +194,8 @@ def emulate(interface: str, *, duration: Optional[float] = None, stop: Optional[
     NetworkError
         If the address or a port cannot be used.
     FileError, ValueError
-        For files that cannot be read, and for options that make no sense.
+        For files that cannot be read, and for invalid options.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        return dict(_risley.emulate(options, threads, _note, stop, tell))
+    with reporting(progress) as on_progress:
+        return dict(_risley.emulate(options, threads, _note, stop, on_progress))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
-"""What the plot() of results draws, where matplotlib is installed."""
+"""Drawings of the plot() of results, if matplotlib is installed."""
 from typing import Any, Mapping, Sequence
 
 

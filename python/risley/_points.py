@@ -4,7 +4,7 @@
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
 from risley import _plots, _risley
-from risley._progress import Progress, telling
+from risley._progress import Progress, reporting
 from risley._results import Answer, _Shown, needed
 from risley._units import (AnyMount, AnySensor, AnyTrajectory, Path, Rate, Source, YawPitchRoll,
                            keyword_defaults, options_of, suggesting, unknown_keyword)
@@ -15,7 +15,7 @@ _NOT_ALWAYS = ("covariance", "own_covariance", "loading", "rotation_angle", "azi
 
 
 class Points(_Shown):
-    """Points with their covariance, as arrays of which each point has a row.
+    """Points with their covariance, as arrays with a row for each point.
 
     The arrays are C-contiguous and may be written to; numpy hands them to torch, jax and cupy
     through DLPack without a copy. Those without a covariance, rotation angles or loadings are None.
@@ -128,7 +128,7 @@ class Points(_Shown):
         return _plots.points(self, axes)
 
 
-range_of = range  # which a class above has a column of
+range_of = range  # for classes above that have such a column
 
 
 @suggesting
@@ -161,8 +161,8 @@ def points(recording: Source, calibration: AnySensor, *, directions: str = "smoo
         As in `risley.cloud`.
     """
     options = options_of(locals())
-    with telling(progress) as tell:
-        made, found = _risley.points(options, threads, tell)
+    with reporting(progress) as on_progress:
+        made, found = _risley.points(options, threads, on_progress)
     return Points(*made, Answer("points", found))
 
 
@@ -188,7 +188,7 @@ def point_chunks(recording: Source, calibration: AnySensor, *, rows: int = 1_000
     Raises
     ------
     EstimationError, FileError, ValueError
-        As in `risley.points`. Damage is raised only after all sound points before it were given.
+        As in `risley.points`. Damage is raised only after all valid points before it were returned.
     """
     of_points = keyword_defaults(points)
     unknown = [name for name in options if name not in of_points]

@@ -4,8 +4,8 @@
 import contextlib
 from typing import Any, Callable, Iterator, Optional, Union
 
-Tell = Callable[[str, float], object]
-Progress = Union[None, bool, Tell]
+OnProgress = Callable[[str, float], object]
+Progress = Union[None, bool, OnProgress]
 
 
 class _Bars:
@@ -15,7 +15,7 @@ class _Bars:
         self._tqdm = tqdm
         self._bar: Any = None
 
-    def tell(self, name: str, fraction: float) -> None:
+    def show(self, name: str, fraction: float) -> None:
         if self._bar is None or self._bar.desc.rstrip(": ") != name:
             self.close()
             self._bar = self._tqdm(total=1.0, desc=name,
@@ -29,7 +29,7 @@ class _Bars:
 
 
 @contextlib.contextmanager
-def telling(progress: Progress) -> Iterator[Optional[Tell]]:
+def reporting(progress: Progress) -> Iterator[Optional[OnProgress]]:
     """The function to call with the name of a stage and the fraction done, or None."""
     if progress is None or progress is False:
         yield None
@@ -41,7 +41,7 @@ def telling(progress: Progress) -> Iterator[Optional[Tell]]:
             return
         bars = _Bars(tqdm)
         try:
-            yield bars.tell
+            yield bars.show
         finally:
             bars.close()
     else:

@@ -7,7 +7,7 @@ import tempfile
 from typing import Any, Optional, Tuple, Union
 
 from risley import _risley
-from risley._progress import Progress, telling
+from risley._progress import Progress, reporting
 from risley._results import needed
 from risley._units import Path, YawPitchRoll, pose, suggesting
 
@@ -29,7 +29,7 @@ def to_pandas(recording: _risley.Recording) -> Any:
 
 
 def reduced(recording: _risley.Recording) -> Tuple[Any, ...]:
-    """For pickle: the lossless format has all that is known of a recording."""
+    """For pickle: the lossless format holds everything known about a recording."""
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / "recording.nc"
         _risley.write_recording(recording, str(file), "")
@@ -75,11 +75,11 @@ def read(path: Path, *, shot_rate: Optional[float] = None, extrinsics: YawPitchR
     FileError
         If the file is missing (also a `FileNotFoundError`), damaged, or of no known format.
     ValueError
-        For options that make no sense.
+        For invalid options.
     """
-    with telling(progress) as tell:
+    with reporting(progress) as on_progress:
         return _risley.read(os.fspath(path), shot_rate, pose(extrinsics, extrinsics_deg), device,
-                            tell)
+                            on_progress)
 
 
 @suggesting
@@ -103,7 +103,8 @@ def read_chunks(path: Path, rows: int = 65536, *, shot_rate: Optional[float] = N
     Raises
     ------
     FileError, ValueError
-        As in `read`. Damage in the body is raised only after all sound rows before it were given.
+        As in `read`. Damage in the body is raised only after all valid rows before it were
+        returned.
     """
     return _risley.ChunkReader(os.fspath(path), rows, shot_rate, pose(extrinsics, extrinsics_deg),
                                device)

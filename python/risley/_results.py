@@ -9,14 +9,14 @@ from typing import (TYPE_CHECKING, Any, Dict, List, Mapping, NamedTuple, Optiona
 
 from risley import _risley
 from risley import _plots
-from risley._progress import Progress, telling
+from risley._progress import Progress, reporting
 from risley._units import Path
 
 if TYPE_CHECKING:
     from risley import _answers
-else:  # what attributes results have is known from their JSON alone
+else:  # the attributes of results are known only from their JSON
     class _answers:
-        Estimate = Calibration = FlightCalibration = Cloud = object
+        Estimate = Calibration = FlightCalibration = Cloud = CloudOfStations = object
         Simulation = Identification = Pattern = object
 
 Found = Union[_risley.EstimatedRecording, _risley.CalibratedRecordings, _risley.CalibratedFlight]
@@ -42,7 +42,7 @@ class Verdict(NamedTuple):
 
 
 class Warning(NamedTuple):
-    """What a user should know that does not make an answer useless; as a text, its message.
+    """A remark that does not invalidate the result; as a text, its message.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Warning(NamedTuple):
 
 
 def needed(package: str, function: str) -> Any:
-    """A package that only some functions need. @raises ImportError that names both"""
+    """A package needed only by some functions. @raises ImportError that names both"""
     try:
         return importlib.import_module(package)
     except ImportError as error:
@@ -80,7 +80,7 @@ def warnings_of(found: List[Dict[str, Any]]) -> List[Warning]:
 
 
 class Fields(Dict[str, Any]):
-    """A part of a result whose keys are attributes, too."""
+    """A part of a result whose keys are also attributes."""
 
     def __getattr__(self, name: str) -> Any:
         if name not in self:
@@ -98,7 +98,7 @@ def _with_attributes(value: Any, as_told: bool = False) -> Any:
 
 
 def lines_of(found: Mapping[str, Any], head: str = "") -> List[Tuple[str, str]]:
-    """Names and values of what a dictionary holds, for people; of lists the length."""
+    """Names and values in a dictionary, for people; for lists the length."""
     lines: List[Tuple[str, str]] = []
     for key, value in found.items():
         if key in ("format_version", "version", "warnings"):
@@ -128,13 +128,13 @@ def table_html(lines: Sequence[Tuple[str, str]]) -> str:
 
 
 class _Shown:
-    """What all results show of themselves."""
+    """Display common to all results."""
 
     def _lines(self) -> List[Tuple[str, str]]:
         raise NotImplementedError
 
     def summary(self) -> str:
-        """What came of it, in a few lines."""
+        """The result, in a few lines."""
         return table_text(self._lines()[:8])
 
     def __str__(self) -> str:
@@ -178,7 +178,7 @@ class _Answer(_Shown):
 
     @property
     def warnings(self) -> List[Warning]:
-        """What to know before the result is used."""
+        """Remarks to read before the result is used."""
         return warnings_of(self._dict.get("warnings", []))
 
 
@@ -223,7 +223,7 @@ class _Columns(_Answer):
 
 
 class Solution(_Columns):
-    """What estimates and calibrations have in common."""
+    """Common part of estimates and calibrations."""
 
     def __init__(self, found: Found) -> None:
         table = found.table
@@ -232,9 +232,9 @@ class Solution(_Columns):
         self.values = table.values
         #: One standard deviation each if held parameters are exact; shape (n,).
         self.sigmas_given_held = table.sigmas_given_held
-        #: Stable code, what was found, and what follows from it.
+        #: Stable code, result, and recommendation.
         self.verdict = Verdict(**self._dict["verdict"])
-        #: The sensor as it was found, with its covariance.
+        #: The estimated sensor, with its covariance.
         self.sensor = found.sensor
         self._html, self._text = found.html, found.text
         self._found: Optional[Found] = found
@@ -246,8 +246,8 @@ class Solution(_Columns):
 
     def _report_text(self, progress: Progress) -> str:
         if not self._report and self._found is not None:
-            with telling(progress) as tell:
-                self._report = self._found.report_text(tell)
+            with reporting(progress) as on_progress:
+                self._report = self._found.report_text(on_progress)
         return self._report
 
     def report(self, path: Path, *, progress: Progress = None) -> None:
@@ -268,14 +268,14 @@ class Solution(_Columns):
         _risley.write_page(self._report_text(progress), os.fspath(path))
 
     def __getstate__(self) -> Dict[str, Any]:
-        self._report_text(None)  # what the page needs is gone with the C++ object
+        self._report_text(None)  # the data for the page are gone with the C++ object
         return {**self.__dict__, "_found": None}
 
     def _as_option(self, name: str) -> Any:
         return self.sensor
 
     def summary(self) -> str:
-        """The verdict, what to do, and what to know before the result is used."""
+        """The verdict, the recommended action, and remarks to read before the result is used."""
         return "\n".join([self.verdict.words, f"what to do: {self.verdict.to_do}",
                           *map(str, self.warnings)])
 
@@ -334,7 +334,7 @@ class RotationAngles(NamedTuple):
 
 
 class Estimate(Solution, _answers.Estimate):
-    """What `risley.estimate` found: parameters, mean speeds, first rotation angles."""
+    """Result of `risley.estimate`: parameters, mean speeds, first rotation angles."""
 
     def __init__(self, found: _risley.EstimatedRecording) -> None:
         super().__init__(found)
@@ -372,7 +372,7 @@ class Estimate(Solution, _answers.Estimate):
         return self._motion
 
     def _both_residuals(self) -> Tuple[Any, Any]:
-        if self._residuals is None:  # nobody asked before: they are as many as shots
+        if self._residuals is None:  # computed on first use: one per shot
             assert isinstance(self._found, _risley.EstimatedRecording)
             self._residuals = self._found.residuals
         return self._residuals
@@ -389,16 +389,16 @@ class Estimate(Solution, _answers.Estimate):
 
     def __getstate__(self) -> Dict[str, Any]:
         self._rotor_motion()
-        self._both_residuals()  # gone with the C++ object, as what the page needs
+        self._both_residuals()  # gone with the C++ object, like the data for the page
         return super().__getstate__()
 
 
 class Calibration(Solution, _answers.Calibration):
-    """What `risley.calibrate` found on walls: parameters and the offset of ranges."""
+    """Result of `risley.calibrate` on walls: parameters and the offset of ranges."""
 
 
 class FlightCalibration(Solution, _answers.FlightCalibration):
-    """What `risley.calibrate` found in flight: boresight, lever arm, clock, ranges, parameters.
+    """Result of `risley.calibrate` in flight: boresight, lever arm, clock, ranges, parameters.
 
     Attributes
     ----------
@@ -418,7 +418,7 @@ class FlightCalibration(Solution, _answers.FlightCalibration):
 
 
 class Plan(_Columns):
-    """What `risley.plan` predicts for a calibration: sigmas without values."""
+    """Prediction of `risley.plan` for a calibration: sigmas without values."""
 
     def __init__(self, planned: Planned) -> None:
         super().__init__(planned.to_dict(), planned.table)
@@ -435,9 +435,12 @@ class Cloud(_Answer, _answers.Cloud):
     """What `risley.cloud` wrote."""
 
 
+class CloudOfStations(_Answer, _answers.CloudOfStations):
+    """Result of `risley.cloud` for recordings on stations."""
+
+
 class Simulation(_Answer, _answers.Simulation):
-    """What `risley.simulate` wrote. Stands for its recording, truth or trajectory wherever one is
-    wanted."""
+    """What `risley.simulate` wrote. Can be used as its recording, truth or trajectory."""
 
     def _as_option(self, name: str) -> Any:
         endings = {"truth": ".truth.yaml"}
@@ -464,7 +467,7 @@ class Identification(_Answer, _answers.Identification):
 
     @property
     def verdict(self) -> Verdict:
-        """Stable code, what was found, and what follows from it."""
+        """Stable code, result, and recommendation."""
         return Verdict(**self._dict["verdict"])
 
 
@@ -473,7 +476,7 @@ class Pattern(_Answer, _answers.Pattern):
 
 
 class Scan(_Shown):
-    """Where a sensor sends its shots, from `risley.pattern`.
+    """Shot directions of a sensor, from `risley.pattern`.
 
     Attributes
     ----------
@@ -519,7 +522,7 @@ class Scan(_Shown):
 
 
 class Answer(Fields, _Shown):
-    """What a job found, as a dictionary whose keys are attributes, too."""
+    """Result of a job, as a dictionary whose keys are also attributes."""
 
     def __init__(self, verb: str, found: Mapping[str, Any]) -> None:
         super().__init__(_with_attributes(dict(found), as_told=True))

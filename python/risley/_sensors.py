@@ -5,7 +5,7 @@ import os
 from typing import List
 
 from risley import _risley
-from risley._progress import Progress, telling
+from risley._progress import Progress, reporting
 from risley._units import Path, suggesting
 
 
@@ -46,7 +46,7 @@ def load_sensor(name_or_path: Path) -> _risley.Sensor:
 
 @suggesting
 def load_mount(path: Path) -> _risley.Mount:
-    """Load how a sensor sits on a moving platform.
+    """Load the mounting of a sensor on a moving platform.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def load_mount(path: Path) -> _risley.Mount:
     Raises
     ------
     FileError
-        For a file that is missing or none; the message names the line.
+        For a missing or invalid file; the message names the line.
     """
     return _risley.load_mount(os.fspath(path))
 
@@ -86,7 +86,7 @@ def load_trajectory(path: Path, *, topic: str = "",
     Raises
     ------
     FileError, ValueError
-        For a file that is missing, damaged or none, and for a topic without poses.
+        For a missing, damaged or invalid file, and for a topic without poses.
     """
-    with telling(progress) as tell:
-        return _risley.load_trajectory(os.fspath(path), topic, tell)
+    with reporting(progress) as on_progress:
+        return _risley.load_trajectory(os.fspath(path), topic, on_progress)

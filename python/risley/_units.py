@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Path = Union[str, "os.PathLike[str]"]
 Source = Union[Path, _risley.Recording, "Simulation"]
-#: A preset by name, a file or folder with a calibration, or what a job found.
+#: A preset by name, a file or folder with a calibration, or a result of a job.
 AnySensor = Union[Path, _risley.Sensor, "Solution", "Identification"]
 AnyMount = Union[Path, _risley.Mount, "FlightCalibration"]
 AnyTrajectory = Union[Path, _risley.Trajectory, "FlightCalibration", "Simulation"]
@@ -27,12 +27,12 @@ Rate = Union[None, float, str]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-#: What may be given by its path or as what it is.
+#: Arguments given by path or as an object.
 _IN_MEMORY = (_risley.Recording, _risley.Sensor, _risley.Mount, _risley.Trajectory)
 
 
 def keyword_defaults(function: Callable[..., Any]) -> Dict[str, Any]:
-    """What the keywords of a function are unless they are given."""
+    """Default values of a function's keywords."""
     return {name: parameter.default
             for name, parameter in inspect.signature(function).parameters.items()
             if parameter.kind is parameter.KEYWORD_ONLY}
@@ -56,20 +56,20 @@ def suggesting(function: Function) -> Function:
 
 
 def unknown_keyword(function: str, name: str, known: Iterable[str]) -> str:
-    """What to say about a keyword that a function does not have."""
+    """Message on a keyword that a function does not have."""
     near = difflib.get_close_matches(name, known, 1, 0.5)
     return f"{function}() has no keyword {name}" + (f"; did you mean {near[0]}?" if near else "")
 
 
 def plain(name: str, value: Any) -> Any:
-    """What the libraries take for an option: a path as text, for a result what it stands for."""
+    """The libraries' form of an option: a path as text, for a result its object."""
     if hasattr(value, "_as_option"):
         value = value._as_option(name)
     return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
 def listed(name: str, given: Any) -> List[Any]:
-    """One thing or several, as a list of what the libraries take."""
+    """One or several objects, as a list in the libraries' form."""
     if isinstance(given, (str, os.PathLike, *_IN_MEMORY)) or hasattr(given, "_as_option"):
         given = [given]
     return [plain(name, one) for one in given]
@@ -105,7 +105,7 @@ def pose(radians: YawPitchRoll, degrees: YawPitchRoll) -> YawPitchRoll:
 
 
 def options_of(values: Mapping[str, Any]) -> Dict[str, Any]:
-    """Keyword arguments of a job as the libraries take them: angles in radians, paths as texts."""
+    """Keyword arguments of a job in the libraries' form: angles in radians, paths as texts."""
     options: Dict[str, Any] = {}
     for name, value in values.items():
         if name in ("progress", "stop", "threads") or name.removesuffix("_deg") in options:

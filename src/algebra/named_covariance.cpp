@@ -32,7 +32,8 @@ NamedCovariance NamedCovariance::part(std::span<const std::string> wanted) const
 }
 
 std::optional<CovarianceFault> covariance_fault(const Eigen::MatrixXd& matrix) {
-  // Of rounding: share of two sigmas by which two halves differ, and an eigenvalue of correlations.
+  // Rounding tolerance: share of two sigmas by which two halves differ, and an eigenvalue of
+  // correlations.
   constexpr double kAsymmetry = 1e-12, kLeastEigenvalue = -1e-9;
   for (Index i = 0; i < matrix.rows(); ++i) {
     if (!(matrix(i, i) > 0.0)) {

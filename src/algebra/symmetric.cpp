@@ -15,7 +15,8 @@ namespace {
 
 /// Smaller eigenvalues of a matrix with a diagonal of ones are rounding.
 constexpr double kNoInformation = 1e-13;
-/// Of a combination's square, what may lie along directions without information by rounding.
+/// Share of a combination's square that may lie along directions without information due to
+/// rounding.
 constexpr double kUntoldShare = 1e-6;
 
 std::size_t length(Eigen::Index size) { return static_cast<std::size_t>(size); }
@@ -33,7 +34,7 @@ SymmetricSolver::SymmetricSolver(const Eigen::MatrixXd& matrix, double damping)
   Eigen::MatrixXd balanced = scaled(matrix, scale_);
   balanced.diagonal().array() += damping;
   factors_.compute(balanced);
-  // The factors would take NaN for a direction without information.
+  // The factors would give NaN for a direction without information.
   const bool finite = balanced.allFinite();
   if (!finite) scale_.setConstant(std::numeric_limits<double>::quiet_NaN());
   positive_ =
@@ -48,7 +49,7 @@ Eigen::VectorXd SymmetricSolver::solve(const Eigen::VectorXd& right) const {
 
 Eigen::MatrixXd SymmetricSolver::solve_columns(const Eigen::MatrixXd& right) const {
   require_length("rows of the right side", length(right.rows()), length(scale_.size()));
-  if (right.cols() == 0) return right;  // Eigen would look at the first entry of none
+  if (right.cols() == 0) return right;  // Eigen would read the first entry of an empty one
   const Eigen::MatrixXd balanced = scale_.asDiagonal() * right;
   return scale_.asDiagonal() * factors_.solve(balanced).eval();
 }
@@ -87,19 +88,19 @@ Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& normal, const Eigen::Matrix
                  static_cast<std::size_t>(normal.rows()));
   const PrincipalAxes axes = principal_axes(scaled(normal, scale));
   const double least = kNoInformation * static_cast<double>(normal.rows());
-  // Of each combination, what lies along every axis.
+  // The part of each combination along every axis.
   const Eigen::MatrixXd along = product(combinations * scale.asDiagonal(), axes.vectors);
-  Eigen::MatrixXd told = along;
+  Eigen::MatrixXd scaled = along;
   Eigen::VectorXd untold = Eigen::VectorXd::Zero(combinations.rows());
   for (Eigen::Index i = 0; i < axes.values.size(); ++i) {
     if (axes.values[i] > least) {
-      told.col(i) /= std::sqrt(axes.values[i]);
+      scaled.col(i) /= std::sqrt(axes.values[i]);
     } else {
-      told.col(i).setZero();
+      scaled.col(i).setZero();
       untold += along.col(i).cwiseAbs2();
     }
   }
-  Eigen::MatrixXd covariance = product(told, told.transpose());
+  Eigen::MatrixXd covariance = product(scaled, scaled.transpose());
   for (Eigen::Index r = 0; r < covariance.rows(); ++r) {
     if (untold[r] <= kUntoldShare * along.row(r).squaredNorm()) continue;
     covariance.row(r).setZero();

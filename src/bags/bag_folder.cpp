@@ -29,7 +29,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kMetadata = "metadata.yaml";
 constexpr std::size_t kMostNamed = 10;  // in a message
 
 std::string some_names(std::vector<std::string> names) {
@@ -95,8 +94,8 @@ std::vector<std::pair<std::string, std::size_t>> stated_names(const std::string&
   return names;
 }
 
-/// A file that rosbag2 compressed as a whole, also where it was unpacked beside since.
-/// @return the file that can be read; empty where it has to be unpacked first
+/// A file that rosbag2 compressed as a whole, even if an unpacked copy exists beside it.
+/// @return the readable file; empty if it has to be unpacked first
 std::string unpacked(const std::string& file) {
   constexpr std::string_view kEnding = ".zstd";
   if (!file.ends_with(kEnding)) return file;
@@ -124,7 +123,7 @@ class BagFolder final : public Bag {
         }
       } catch (const FileError&) {
         if (&file == &files_.front()) throw;
-        break;  // reported once the sound files before it are read
+        break;  // reported once the undamaged files before it are read
       }
     }
     std::ranges::sort(topics_,
@@ -204,7 +203,7 @@ class BagFolder final : public Bag {
 
   std::vector<io::InputFile> files_;
   std::vector<bool> wanted_;
-  std::unique_ptr<Bag> part_;          ///< the file that is being read
+  std::unique_ptr<Bag> part_;          ///< the current file
   std::size_t read_ = 0;               ///< files before it
   std::vector<std::size_t> topic_of_;  ///< by topic of the file
   Message part_message_;               ///< the last one, with the file's topic

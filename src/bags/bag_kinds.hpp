@@ -10,18 +10,20 @@
 #include <vector>
 
 #include "risley/bags/bag.hpp"
+#include "risley/bags/bag_writer.hpp"
 
 namespace risley::bags {
 
 inline constexpr std::string_view kRos1Signature = "#ROSBAG V2.0";
 inline constexpr std::string_view kMcapSignature = "\x89MCAP";  ///< the version follows
+inline constexpr const char* kMetadata = "metadata.yaml";       ///< of a folder of ROS 2
 
 /// A type whose messages are known.
 struct KnownType {
   MessageKind kind;
   std::string_view ros1_name, md5, ros2_name;
 };
-/// A CustomMsg, whose package differs between drivers, has no names here.
+/// A CustomMsg, which is in different packages in different drivers, has no names here.
 inline constexpr std::array kKnownTypes{
     KnownType{MessageKind::points, "", "e4d6829bdfe657cb6c21a746c86b21a6", ""},
     KnownType{MessageKind::cloud, "sensor_msgs/PointCloud2", "1158d486dd51d683ce2f1be655c3c181",
@@ -40,8 +42,8 @@ inline constexpr std::array kKnownTypes{
 
 /// The kind of messages of a type of ROS 2.
 std::optional<MessageKind> ros2_kind(std::string_view type);
-/// A topic of ROS 1, whose md5 sum matters where the name alone would fit.
-/// @param md5  empty where it is not known: then the name decides
+/// A topic of ROS 1, where the md5 sum matters if the name alone would match.
+/// @param md5  empty if it is not known: then the name decides
 Topic ros1_topic(const std::string& name, const std::string& type, const std::string& md5);
 
 std::unique_ptr<Bag> open_ros1_bag(const io::InputFile& file,
@@ -51,10 +53,13 @@ std::unique_ptr<Bag> open_ros2_bag(const std::string& path,
                                    const Progress& progress);  // ros2_bag.cpp
 std::unique_ptr<Bag> open_mcap_bag(const io::InputFile& file,
                                    const Progress& progress);  // mcap_bag.cpp
-/// A folder of bags of one kind, as files_of_bag_folder() takes it.
+/// A folder of bags of one kind, as returned by files_of_bag_folder().
 std::unique_ptr<Bag> open_bag_folder(const std::string& folder,
-                                     const Progress& progress);  // bag_folder.cpp
-/// The kind of a bag; nothing where it is none.
+                                     const Progress& progress);       // bag_folder.cpp
+std::unique_ptr<BagWriter> create_ros1_bag(const std::string& path);  // ros1_writer.cpp
+std::unique_ptr<BagWriter> create_ros2_bag(const std::string& path);  // ros2_writer.cpp
+std::unique_ptr<BagWriter> create_mcap_bag(const std::string& path);  // mcap_writer.cpp
+/// The kind of a bag; nothing if it is not one.
 std::optional<BagKind> bag_kind_of(const io::InputFile& file);  // bag.cpp
 
 }  // namespace risley::bags

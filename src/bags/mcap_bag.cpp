@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // MCAP, version 0, as https://mcap.dev/spec has it: records, some of them within chunks that may be
-// packed. They are read from the front, so that a file without an end gives what it has; of the
-// summary at the end only topics and counts are taken. A chunk is given out when its checksum fits.
+// packed. They are read from the front, so that a file without an end yields its contents; from the
+// summary at the end only topics and counts are used. A chunk is used only if its checksum is
+// right.
 #include <algorithm>
 #include <map>
 #include <memory>
@@ -24,36 +25,19 @@
 #include "risley/io/little_endian.hpp"
 
 #include "bags/bag_kinds.hpp"
+#include "bags/mcap_format.hpp"
 #include "bags/unpack.hpp"
 #include "bags/untouched_bytes.hpp"
 
 namespace risley::bags {
 namespace {
 
-using namespace std::string_view_literals;
 using io::BlockInput;
 using io::load;
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr std::string_view kMcapMagic = "\x89MCAP0\r\n"sv;
-constexpr std::uint64_t kRecordHead = 9, kMessageHead = 22;
 /// Of a chunk when unpacked, and of a message.
 constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30U;
-
-enum McapOp : std::uint8_t {
-  kHeaderOp = 1,
-  kFooterOp = 2,
-  kSchemaOp = 3,
-  kChannelOp = 4,
-  kMessageOp = 5,
-  kChunkOp = 6,
-  kMessageIndexOp = 7,
-  kAttachmentOp = 9,
-  kStatisticsOp = 11,
-  kMetadataOp = 12,
-  kDataEndOp = 15,
-  kLastKnownOp = 15,
-};
 
 /// Where a record of the file stands.
 struct McapRecord {
@@ -63,9 +47,14 @@ struct McapRecord {
   std::uint64_t data_bytes() const { return end - data; }
 };
 
+struct Schema {
+  std::string name, encoding, definition;
+};
+
 struct Channel {
   std::uint16_t schema = 0;
   std::string topic, encoding, md5;
+  std::vector<std::pair<std::string, std::string>> details;
   std::size_t index = 0;  ///< of its topic
 
   bool is_like(const Channel& other) const {
@@ -86,15 +75,26 @@ std::pair<std::uint16_t, Channel> take_channel(Bytes bytes) {
   while (metadata.left() > 0) {
     const std::string key = metadata.text("characters of a key");
     std::string value = metadata.text("characters of a value");
-    if (key == "md5sum") channel.md5 = std::move(value);  // from converted bags of ROS 1
+    if (key == "md5sum") {  // from converted bags of ROS 1
+      channel.md5 = std::move(value);
+    } else if (key != "topic") {
+      channel.details.emplace_back(key, std::move(value));
+    }
   }
   return {id, std::move(channel)};
 }
 
-/// The topic of a channel whose schema has that name.
-Topic topic_of_channel(const Channel& channel, const std::string& type) {
-  if (channel.encoding == "ros1") return ros1_topic(channel.topic, type, channel.md5);
-  Topic topic{channel.topic, type, ros2_kind(type), Serialisation::cdr};
+/// The topic of a channel of that schema.
+Topic topic_of_channel(const Channel& channel, const Schema& schema) {
+  const std::string& type = schema.name;
+  StoredTopic stored{type, channel.md5, schema.encoding, schema.definition, {}, channel.details};
+  if (channel.encoding == "ros1") {
+    Topic topic = ros1_topic(channel.topic, type, channel.md5);
+    topic.stored = std::move(stored);
+    return topic;
+  }
+  if (channel.encoding != "cdr") stored.encoding = channel.encoding;
+  Topic topic{channel.topic, type, ros2_kind(type), Serialisation::cdr, std::move(stored)};
   if (channel.encoding != "cdr" && topic.kind) {
     topic.kind.reset();
     topic.type += fmt::format(", encoded as \"{}\" instead of cdr", channel.encoding);
@@ -146,7 +146,7 @@ class McapBag final : public Bag {
     fail_at(chunk_offset_, fmt::format("{}, at byte {} of the unpacked chunk", problem, at));
   }
 
-  /// Calls a function that takes a record apart, whose bytes begin at an offset of the file.
+  /// Calls a function that parses a record whose bytes begin at an offset of the file.
   template <class Function>
   auto guarded(std::uint64_t offset, Function&& function) const {
     try {
@@ -163,7 +163,7 @@ class McapBag final : public Bag {
     return {count == 0 ? nullptr : file_.at(record.data, count), count};
   }
 
-  /// Copies bytes of the file, or gives them away in pieces.
+  /// Copies bytes of the file, or passes them on in pieces.
   template <class Take>
   void for_each_block(std::uint64_t begin, std::uint64_t end, Take&& take) {
     while (begin < end) {
@@ -186,11 +186,11 @@ class McapBag final : public Bag {
     return static_cast<std::uint32_t>(crc);
   }
 
-  /// The record at an offset; nothing where it does not end before the limit.
+  /// The record at an offset; nothing if it does not end before the limit.
   std::optional<McapRecord> record_at(std::uint64_t offset, std::uint64_t limit) {
-    if (limit - offset < kRecordHead) return std::nullopt;
-    const std::uint8_t* head = file_.at(offset, kRecordHead);
-    McapRecord record{head[0], offset, offset + kRecordHead, 0};
+    if (limit - offset < kMcapRecordHead) return std::nullopt;
+    const std::uint8_t* head = file_.at(offset, kMcapRecordHead);
+    McapRecord record{head[0], offset, offset + kMcapRecordHead, 0};
     const auto bytes = load<std::uint64_t>(head + 1);
     if (bytes > limit - record.data) return std::nullopt;
     record.end = record.data + bytes;
@@ -200,7 +200,8 @@ class McapBag final : public Bag {
 
   void check_beginning() {
     const std::uint64_t magic = kMcapMagic.size();
-    if (file_.size() < magic + kRecordHead) fail_at(file_.size(), "is cut off before its header");
+    if (file_.size() < magic + kMcapRecordHead)
+      fail_at(file_.size(), "is cut off before its header");
     const std::string_view found(reinterpret_cast<const char*>(file_.at(0, magic)), magic);
     if (found != kMcapMagic) {
       fail_at(kMcapSignature.size(),
@@ -214,24 +215,24 @@ class McapBag final : public Bag {
     first_ = header->end;
   }
 
-  /// Finds whether the file was closed, and where its data ends then.
+  /// Finds whether the file was closed, and where its data end then.
   void find_end() {
     constexpr std::uint64_t kFooterBytes = 20;
     const std::uint64_t size = file_.size(), magic = kMcapMagic.size();
     data_limit_ = size;
-    if (size - first_ < kRecordHead + kFooterBytes + magic) return;
-    const std::uint64_t footer = size - magic - kFooterBytes - kRecordHead;
+    if (size - first_ < kMcapRecordHead + kFooterBytes + magic) return;
+    const std::uint64_t footer = size - magic - kFooterBytes - kMcapRecordHead;
     const std::uint8_t* bytes = file_.at(footer, size - footer);
-    const std::string_view end(reinterpret_cast<const char*>(bytes) + kRecordHead + kFooterBytes,
-                               magic);
+    const std::string_view end(
+        reinterpret_cast<const char*>(bytes) + kMcapRecordHead + kFooterBytes, magic);
     if (bytes[0] != kFooterOp || load<std::uint64_t>(bytes + 1) != kFooterBytes ||
         end != kMcapMagic) {
       return;
     }
     closed_ = true;
     footer_ = data_limit_ = footer;
-    summary_ = load<std::uint64_t>(bytes + kRecordHead);
-    const auto stated = load<std::uint32_t>(bytes + kRecordHead + 16);
+    summary_ = load<std::uint64_t>(bytes + kMcapRecordHead);
+    const auto stated = load<std::uint32_t>(bytes + kMcapRecordHead + 16);
     if (summary_ == 0) return;
     if (summary_ < first_ || summary_ > footer) {
       summary_problem_.emplace(
@@ -243,7 +244,7 @@ class McapBag final : public Bag {
     }
     data_limit_ = summary_;
     if (stated == 0) return;
-    const std::uint32_t found = checksum(summary_, footer + kRecordHead + 16);
+    const std::uint32_t found = checksum(summary_, footer + kMcapRecordHead + 16);
     if (found == stated) return;
     summary_problem_.emplace(
         path_, FilePlace{summary_, {}},
@@ -252,7 +253,7 @@ class McapBag final : public Bag {
             found, stated));
   }
 
-  /// Takes channels and counts from the summary. @return whether it is sound and has them all
+  /// Reads channels and counts from the summary. @return whether it is valid and complete
   bool take_summary() {
     if (!closed_ || summary_ == 0 || summary_problem_) return false;
     std::optional<std::uint32_t> channels;
@@ -286,7 +287,8 @@ class McapBag final : public Bag {
     return false;
   }
 
-  /// Reads all records for their channels, up to the first damage, which reading reports later.
+  /// Reads all records for their channels, up to the first damage, which is reported later on
+  /// reading.
   void look_for_channels() {
     looking_ = true;
     begin_pass();
@@ -307,35 +309,47 @@ class McapBag final : public Bag {
     warnings_.clear();
   }
 
-  /// Several channels may have one topic: each sender its own.
+  /// Several channels may have one topic: one for each sender.
   void make_topics() {
     std::map<std::tuple<std::string, std::string, std::string>, std::vector<Channel*>> known;
     for (auto& [id, channel] : channels_) {
-      const std::string type = channel.schema == 0 ? "" : schemas_.at(channel.schema);
-      known[{channel.topic, type, channel.encoding}].push_back(&channel);
+      known[{channel.topic, schema_of(channel).name, channel.encoding}].push_back(&channel);
     }
     for (const auto& [key, channels] : known) {
       for (Channel* channel : channels) channel->index = topics_.size();
-      topics_.push_back(topic_of_channel(*channels.front(), std::get<1>(key)));
+      topics_.push_back(topic_of_channel(*channels.front(), schema_of(*channels.front())));
     }
   }
 
-  /// Takes a schema or a channel, or compares it with that of its number.
+  Schema schema_of(const Channel& channel) const {
+    return channel.schema == 0 ? Schema{} : schemas_.at(channel.schema);
+  }
+
+  /// Adds a schema or a channel, or compares it with the one of its number.
   /// @param is_new  whether it may be unknown so far
   /// @throws BadMessage
   void take_definition(std::uint8_t op, Bytes bytes, bool is_new) {
     if (op == kSchemaOp) {
       Ros1Fields fields(bytes);
       const auto id = fields.number<std::uint16_t>("the schema's number");
-      const std::string name = fields.text("characters of the schema's name");
+      Schema schema{fields.text("characters of the schema's name"), {}, {}};
       if (id == 0) return;  // which readers should ignore
-      const auto [known, added] =
-          is_new ? schemas_.emplace(id, name) : std::pair{schemas_.find(id), false};
-      if (known == schemas_.end()) return;  // of no channel
-      if (!added && known->second != name) {
-        throw BadMessage{fmt::format("schema {} is {} here and {} elsewhere in the file", id, name,
-                                     known->second)};
+      const auto known = schemas_.find(id);
+      if (known != schemas_.end()) {
+        if (known->second.name != schema.name) {
+          throw BadMessage{fmt::format("schema {} is {} here and {} elsewhere in the file", id,
+                                       schema.name, known->second.name)};
+        }
+        return;
       }
+      if (!is_new) return;  // of no channel
+      try {                 // the rest is not needed to read messages
+        schema.encoding = fields.text("characters of the schema's encoding");
+        schema.definition = fields.text("characters of the schema");
+      } catch (const BadMessage&) {
+        schema.encoding.clear();
+      }
+      schemas_.emplace(id, std::move(schema));
       return;
     }
     auto [id, channel] = take_channel(bytes);
@@ -363,6 +377,12 @@ class McapBag final : public Bag {
       throw BadMessage{fmt::format("a message of channel {}, which no record describes", id)};
     }
     return !looking_ && wanted_[channel->second.index] ? &channel->second : nullptr;
+  }
+
+  /// The times of a message, which stand behind its channel and number.
+  static void take_head(const std::uint8_t* head, Message& message) {
+    message.time_ns = load<std::uint64_t>(head + 6);
+    message.publish_time_ns = load<std::uint64_t>(head + 14);
   }
 
   bool give(const Channel& channel, Bytes bytes, std::uint64_t byte_offset, Message& message) {
@@ -411,7 +431,7 @@ class McapBag final : public Bag {
       case kDataEndOp:
         end_data(*record);
         break;
-      case kFooterOp:  // of a file whose last bytes are not as they should be
+      case kFooterOp:  // of a file whose last bytes are invalid
         if (file_.size() - record->end >= kMcapMagic.size()) {
           fail_at(record->end,
                   "expected the file to end with 89 4D 43 41 50 30 0D 0A after the footer, found "
@@ -425,7 +445,7 @@ class McapBag final : public Bag {
     return false;
   }
 
-  /// Data stand before the record that ends them, what belongs to the summary behind it.
+  /// Data come before the record that ends them, the summary follows it.
   void require_in_place(const McapRecord& record) const {
     const bool is_data = record.op == kMessageOp || record.op == kChunkOp ||
                          record.op == kMessageIndexOp || record.op == kAttachmentOp ||
@@ -439,14 +459,15 @@ class McapBag final : public Bag {
   }
 
   bool take_message(const McapRecord& record, Message& message) {
-    if (record.data_bytes() < kMessageHead) {
+    if (record.data_bytes() < kMcapMessageHead) {
       fail_at(record.offset, fmt::format("expected a message of at least {} bytes, found {}",
-                                         kMessageHead, record.data_bytes()));
+                                         kMcapMessageHead, record.data_bytes()));
     }
-    const auto id = load<std::uint16_t>(file_.at(record.data, kMessageHead));
+    take_head(file_.at(record.data, kMcapMessageHead), message);
+    const auto id = load<std::uint16_t>(file_.at(record.data, kMcapMessageHead));
     const Channel* channel = guarded(record.offset, [&] { return wanted_channel(id); });
     if (channel == nullptr) return false;
-    const std::uint64_t begin = record.data + kMessageHead, bytes = record.end - begin;
+    const std::uint64_t begin = record.data + kMcapMessageHead, bytes = record.end - begin;
     if (bytes > kMostBytes) {
       fail_at(record.offset,
               fmt::format("expected a message of at most {} bytes, found {}", kMostBytes, bytes));
@@ -490,10 +511,9 @@ class McapBag final : public Bag {
                           kMostBytes, packed, bytes));
     }
     if (packing.empty() ? bytes != packed : bytes > most * packed) {
-      fail_at(
-          record.offset,
-          fmt::format("the chunk states {} bytes when unpacked, its records have {}{}", bytes,
-                      packed, packing.empty() ? "" : " when packed, of which they cannot come"));
+      fail_at(record.offset,
+              fmt::format("the chunk states {} bytes when unpacked, its records have {}{}", bytes,
+                          packed, packing.empty() ? "" : " when packed, too few to hold them"));
     }
     chunk_.make_room(bytes);
     if (packing.empty()) {
@@ -525,19 +545,20 @@ class McapBag final : public Bag {
   bool take_from_chunk(Message& message) {
     const std::uint64_t at = chunk_at_, left = chunk_bytes_ - at;
     const std::uint8_t* record = chunk_.data() + at;
-    const std::uint64_t bytes = left < kRecordHead ? left : load<std::uint64_t>(record + 1);
-    if (left < kRecordHead || bytes > left - kRecordHead) {
+    const std::uint64_t bytes = left < kMcapRecordHead ? left : load<std::uint64_t>(record + 1);
+    if (left < kMcapRecordHead || bytes > left - kMcapRecordHead) {
       fail_in_chunk(at, "a record does not fit into its chunk");
     }
-    chunk_at_ = at + kRecordHead + bytes;
-    const Bytes content{record + kRecordHead, static_cast<std::size_t>(bytes)};
+    chunk_at_ = at + kMcapRecordHead + bytes;
+    const Bytes content{record + kMcapRecordHead, static_cast<std::size_t>(bytes)};
     try {
       switch (record[0]) {
         case kMessageOp: {
-          require_room("the head of a message", 1, kMessageHead, content.size());
+          require_room("the head of a message", 1, kMcapMessageHead, content.size());
           const Channel* channel = wanted_channel(load<std::uint16_t>(content.data()));
+          take_head(content.data(), message);
           return channel != nullptr &&
-                 give(*channel, content.subspan(kMessageHead),
+                 give(*channel, content.subspan(kMcapMessageHead),
                       chunk_is_plain_ ? chunk_data_ + at : chunk_offset_, message);
         }
         case kSchemaOp:
@@ -545,7 +566,7 @@ class McapBag final : public Bag {
           take_definition(record[0], content, looking_);
           return false;
         default:
-          if (record[0] > kLastKnownOp) return false;  // of later versions, or somebody's own
+          if (record[0] > kLastKnownOp) return false;  // of later versions, or private ones
           throw BadMessage{
               fmt::format("expected a schema, a channel or a message in a chunk, "
                           "found a record of type {}",
@@ -578,7 +599,7 @@ class McapBag final : public Bag {
                     found, stated));
   }
 
-  /// All that can be read is read: says what is wrong with the end.
+  /// All readable data are read: reports the defect at the end.
   void finish() {
     ended_ = true;
     if (looking_) return;
@@ -610,8 +631,8 @@ class McapBag final : public Bag {
   bool closed_ = false;
   std::optional<FileError> summary_problem_;
   std::optional<std::uint64_t> message_count_;
-  std::map<std::uint16_t, std::string> schemas_;  ///< names by number
-  std::map<std::uint16_t, Channel> channels_;     ///< by number
+  std::map<std::uint16_t, Schema> schemas_;    ///< by number
+  std::map<std::uint16_t, Channel> channels_;  ///< by number
 
   // Of a pass through the file:
   bool looking_ = false;  ///< for channels, and nothing else
@@ -620,7 +641,7 @@ class McapBag final : public Bag {
   std::uint64_t offset_ = 0, messages_ = 0;
   bool ended_ = false, data_ended_ = false;
   Unpacker unpacker_;
-  UntouchedBytes buffer_;  ///< a message outside of chunks, or a chunk as it is packed
+  UntouchedBytes buffer_;  ///< a message outside of chunks, or a packed chunk
   UntouchedBytes chunk_;
   std::uint64_t chunk_bytes_ = 0, chunk_at_ = 0;
   std::uint64_t chunk_offset_ = 0, chunk_data_ = 0;  ///< in the file: the record, its records

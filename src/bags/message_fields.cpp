@@ -28,7 +28,7 @@ void require_room(std::string_view what, std::uint64_t count, std::size_t bytes_
 struct CdrFields::State {
   explicit State(std::span<const std::uint8_t> message)
       : bytes(message),
-        // Reading changes nothing, but the buffer is of bytes that could be written.
+        // Reading changes nothing, but the buffer's type is of writable bytes.
         buffer(reinterpret_cast<char*>(const_cast<std::uint8_t*>(bytes.data())), bytes.size()),
 #if defined(FASTCDR_VERSION_MAJOR) && FASTCDR_VERSION_MAJOR >= 2
         cdr(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::CdrVersion::DDS_CDR)
@@ -98,16 +98,18 @@ std::uint32_t CdrFields::length(std::string_view what, std::size_t bytes_each) {
   return count;
 }
 
-std::span<const std::uint8_t> CdrFields::byte_sequence(std::string_view what) {
-  const std::size_t count = length(what, 1);
+bool CdrFields::big_endian() const { return state_->bytes[1] == 0; }
+
+std::span<const std::uint8_t> CdrFields::take(std::size_t count, std::string_view what) {
+  require_room(what, count, 1, left());
   const auto bytes = state_->bytes.subspan(state_->bytes.size() - left(), count);
   state_->guarded([&] { state_->cdr.jump(count); });
   return bytes;
 }
 
 Header take_header(Ros1Fields& fields) {
-  fields.number<std::uint32_t>("the sequence number");
   Header header;
+  header.sequence = fields.number<std::uint32_t>("the sequence number");
   header.seconds = fields.number<std::uint32_t>("the stamp");
   header.nanoseconds = fields.number<std::uint32_t>("the stamp");
   header.frame = fields.text("characters of the frame name");

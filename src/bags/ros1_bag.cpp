@@ -1,17 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Bags of ROS 1, version 2.0, read through rosbag_storage. That library trusts the lengths and
-// positions in a file, so the structure is checked before the file is given to it. For that, chunks
-// that are compressed are unpacked once more than for reading.
+// positions in a file, so the structure is checked first. For this, compressed chunks are unpacked
+// once more than for reading.
 #include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <memory>
-#include <mutex>
 #include <tuple>
 #include <utility>
 
-#include <console_bridge/console.h>
 #include <fmt/format.h>
 #include <rosbag/bag.h>
 #include <rosbag/chunked_file.h>
@@ -20,9 +18,9 @@
 #include "risley/bags/bag.hpp"
 #include "risley/core/error.hpp"
 #include "risley/io/little_endian.hpp"
-#include "risley/io/rosbag_lock.hpp"
 
 #include "bags/bag_kinds.hpp"
+#include "bags/rosbag_call.hpp"
 #include "bags/untouched_bytes.hpp"
 
 namespace risley::bags {
@@ -31,20 +29,6 @@ namespace {
 using io::load;
 
 constexpr std::string_view kMend = "; the command `rosbag reindex` repairs it";
-
-/// Holds rosbag_storage for one thread. While it lives, the library prints nothing: it logs what it
-/// throws.
-class RosbagCall {
- public:
-  RosbagCall() : handler_(console_bridge::getOutputHandler()) { console_bridge::noOutputHandler(); }
-  ~RosbagCall() { console_bridge::useOutputHandler(handler_); }
-  RosbagCall(const RosbagCall&) = delete;
-  RosbagCall& operator=(const RosbagCall&) = delete;
-
- private:
-  std::unique_lock<std::recursive_mutex> lock_ = io::lock_rosbag();  // before the handler is asked
-  console_bridge::OutputHandler* handler_;
-};
 
 /// Deletes an object of rosbag_storage.
 struct DeleteInRosbag {
@@ -66,7 +50,7 @@ bool operator<(const TopicKey& a, const TopicKey& b) {
   return std::tie(a.name, a.md5, a.type) < std::tie(b.name, b.md5, b.type);
 }
 
-/// Topics of connections, of which a topic has one for every node that sends to it.
+/// Topics of connections; a topic has one for every sending node.
 std::vector<Topic> topics_of(std::vector<TopicKey> keys, std::vector<TopicKey>* kept = nullptr) {
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end(),
@@ -164,7 +148,7 @@ class BagStructure {
     return record;
   }
 
-  /// Calls visit(name, value) for the fields of a header, which stand behind their lengths.
+  /// Calls visit(name, value) for the fields of a header, each of which follows its length.
   template <class Visit>
   void for_each_field(std::uint64_t offset, std::string_view header, Visit&& visit) const {
     while (!header.empty()) {
@@ -200,7 +184,7 @@ class BagStructure {
     return load<T>(reinterpret_cast<const std::uint8_t*>(value->data()));
   }
 
-  /// Where the records behind the file's header begin, and where its index does.
+  /// Positions of the records after the file's header, and of its index.
   struct Beginning {
     std::uint64_t records = 0, index = 0;
   };
@@ -329,7 +313,7 @@ class BagStructure {
     }
     std::vector<std::uint8_t> packed(record.data_bytes());
     read(record.data, reinterpret_cast<char*>(packed.data()), packed.size());
-    // What the compressed bytes do not fill stays zero and is no record.
+    // Bytes that the compressed data do not fill stay zero and are not a record.
     UntouchedBytes unpacked(bytes);
     try {
       const RosbagCall call;
@@ -387,7 +371,7 @@ class BagStructure {
   std::uint64_t size_ = 0;
   std::vector<std::uint64_t> chunks_;
   std::vector<std::uint32_t> messages_;  ///< where those of the last chunk begin in it
-  UntouchedBytes unpacked_;              ///< a compressed chunk while it is looked at
+  UntouchedBytes unpacked_;              ///< a compressed chunk during the check
 };
 
 class Ros1Bag final : public Bag {
@@ -425,6 +409,7 @@ class Ros1Bag final : public Bag {
       const rosbag::MessageInstance& instance = *position_;
       message.topic = topic_of(instance.getTopic(), instance.getMD5Sum());
       message.number = ++topic_messages_[message.topic];
+      message.time_ns = message.publish_time_ns = instance.getTime().toNSec();
       bytes_.resize(instance.size());
       ros::serialization::OStream stream(bytes_.data(), instance.size());
       instance.write(stream);
@@ -439,7 +424,7 @@ class Ros1Bag final : public Bag {
   }
 
  private:
-  /// Calls a function of rosbag_storage, whose errors are of many types.
+  /// Calls a function of rosbag_storage, whose exceptions have many types.
   template <class Function>
   void guarded(const char* what, Function&& function) const {
     const RosbagCall call;
@@ -461,6 +446,17 @@ class Ros1Bag final : public Bag {
       connections.push_back({connection->topic, connection->md5sum, connection->datatype});
     }
     topics_ = topics_of(std::move(connections), &known_);
+    for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+      StoredTopic& stored = topics_[topic_of(connection->topic, connection->md5sum)].stored;
+      stored.type = connection->datatype;
+      stored.md5 = connection->md5sum;
+      stored.definition_format = "ros1msg";
+      stored.definition = connection->msg_def;
+      stored.details.clear();
+      for (const auto& [name, value] : *connection->header) {
+        if (name == "callerid" || name == "latching") stored.details.emplace_back(name, value);
+      }
+    }
   }
 
   std::size_t topic_of(const std::string& name, const std::string& md5) const {

@@ -1,10 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Bags of ROS 2 as rosbag2 stores them by default: a SQLite database whose messages are in CDR.
-// Messages come in the order of their ids, which is that of recording.
+// Messages come in the order of their ids, the order of recording.
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -26,8 +28,9 @@ class Ros2Bag final : public Bag {
     database_.require_plain_table("topics");
     database_.require_plain_table("messages");
     find_topics();
+    find_stored();
     find_ids();
-    messages_ = database_.query("SELECT id, topic_id, data FROM messages ORDER BY id");
+    messages_ = database_.query("SELECT id, topic_id, data, timestamp FROM messages ORDER BY id");
   }
 
   void rewind(const std::vector<bool>& wanted) override {
@@ -45,7 +48,7 @@ class Ros2Bag final : public Bag {
     while (messages_->next("be read to its end")) {
       progress_.check();
       const std::int64_t id = messages_->integer(0);
-      if (any_read_ && id <= id_) {  // pages that stand in the table again and again
+      if (any_read_ && id <= id_) {  // pages repeated in the table
         fail(fmt::format("message row {} follows row {}, expected ascending numbers", id, id_));
       }
       id_ = id;
@@ -54,9 +57,10 @@ class Ros2Bag final : public Bag {
       if (!topic) continue;
       message.topic = *topic;
       message.number = id;
+      message.time_ns = message.publish_time_ns = static_cast<std::uint64_t>(messages_->integer(3));
       message.bytes = messages_->bytes(2);
       blob_bytes_ += message.bytes.size();
-      if (blob_bytes_ > database_.file_bytes()) {  // pages that stand in several messages
+      if (blob_bytes_ > database_.file_bytes()) {  // pages shared by several messages
         fail(fmt::format("the messages up to row {} have {} bytes, but the database only {}", id_,
                          blob_bytes_, database_.file_bytes()));
       }
@@ -88,13 +92,57 @@ class Ros2Bag final : public Bag {
       topic.type = query.text(2);
       topic.kind = ros2_kind(topic.type);
       topic.serialisation = Serialisation::cdr;
+      topic.stored.type = topic.type;
       const std::string serialization = query.text(3);
+      if (serialization != "cdr") topic.stored.encoding = serialization;
       if (topic.kind && serialization != "cdr") {
         topic.kind.reset();
         topic.type += fmt::format(", stored as \"{}\" instead of cdr", serialization);
       }
       ids_.push_back(query.integer(0));
       topics_.push_back(std::move(topic));
+    }
+  }
+
+  /// Definitions and qualities of service, which not every version of rosbag2 stores.
+  void find_stored() {
+    std::map<std::int64_t, std::string> qualities;  // by topic
+    take_texts("SELECT id, offered_qos_profiles FROM topics", [&](const auto& row) {
+      return qualities.insert_or_assign(row.integer(0), row.text(1)).first->second.size();
+    });
+    struct Definition {
+      std::string format, text;
+    };
+    std::map<std::string, Definition> definitions;  // by type
+    database_.require_plain_table("message_definitions");
+    take_texts("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions",
+               [&](const auto& row) {
+                 Definition& one = definitions[row.text(0)];
+                 one = {row.text(1), row.text(2)};
+                 return one.text.size();
+               });
+    for (std::size_t i = 0; i < topics_.size(); ++i) {
+      StoredTopic& stored = topics_[i].stored;
+      if (const auto found = qualities.find(ids_[i]); found != qualities.end()) {
+        stored.details.emplace_back("offered_qos_profiles", found->second);
+      }
+      if (const auto found = definitions.find(stored.type); found != definitions.end()) {
+        stored.definition_format = found->second.format;
+        stored.definition = found->second.text;
+      }
+    }
+  }
+
+  /// Runs a query if the database has its columns: messages can be read without it.
+  /// @param take  for each row; returns its bytes, which together cannot exceed the file's
+  template <class Take>
+  void take_texts(const char* sql, const Take& take) {
+    std::size_t bytes = 0;
+    try {
+      tables::SqliteQuery query = database_.query(sql);
+      while (bytes <= database_.file_bytes() && query.next("give its topics")) bytes += take(query);
+    } catch (const FileError&) {
+      // A column that this version does not have, or damage that other queries report.
     }
   }
 
@@ -105,7 +153,7 @@ class Ros2Bag final : public Bag {
     id_ = first_id_;
   }
 
-  /// A damaged end is no reason to keep back what stands in front of it.
+  /// A damaged end does not invalidate the data before it.
   std::int64_t id_at_end(const char* sql) const {
     tables::SqliteQuery query = database_.query(sql);
     try {

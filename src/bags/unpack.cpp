@@ -37,7 +37,7 @@ struct Unpacker::State {
   std::unique_ptr<LZ4F_dctx, FreeLz4> lz4;
   std::unique_ptr<ZSTD_DCtx, FreeZstd> zstd;
 
-  /// Frames one after the other. @return how many bytes came of them
+  /// Frames one after the other. @return number of bytes unpacked
   std::size_t unpack_lz4(std::span<const std::uint8_t> packed, std::span<std::uint8_t> room) {
     if (!lz4) {
       LZ4F_dctx* context = nullptr;
@@ -59,7 +59,7 @@ struct Unpacker::State {
       packed = packed.subspan(taken);
       done += made;
     }
-    // A frame that wants more may only have to give what has no room.
+    // A frame that needs more may only have to return output that has no room.
     if (more != 0)
       fail_length(room.size(), done == room.size() ? "more" : "a frame without an end");
     return done;

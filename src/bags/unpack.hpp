@@ -11,7 +11,7 @@
 
 namespace risley::bags {
 
-/// Unpacks chunks and messages, keeping what the libraries need from one to the next.
+/// Unpacks chunks and messages, and reuses the libraries' state.
 class Unpacker {
  public:
   Unpacker();
@@ -19,17 +19,17 @@ class Unpacker {
   Unpacker(const Unpacker&) = delete;
   Unpacker& operator=(const Unpacker&) = delete;
 
-  /// So many bytes at most come of one packed byte: more cannot be claimed.
-  /// @param packing  "lz4" or "zstd"; 0 for others, which are not known
+  /// Largest expansion of one packed byte: claims beyond it are false.
+  /// @param packing  "lz4" or "zstd"; 0 for unknown ones
   static std::uint64_t most_per_byte(std::string_view packing);
 
   /// Unpacks one chunk, which must fill its room exactly.
-  /// @throws BadMessage when the bytes are not packed so, or hold more or less
+  /// @throws BadMessage when the bytes are not packed this way, or hold more or less
   void unpack(std::string_view packing, std::span<const std::uint8_t> packed,
               std::span<std::uint8_t> room);
 
   /// A message of ROS 2 as it was before rosbag2 compressed it by Zstandard (compression_mode:
-  /// MESSAGE), recognised by first bytes with which plain CDR never begins; others as they are.
+  /// MESSAGE), recognised by first bytes that plain CDR never has; others unchanged.
   /// @return bytes that are valid until the next call
   /// @throws BadMessage as unpack()
   std::span<const std::uint8_t> message(std::span<const std::uint8_t> bytes);

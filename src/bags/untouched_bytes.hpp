@@ -10,7 +10,7 @@
 
 namespace risley::bags {
 
-/// Zeroed memory that costs nothing until it is written to, however much a file asks for.
+/// Zeroed memory that costs nothing until it is written to, however much a file requests.
 class UntouchedBytes {
  public:
   UntouchedBytes() = default;

@@ -6,8 +6,8 @@
 
 namespace risley::calibration {
 
-/// A symmetric positive matrix of which only a band beside the diagonal is not zero, and its factor
-/// L L'. Rows are kept as they stand in memory, so that products of rows run through it.
+/// A symmetric positive definite matrix that is zero outside a band along the diagonal, and its
+/// factor L L'. Rows are stored in memory order, so that products of rows are contiguous.
 class BandMatrix {
  public:
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -25,7 +25,7 @@ class BandMatrix {
 
   /// Replaces the matrix by its factor. @return whether there is one
   bool factorise();
-  /// L^-1 times the columns, in their place.
+  /// L^-1 times the columns, in place.
   void solve_lower(Rows& columns) const;
   /// L'^-1 times a vector, in its place.
   void solve_upper(Eigen::VectorXd& vector) const;

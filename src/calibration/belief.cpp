@@ -34,7 +34,7 @@ void check_same_sensor(const std::vector<RangedRecording>& recordings) {
   }
 }
 
-/// Row of a held parameter, entered where it is new.
+/// Row of a held parameter, added if it is new.
 Index row_of(const estimation::FreeParameter& parameter,
              std::vector<estimation::FreeParameter>& held) {
   const auto at =
@@ -44,7 +44,7 @@ Index row_of(const estimation::FreeParameter& parameter,
   return row;
 }
 
-/// Errors of held parameters are the same in all recordings: it is one sensor.
+/// Errors of held parameters are the same in all recordings, because they are from one sensor.
 void pool_held(const std::vector<RangedRecording>& recordings, Belief& belief) {
   const Index n = belief.free.size();
   std::vector<std::vector<Index>> rows;

@@ -10,22 +10,22 @@
 
 namespace risley::calibration {
 
-/// The believed parameters as all recordings together determine them: what the sensor computes its
-/// directions with.
+/// The believed parameters as determined by all recordings together: those with which the sensor
+/// computes its directions.
 struct Belief {
   sensors::Sensor sensor;
   std::vector<estimation::FreeParameter> free;
   Eigen::MatrixXd covariance;                    ///< [free, free], SI units
   std::vector<std::vector<double>> angle_shift;  ///< [recordings][prisms], rad
-  /// What the estimates held and what one sigma of it does to the belief and, that of the belief
-  /// included, to the rotation angles.
+  /// Held values of the estimates and the effect of one sigma of each on the belief and, including
+  /// the belief's own, on the rotation angles.
   std::vector<estimation::FreeParameter> held;
   Eigen::MatrixXd held_changes;                     ///< [free, held], SI
   std::vector<Eigen::MatrixXd> held_angle_changes;  ///< [recordings] of [prisms, held], rad
 };
 
-/// Mean of the recordings' own estimates, weighted by their information, and how far it moves the
-/// rotation angles of each.
+/// Mean of the recordings' own estimates, weighted by their information, and the resulting shift of
+/// the rotation angles of each.
 /// @throws InvalidArgument for recordings of different sensors by serial number or rotors,
 ///         EstimationError when their parameters disagree
 Belief pooled_belief(const std::vector<RangedRecording>& recordings);

@@ -31,21 +31,21 @@
 namespace risley::calibration {
 namespace {
 
-/// Shots to find the planes with, of all recordings together and of each at least, and rounds of
+/// Shots for finding the planes, of all recordings together and of each at least, and rounds of
 /// labels and adjustment on these and on all shots: docs/theory/calibration.md
 constexpr std::size_t kCoarseShots = 40000, kLeastCoarseShots = 5000;
 constexpr int kCoarseRounds = 5, kMostFullRounds = 5;
-/// Beams of all recordings that formal sigmas are the mean of: beams are smooth in two rotation
-/// angles, which so many sample every 6 degrees, 360 / sqrt(4000).
+/// Number of beams of all recordings that formal sigmas are averaged over: beams are smooth in two
+/// rotation angles, which so many sample every 6 degrees, 360 / sqrt(4000).
 constexpr std::size_t kBundleBeams = 4000;
 /// Variance of a normal distribution cut off at the gate g: 1 - 2 g phi(g) / (2 Phi(g) - 1).
 constexpr double kVarianceWithinGate = 0.97334;
-/// Keeps the variance of ranges without noise above 0; sensors step by 1 mm. M.
+/// Keeps the variance of ranges without noise above 0; sensors have steps of 1 mm. M.
 constexpr double kLeastRangeSigma = 1e-7;
-/// Steps stand still when what is left out changes by less than one shot in a hundred.
+/// Steps have converged when the number of excluded shots changes by less than one in a hundred.
 constexpr std::size_t kSettledPart = 100;
 
-/// Variance component of every view: what its residuals say of the range noise.
+/// Variance component of every view: the range noise according to its residuals.
 void update_range_variances(PlanarSolution& solution) {
   for (std::size_t v = 0; v < solution.chi2.size(); ++v) {
     if (solution.redundancy[v] < kLeastViewShots) continue;
@@ -182,7 +182,7 @@ class WallCalibration {
     }
   }
 
-  /// Planes in every recording by itself, then which of them are the same wall.
+  /// Planes in every recording separately, then which of them are the same wall.
   void find_walls() {
     const std::size_t most =
         std::max<std::size_t>(kCoarseShots / recordings_.size(), kLeastCoarseShots);
@@ -201,7 +201,7 @@ class WallCalibration {
         const std::string why = fmt::format(
             "{}: no plane found among {} points{}", recordings_[r].name, coarse_[r].size(),
             segmentation.on_one_line
-                ? ": what is flat in them lies on one line, and a wall has to fill an area"
+                ? ": its flat parts lie on one line, and a wall has to fill an area"
                 : "");
         if (recordings_.size() == 1) throw EstimationError(why);
         warn(result_.warnings, kWarning.input_left_out, "{}; it is left out", why);
@@ -210,7 +210,7 @@ class WallCalibration {
     if (found.empty()) throw EstimationError("no plane found in any recording");
     std::vector<std::string> names;
     for (const RangedRecording& recording : recordings_) names.push_back(recording.name);
-    // The paper's method knows no datum.
+    // The paper's method has no datum.
     const FoundPoses poses = found_poses(found, names);
     WallMatching matching =
         paper() ? match_walls(found, names, std::nullopt, {})
@@ -243,14 +243,14 @@ class WallCalibration {
     }
   }
 
-  /// How recordings from unknown poses stood to each other, where they saw the same walls.
+  /// Relative poses of recordings from unknown poses, if they saw the same walls.
   FoundPoses found_poses(const std::vector<FoundPlane>& found,
                          const std::vector<std::string>& names) const {
     const bool stated = options_.planes || !options_.stations.empty();
     if (options_.same_walls == SameWalls::no || paper() || stated || names.size() < 2) return {};
     FoundPoses poses = poses_before_same_walls(found, names);
     if (poses.stations.empty() && options_.same_walls == SameWalls::yes) {
-      throw EstimationError("the recordings did not see the same walls: " + poses.why_not);
+      throw EstimationError("the recordings do not show the same walls: " + poses.why_not);
     }
     return poses;
   }
@@ -261,8 +261,7 @@ class WallCalibration {
     return paper() ? adjust_as_paper(problem) : adjust(problem);
   }
 
-  /// Views that lost their shots when labels changed are no views any more, and walls
-  /// without a view are no unknowns.
+  /// Views that lost their shots when labels changed are removed, and so are walls without a view.
   void drop_empty_views(PlanarProblem& problem) const {
     std::erase_if(problem.views,
                   [](const WallView& view) { return view.shots->size() < kLeastViewShots; });
@@ -310,8 +309,8 @@ class WallCalibration {
     }
   }
 
-  /// Labels all shots, less the steps, and gives every view its own. Views that are left with too
-  /// few are none, and their shots look for another.
+  /// Labels all shots, except the steps, and assigns them to views. Views with too few shots are
+  /// dropped, and their shots are assigned to others.
   void share_out(bool steps) {
     for (;;) {
       label_all();
@@ -325,8 +324,8 @@ class WallCalibration {
 
   PlanarSolution adjust_fully() {
     share_out(false);
-    // The first solution bends towards steps and hides their rims: labels and solution take turns
-    // until what is left out stays the same.
+    // The first solution bends towards steps and hides their rims: labels and solution alternate
+    // until the excluded shots stay the same.
     PlanarSolution solution;
     std::size_t left_out = 0;
     bool settled = false;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kSource = "calibrated on plane walls by risley calibrate";
 
-/// Sizes of the prisms and range errors as they were adjusted, and what is known of them.
+/// Sizes of the prisms and range errors as adjusted, and their uncertainty.
 void set_numbers(const PlanarProblem& problem, const Calibration& result, sensors::Sensor& sensor) {
   const bool sizes =
       std::ranges::any_of(problem.sizes, [](const SizePrior& size) { return size.sigma > 0; });
@@ -51,7 +51,7 @@ std::vector<Index> considered_materials(const Belief& belief, const PlanarSoluti
   return materials;
 }
 
-/// The row of a name behind those of parameters and range offset, entered where it is new.
+/// The row of a name after those of parameters and range offset, added if it is new.
 Index row_of(const std::string& name, Index first, std::vector<std::string>& names) {
   auto at = std::find(names.begin() + first, names.end(), name);
   if (at == names.end()) at = names.insert(at, name);
@@ -84,8 +84,8 @@ sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belie
   set_numbers(solution.problem, result, sensor);
   const Index n = result.covariance.rows(), numbers = solution.number_covariance.rows();
   const Index first = n + numbers;
-  // With what was not adjusted as quantities of their own, beams are as sure as they are: an error
-  // of one and what it does to the others cancel in them.
+  // With held quantities included in the covariance, the beams' uncertainty is correct: an error of
+  // one and its effect on the others cancel in them.
   std::vector<Index> moved_rows, material_rows;
   for (const auto& moved : held.moved) {
     moved_rows.push_back(row_of(moved.name, first, sensor.covariance_names));

@@ -9,12 +9,12 @@
 
 namespace risley::calibration {
 
-/// The sensor as a calibration knows it: adjusted optics with the joint covariance of what was
-/// adjusted and what was held, and what the recordings show of the rotors and of what the prisms
-/// are made of. All but its serial number.
+/// The calibrated sensor: adjusted optics with the joint covariance of adjusted and held
+/// quantities, and the recordings' information on the rotors and on the material of the prisms. All
+/// but its serial number.
 /// @param result  with free parameters, covariance, range offset sigma, variance factor and changes
-///                by what was held
-/// @param held    what was held and may be off
+/// due to held quantities
+/// @param held  the held quantities that may be off
 sensors::Sensor calibrated_sensor(const CalibrationOptions& options, const Belief& belief,
                                   const PlanarSolution& solution, const Calibration& result,
                                   const Held& held);

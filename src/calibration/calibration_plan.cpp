@@ -25,17 +25,17 @@
 namespace risley::calibration {
 namespace {
 
-/// A second pose is worth its trouble where it makes sigmas smaller by this.
+/// A second pose is recommended if it reduces sigmas by this factor.
 constexpr double kWorthRolling = 0.8;
-/// Shots of every recording that stand for all of them: their own share of a wall is then known to
-/// 0.4 %, sqrt(0.25 / 20000).
+/// Number of sampled shots that represent every recording: their own share of a wall is then known
+/// to 0.4 %, sqrt(0.25 / 20000).
 constexpr std::size_t kSampleShots = 20000;
-/// Steeper walls determine the common direction 20 times as well as one that is met face on:
-/// table in docs/theory/calibration.md, section Datum.
+/// Steeper walls determine the common direction 20 times as well as one met face on: table in
+/// docs/theory/calibration.md, section Datum.
 constexpr double kUsefulIncidence = radians_from_degrees(30.0);
 
-/// Rotation angles of a sample of one recording: spread over its whole time, from angles that no
-/// rational relation ties to the next recording's.
+/// Rotation angles of a sample of one recording: spread over its whole time, from start angles
+/// without a rational relation to the next recording's.
 std::vector<std::vector<double>> sample_angles(const CalibrationPlan& plan, std::size_t recording) {
   std::vector<std::vector<double>> angles;
   for (std::size_t k = 0; k < plan.sensor.angular_velocity.size(); ++k) {
@@ -51,7 +51,7 @@ std::vector<std::vector<double>> sample_angles(const CalibrationPlan& plan, std:
   return angles;
 }
 
-/// What a planned recording sees: the shots of each plane of the scene.
+/// View of a planned recording: the shots of each plane of the scene.
 struct Seen {
   std::vector<std::vector<std::size_t>> rows;  ///< [planes]
   std::vector<double> incidence, range;        ///< [planes], sums
@@ -84,7 +84,7 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
     if (steep < 0.5 * all) {
       advice.push_back(
           "turn the sensor so that the beam meets the walls at 50 to 65 degrees of incidence: "
-          "between 10 and 60 degrees, the common direction becomes ten times better known");
+          "between 10 and 60 degrees, the sigma of the common direction falls by a factor of ten");
     }
     if (far < 20.0) {
       advice.push_back(
@@ -94,8 +94,7 @@ std::vector<std::string> advice_for(const CalibrationForecast& f, const Calibrat
       advice.push_back(
           "scan the same walls also with the body turned upside down (180 degrees about its axis) "
           "and with it rotated by 30 degrees to both sides against a stop (stations with a "
-          "sigma_deg): "
-          "only that makes the common direction independent of the walls' flatness");
+          "sigma_deg): only that makes the common direction independent of the walls' flatness");
     }
     advice.push_back("record longer: the sigma falls with the square root of the duration");
   }
@@ -152,8 +151,8 @@ AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
 
 namespace {
 
-/// What the plan is good for with the poses of its stations.
-/// @param poses_found  how the stations stood to each other is not known beforehand
+/// Quality of the plan with the poses of its stations.
+/// @param poses_found  the relative poses of the stations are not known beforehand
 CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
                                   const Progress& progress) {
   const sensors::Sensor& sensor = plan.sensor;
@@ -179,7 +178,7 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
     problem.geometry = one_size_each(problem.geometry, sensor.prisms());
     problem.sizes = size_priors(sensor);
   }
-  // One shot of the sample stands for several: its variance is divided by their number.
+  // One shot of the sample represents several: its variance is divided by their number.
   const double weight = plan.duration * rate / static_cast<double>(kSampleShots);
   const double variance =
       (noise * noise + sensor.range_resolution * sensor.range_resolution / 12.0) / weight;
@@ -237,7 +236,7 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
       auto shots = std::make_shared<RangedShots>(rows_of(all, seen.rows[w]));
       // Intensities as of one matt material: walls of one colour do not determine the walk error.
       shots->intensity.assign(shots->size(), static_cast<std::uint8_t>(sensors::kWalkIntensity));
-      // The plane in the sensor's frame: R^T n, and nearer by what the station stands towards it.
+      // The plane in the sensor's frame: R^T n, and closer by the station's offset towards it.
       const Vector3<double>& n_scene = plane.plane.normal;
       const Vector3<double> axes[] = {station.scene_from_sensor({1, 0, 0}),
                                       station.scene_from_sensor({0, 1, 0}),
@@ -300,7 +299,7 @@ CalibrationForecast forecast_once(const CalibrationPlan& plan, bool poses_found,
 CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress) {
   CalibrationForecast result = forecast_once(plan, false, progress);
   if (plan.scene.stations.size() < 2 && !plan.shape.parameters.empty()) {
-    // The same time in two poses, of which the second is the first rolled on the spot.
+    // The same time in two poses, the second one being the first rolled on the spot.
     CalibrationPlan rolled = plan;
     rolled.duration = 0.5 * plan.duration;
     if (rolled.scene.stations.empty()) rolled.scene.stations.emplace_back();

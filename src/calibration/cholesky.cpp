@@ -49,7 +49,7 @@ Cholesky::Cholesky(MatrixXd matrix) : factor_(std::move(matrix)) {
 }
 
 void Cholesky::solve_in_place(MatrixXd& right) const {
-  if (right.cols() == 0) return;  // of which Eigen would take the first element
+  if (right.cols() == 0) return;  // of which Eigen would read the first element
   factor_.triangularView<Eigen::Lower>().solveInPlace(right);
   factor_.triangularView<Eigen::Lower>().transpose().solveInPlace(right);
 }

@@ -15,9 +15,9 @@ class Cholesky {
   explicit Cholesky(Eigen::MatrixXd matrix);
 
   bool positive() const { return positive_; }  ///< otherwise there is no factor
-  /// Lower triangle; what is above the diagonal means nothing.
+  /// Lower triangle; the part above the diagonal is undefined.
   const Eigen::MatrixXd& factor() const { return factor_; }
-  /// The inverse of the matrix times `right`, in its place.
+  /// The inverse of the matrix times `right`, in place.
   void solve_in_place(Eigen::MatrixXd& right) const;
 
  private:

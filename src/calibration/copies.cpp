@@ -16,16 +16,16 @@
 namespace risley::calibration {
 namespace {
 
-/// Shots of a recording that are looked for in the others.
+/// Number of shots of a recording searched in the others.
 constexpr std::size_t kLookedFor = 200;
-/// Part of them that only a copy has.
+/// Share of them that only a copy can have.
 constexpr double kCopiedPart = 0.9;
-/// What formats round: coordinates to 1 mm, which moves the range by that and the rotation angles,
+/// Rounding by formats: coordinates to 1 mm, which moves the range by that and the rotation angles,
 /// found with all shots together, by less than this. Two readings of 2 cm noise differ by more.
 constexpr double kSameRange = 1e-3;  // m
 constexpr double kSameAngle = radians_from_degrees(0.05);
 
-/// Cells of two rotation angles, twice as wide as what is looked for.
+/// Cells of two rotation angles, twice as wide as the search tolerance.
 constexpr std::int64_t kCells = 3600;
 constexpr double kCell = kTwoPi / kCells;
 
@@ -34,7 +34,7 @@ std::int64_t cell_of(double angle) {
   return std::clamp<std::int64_t>(cell, 0, kCells - 1);
 }
 
-/// One shot that is looked for.
+/// One shot to search for.
 struct Sought {
   std::size_t recording = 0;
   double angle_a = 0, angle_b = 0, range = 0;
@@ -104,9 +104,9 @@ void require_no_copies(const std::vector<RangedRecording>& recordings) {
         continue;
       }
       const auto [first, second] = std::minmax(r, other);
-      throw InvalidArgument(fmt::format(
-          "{} and {} hold the same shots, and a copy adds nothing: leave one of them out",
-          recordings[first].name, recordings[second].name));
+      throw InvalidArgument(
+          fmt::format("{} and {} hold the same shots, and a copy adds nothing: omit one of them",
+                      recordings[first].name, recordings[second].name));
     }
   }
 }

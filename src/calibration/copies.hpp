@@ -8,9 +8,9 @@
 
 namespace risley::calibration {
 
-/// Refuses recordings that hold the same shots, whatever their formats and times: counted twice,
-/// they would make every sigma too small. Rotors that turn freely do not come back to the same
-/// angles with the same ranges.
+/// Rejects recordings that hold the same shots, whatever their formats and times: counted twice,
+/// they would make every sigma too small. Rotors that turn freely do not return to the same angles
+/// with the same ranges.
 /// @throws InvalidArgument for a recording nine tenths of which are in another one
 void require_no_copies(const std::vector<RangedRecording>& recordings);
 

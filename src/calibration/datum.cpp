@@ -26,7 +26,7 @@ namespace {
 using Eigen::Index;
 using Eigen::Matrix3d;
 
-/// Sigma of a quantity that changes by a row with free and held.
+/// Sigma of a quantity with given derivatives by free and held ones.
 double sigma_of(const Eigen::RowVectorXd& gradient, const Eigen::MatrixXd& covariance) {
   const Eigen::RowVectorXd product = gradient * covariance;
   return std::sqrt(std::max(product.dot(gradient), 0.0));  // NaN stays
@@ -177,7 +177,7 @@ Eigen::MatrixXd BeamBundle::covariance_of_all(const Eigen::MatrixXd& covariance,
   return all;
 }
 
-/// What is left of a beam's movements without the shared rotation [3, free + held].
+/// A beam's movements without the shared rotation [3, free + held].
 Eigen::MatrixXd BeamBundle::rest(const Beam& beam) const {
   Eigen::MatrixXd result = beam.jacobian;
   for (Index j = 0; j < result.cols(); ++j) {
@@ -195,7 +195,7 @@ FormalDatum BeamBundle::formal_datum(const Eigen::MatrixXd& covariance, HeldErro
   datum.sigma_pitch = std::sqrt(turn_covariance(1, 1));
   datum.sigma_yaw = std::sqrt(turn_covariance(2, 2));
   datum.gauge = std::sqrt(turn_covariance.cwiseProduct(normal_).sum() / count());
-  // Sums of J^T J over the beams: their products with the covariance sum up the variances.
+  // Sums of J^T J over the beams: their products with the covariance are the summed variances.
   Eigen::MatrixXd shape = Eigen::MatrixXd::Zero(all.rows(), all.cols()), total = shape;
   for (const Beam& beam : beams_) {
     const Eigen::MatrixXd rest_of_beam = rest(beam);

@@ -14,8 +14,8 @@ namespace {
 
 /// Part of the points beyond the extent on each side, as SegmentationOptions::least_extent says.
 constexpr double kTail = 0.05;
-/// Grid of the directions: points per cell, and limits of its width, rad (1 to 3 degrees). A
-/// block of nine cells then holds 180 points, and a tenth of them differs significantly from none.
+/// Grid of the directions: points per cell, and limits of its width, rad (1 to 3 degrees). A block
+/// of nine cells then holds 180 points, and a tenth of them differs significantly from none.
 constexpr double kPointsPerCell = 20, kLeastCell = 0.0175, kMostCell = 0.0524;
 
 }  // namespace

@@ -14,8 +14,8 @@
 
 namespace risley::calibration {
 
-/// Directions as two angles from the middle of all, rad: the same distance from it in every
-/// direction. And a grid of cells over them.
+/// Directions as two angles from the middle of all, rad, equidistant in every direction. Also a
+/// grid of cells over them.
 class DirectionGrid {
  public:
   explicit DirectionGrid(const std::vector<Beam>& beams);
@@ -24,7 +24,7 @@ class DirectionGrid {
   std::size_t cells() const { return static_cast<std::size_t>(size_[0] * size_[1]); }
   std::size_t cell(std::size_t beam) const { return static_cast<std::size_t>(cell_[beam]); }
   std::span<const std::size_t> beams_in(std::size_t cell) const { return beams_.of(cell); }
-  /// The cell that is these columns and rows away, or none outside the field of view.
+  /// The cell at this offset in columns and rows, or none outside the field of view.
   std::optional<std::size_t> shifted(std::size_t cell, int columns, int rows) const {
     const int column = static_cast<int>(cell) % size_[0] + columns;
     const int row = static_cast<int>(cell) / size_[0] + rows;
@@ -34,8 +34,8 @@ class DirectionGrid {
   /// Counts of cells summed over each cell and its eight neighbours.
   std::vector<std::uint32_t> block_sums(const std::vector<std::uint32_t>& counts) const;
 
-  /// Width of the field that beams fill in its shorter principal direction, rad. The outer tails
-  /// are cut and the rest extrapolated, so that single strays do not widen a row of points.
+  /// Width of the beams' field in its shorter principal direction, rad. The outer tails are cut and
+  /// the rest extrapolated, so that single outliers do not widen a row of points.
   double shorter_extent(const std::vector<std::size_t>& beams) const;
 
  private:

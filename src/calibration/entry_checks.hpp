@@ -10,7 +10,7 @@
 
 namespace risley::calibration {
 
-/// Rotation angles of every prism of a train and, if any, the emitter, for every range.
+/// Requires rotation angles of every prism of a train and, if any, the emitter, for every range.
 inline void require_angle_columns(const RangedShots& shots, const PrismTrain& train) {
   check_shape(train.shape());
   require_length("rotation_angle", shots.rotation_angle.size(), train.prisms());

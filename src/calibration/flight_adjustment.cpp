@@ -33,9 +33,10 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr Index kTwo = 2 * kCorrections;
-/// A long flight has settled when its corrections move by no more than this, RMS, in their sigmas.
+/// A long flight has converged when its corrections move by no more than this, RMS, in their
+/// sigmas.
 constexpr double kSettledCorrection = 0.02;
-/// Columns of an inverse that are computed together.
+/// Columns of an inverse computed together.
 constexpr Index kInverseColumns = 96;
 
 using PlaneRows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
@@ -57,7 +58,7 @@ struct EliminatedPlane {
   MatrixXd by_knot;                  // [6 knots, 3]
 };
 
-/// Takes left own' off a block of rows x 6 entries: by far the most of the work of elimination.
+/// Subtracts left own' from a block of rows x 6 entries: by far the most work of the elimination.
 void subtract_product(const double* left_0, const double* left_1, const double* left_2, Index rows,
                       const Eigen::Matrix<double, kCorrections, 3>& own, double* block,
                       Index stride) {
@@ -86,7 +87,7 @@ void require_priors(const FlightPriors& priors, const FlightModel& model) {
   require_length("rows of the priors' information", priors.information.rows(), globals);
   require_length("columns of the priors' information", priors.information.cols(), globals);
   if (!priors.mean.allFinite() || !priors.information.allFinite()) {
-    throw InvalidArgument("priors contain numbers that are not finite");
+    throw InvalidArgument("priors contain non-finite numbers");
   }
   require_length_or_none("held", priors.held.size(), globals);
   for (const PlanePrior& prior : priors.planes) {
@@ -99,7 +100,7 @@ void require_priors(const FlightPriors& priors, const FlightModel& model) {
   }
 }
 
-/// By how much a step moves what the whole flight shares, in squared sigmas of it.
+/// Length of a step in the global unknowns, in squared sigmas.
 double promised_to_globals(const FlightSystem& system, const FlightSystem::Step& step,
                            const std::vector<bool>& held) {
   std::vector<Index> free;
@@ -158,7 +159,7 @@ struct FlightSystem::ReducedEquations {
   std::size_t planes = 0;
   std::vector<EliminatedPlane> eliminated;
   std::vector<Index> held;  // globals
-  MatrixXd held_columns;    // [size, held]: of the equations, before they were taken out
+  MatrixXd held_columns;    // [size, held]: of the equations, before they were removed
   VectorXd scale;           // to a diagonal of ones
   Cholesky root;
   VectorXd right;
@@ -223,7 +224,7 @@ void FlightSystem::ReducedEquations::eliminate(const FlightEquations& equations,
   });
 }
 
-/// Takes the planes' part off the lower triangle and the right side.
+/// Subtracts the planes' part from the lower triangle and the right side.
 void FlightSystem::ReducedEquations::reduce(MatrixXd& hessian) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> places;  // plane, its knot
   for (std::size_t p = 0; p < planes; ++p) {
@@ -235,7 +236,7 @@ void FlightSystem::ReducedEquations::reduce(MatrixXd& hessian) {
     return eliminated[places[i].first].knots[places[i].second];
   });
   const Index g0 = first_global();
-  // Each task has the columns of one knot for itself.
+  // Each task owns the columns of one knot.
   parallel::for_each(knots, [&](Index knot) {
     const Index column = kCorrections * knot;
     for (const std::size_t i : by_knot.of(knot)) {
@@ -244,7 +245,7 @@ void FlightSystem::ReducedEquations::reduce(MatrixXd& hessian) {
       const Eigen::Matrix<double, kCorrections, 3> own =
           plane.by_knot.middleRows<kCorrections>(kCorrections * slot);
       for (std::size_t first = slot; first < plane.knots.size();) {
-        std::size_t end = first + 1;  // of the knots that follow each other
+        std::size_t end = first + 1;  // of consecutive knots
         while (end < plane.knots.size() && plane.knots[end] == plane.knots[end - 1] + 1) ++end;
         const auto rows = kCorrections * static_cast<Index>(end - first);
         const auto at = kCorrections * first;
@@ -345,8 +346,8 @@ FlightSystem::FlightSystem(const FlightEquations& equations, const FlightModel& 
   p.root = Cholesky(std::move(hessian));
   if (!p.root.positive()) {
     throw EstimationError(
-        "the flight gives no information on some of the unknowns, and they have no priors: state "
-        "sigmas, or hold what is not to be adjusted");
+        "the flight carries no information on some of the unknowns, and they have no priors: state "
+        "sigmas, or hold the unknowns that are not to be adjusted");
   }
 }
 
@@ -504,7 +505,7 @@ FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
     ++result.steps;
     result.promised = step.promised;
     result.converged = step.promised <= options.tolerance;
-    // Shots at the gate move each of many corrections by a hair, without an end.
+    // Shots at the gate would move many corrections slightly, without end.
     if (!result.converged && result.steps == options.most_steps &&
         step.promised <= kSettledCorrection * kSettledCorrection *
                              static_cast<double>(kCorrections * result.model.knots.size())) {

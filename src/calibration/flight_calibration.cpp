@@ -40,26 +40,26 @@ constexpr double kCauchy = 1.5;  // median absolute residuals
 constexpr double kGatedVariance = 0.97334;
 constexpr double kCoarseKnots = 20;     // s
 constexpr double kLeastRange = 1e-4;    // smallest sigma that a range is given, m
-constexpr double kClockRefresh = 2e-5;  // error of the clock that poses are extrapolated over, s
+constexpr double kClockRefresh = 2e-5;  // error of the clock over which poses are extrapolated, s
 constexpr double kPoseMargin = 5;       // sigmas of the clock offset
 /// Done when a step promises less, in squared sigmas of all unknowns together: shots that come and
-/// go at the gate move the answer by about as much.
+/// go at the gate move the result by about as much.
 constexpr double kSettled = 0.1;
-/// What is tested is known before to no better than these: drift, s/s, delay, s, and what is held.
+/// Prior sigmas of tested quantities: drift, s/s, delay, s, and held ones.
 constexpr double kDriftPrior = 1e-3, kDelayPrior = 1, kHeldPrior = 1e-2;
-/// Beyond this many sigmas of a delay, and where the clock offset is this far from what is stated,
-/// what a delay would do counts as an error of everything else.
+/// Beyond this many sigmas of a delay, and if the clock offset is this far from its stated value,
+/// the effect of a delay counts as an error of everything else.
 constexpr double kDelayConsidered = 2;
 /// A trajectory that jumps more often does not fit, nor does one that this many repetitions do not
-/// mend.
+/// fix.
 constexpr std::size_t kMostJumps = 8;
 constexpr int kMendings = 8;
-/// A jump may be this many sigmas of the process, and this many times what is seen of it.
+/// A jump may be this many sigmas of the process, and this many times its estimate.
 constexpr double kBreakSigmas = 3;
-/// A process that grows counts as found when its corrections ask for no more than this factor.
+/// A process that grows has converged when its corrections require no more than this factor.
 constexpr double kProcessRatio = 1.1;
 
-/// What of the globals a round adjusts.
+/// Global unknowns that a round adjusts.
 enum class Unlocked : std::uint8_t { boresight, prisms, range_and_clock, all };
 
 struct CoarseRound {
@@ -77,7 +77,7 @@ constexpr int kAllRounds = 3, kManySteps = 2, kLastSteps = 8;
 
 double flight_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 1e-9; }
 
-/// Shots, poses and what they are labelled with.
+/// Shots, poses and their labels.
 struct LabelledFlight {
   FlightShots shots;
   ShotPoses poses;
@@ -141,8 +141,8 @@ class FlightCalibrator {
     full_.shots = rows.size() == shots.size() ? shots : rows_of(shots, rows);
     if (full_.shots.strip.front() == full_.shots.strip.back()) {
       throw EstimationError(
-          "all shots are of one strip: at least two that overlap are needed, and crossing ones are "
-          "best");
+          "all shots belong to one strip: at least two that overlap are needed, and crossing ones "
+          "are best");
     }
     coarse_.shots = sample_of_all(options_.coarse_shots);
   }
@@ -193,14 +193,14 @@ class FlightCalibrator {
     leave_out_jumps(flight);
     if (flight.cells.planes.size() < kFewestCells) {
       throw EstimationError(fmt::format(
-          "only {} cells of {:g} m of ground were seen by several strips, at least {} are needed: "
-          "do the strips overlap, and do mount and trajectory belong to this flight?",
+          "only {} cells of {:g} m of ground are covered by several strips, at least {} are "
+          "needed: do the strips overlap, and do mount and trajectory belong to this flight?",
           flight.cells.planes.size(), size, kFewestCells));
     }
     model_.planes = flight.cells.planes;
   }
 
-  /// Shots between two knots with a jump between them are left out: corrections are linear there.
+  /// Shots between two knots with a jump between them are dropped: corrections are linear there.
   void leave_out_jumps(LabelledFlight& flight) const {
     for (const ProcessBreak& one : priors_.breaks) {
       for (const TrajectoryKnots::Interval& interval : model_.knots.intervals) {
@@ -211,7 +211,7 @@ class FlightCalibrator {
     }
   }
 
-  /// Known ground has planes of its own, whose places are fixed on what is known.
+  /// Known ground has its own planes, which are fixed to the known values.
   void take_control(LabelledFlight& flight, const GroundCellOptions& cells) {
     priors_.planes.clear();
     control_plane_.clear();
@@ -226,7 +226,7 @@ class FlightCalibrator {
       PlanePrior& known = priors_.planes.emplace_back(control_[i]);
       known.plane = static_cast<std::size_t>(control_plane_[i]);
       GroundPlane& plane = flight.cells.planes[known.plane];
-      // Tilts turn about the place that is known.
+      // Tilts turn about the known place.
       plane.centre = known.place - plane.normal.dot(known.place - plane.centre) * plane.normal;
     }
   }
@@ -245,8 +245,8 @@ class FlightCalibrator {
         std::abs(model_.clock_offset - options_.mount.clock_offset.value) >
             std::max(1e-3, kPoseMargin * options_.mount.clock_offset.sigma)) {
       throw EstimationError(
-          "the adjustment diverged: boresight, lever arm or clock offset are far from what the "
-          "mount states. Are the axes of the mount right, and the times of sensor and trajectory?");
+          "the adjustment diverged: boresight, lever arm or clock offset are far from the mount's "
+          "values. Are the axes of the mount right, and the times of sensor and trajectory?");
     }
     return adjusted;
   }
@@ -272,7 +272,7 @@ class FlightCalibrator {
     for (int i = 0; i < kAllRounds; ++i) round(options_.cell_size, Unlocked::all, 2, i == 0);
   }
 
-  /// How far strips are apart with what was given.
+  /// Offsets of the strips with the given values.
   void pairs_at_start() {
     label(coarse_, options_.cell_size, true);
     result_.pairs_before = strip_pairs(coarse_.points, coarse_.shots.strip, coarse_.cells.plane,
@@ -289,7 +289,7 @@ class FlightCalibrator {
     return cells > 0 ? std::sqrt(squares / cells) : 0;
   }
 
-  /// What a piece of the flight adds to what the residuals say of the ranges' noise.
+  /// Contribution of a piece of the flight to the estimate of the ranges' noise from residuals.
   struct PieceScatter {
     double squares = 0;  ///< over the shots' own variance
     double metres2 = 0;  ///< of the residuals
@@ -325,11 +325,10 @@ class FlightCalibrator {
     if (spacing > options_.knot_spacing) {
       warn(result_.warnings, kWarning.coarse_knots,
            "corrections of the trajectory have knots every {:.2f} s instead of {:g} s, because the "
-           "flight would need more than {} of them; the sigmas account for what happens between "
-           "them",
+           "flight would need more than {} of them; the sigmas account for errors between them",
            spacing, options_.knot_spacing, options_.most_knots);
     }
-    // The trajectory first, with shots that are enough for it.
+    // The trajectory first, with enough shots for it.
     set_knots(coarse_.shots, spacing);
     label(coarse_, options_.cell_size, false);
     const double scatter =
@@ -340,7 +339,7 @@ class FlightCalibrator {
     adjust(coarse_, first, 2);
     progress_.report(0.5);
     set_knots(full_.shots, spacing);
-    // Then everything. What the residuals say of the ranges' noise counts in the last round.
+    // Then everything. The last round uses the ranges' noise estimated from the residuals.
     cell_noise_ = coarse_.cells.scatter;
     if (full_.shots.size() <= options_.many_shots) {
       fine_round(full_, kManySteps);
@@ -481,7 +480,7 @@ void FlightCalibrator::fill_result() {
   result_.verdict = verdict_of(result_);
 }
 
-/// The last equations, and what neighbouring knots share of their inverse.
+/// The last equations, and the part of their inverse common to neighbouring knots.
 void FlightCalibrator::solve_last() {
   progress_.check();
   smooth_ = model_;
@@ -495,8 +494,8 @@ void FlightCalibrator::solve_last() {
   band_ = system_->inverse_band();
 }
 
-/// Compares the corrections with the process that is stated of them, and adjusts again until they
-/// fit: jumps get steps of their own, and a process that is larger than stated its size.
+/// Compares the corrections with their stated process, and repeats the adjustment until they agree:
+/// jumps get separate steps, and a process larger than stated gets its actual size.
 void FlightCalibrator::mend_trajectory() {
   TrajectoryFit& fit = result_.trajectory_fit;
   for (int mended = 0;; ++mended) {
@@ -506,7 +505,7 @@ void FlightCalibrator::mend_trajectory() {
       std::copy_n(check.chi2.data(), kCorrections, fit.chi2.begin());
       std::copy_n(check.expected.data(), kCorrections, fit.expected.begin());
     }
-    // Known ground that is wrong bends the trajectory: it is named, and nothing else is blamed.
+    // Wrong known ground bends the trajectory: it is reported, and no other cause is considered.
     if (known_ground_contradicts()) return;
     const bool fits = jumps_of(model_.knots, check).empty() &&
                       process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
@@ -526,10 +525,10 @@ bool FlightCalibrator::known_ground_contradicts() const {
   });
 }
 
-/// @return whether anything has changed, so that the adjustment has to be repeated
+/// @return whether anything has changed, so that the adjustment must be repeated
 bool FlightCalibrator::mend_as_needed(const ProcessCheck& check) {
   const std::vector<std::size_t> jumps = jumps_of(model_.knots, check);
-  // A process that was larger than stated is followed to its size.
+  // A process larger than stated is enlarged iteratively to its size.
   const bool alerted = process_factor_ != trajectories::PoseErrorVector::Ones();
   const VectorXd factors = process_factors(model_.knots, check, alerted);
   const bool large = factors.maxCoeff() > (alerted ? kProcessRatio : 1);
@@ -561,8 +560,7 @@ void FlightCalibrator::break_process(const ProcessCheck& check,
   }
 }
 
-/// Equations in which the clock may drift, attitudes may be late, and what is held, though it may
-/// be off, is free.
+/// Equations with a free clock drift, a free delay of attitudes, and free held quantities.
 FlightCalibrator::TestedSystem FlightCalibrator::tested_system() const {
   const std::vector<std::int64_t>& times = full_.shots.time_ns;
   FlightModel model = smooth_;
@@ -586,8 +584,8 @@ FlightCalibrator::TestedSystem FlightCalibrator::tested_system() const {
   return {std::move(model), std::move(priors), std::move(system)};
 }
 
-/// Whether corrections fit their process once what is tested is free: then it is to blame, and the
-/// trajectory is not.
+/// Whether corrections fit their process once the tested quantity is free: then it is the cause,
+/// not the trajectory.
 bool FlightCalibrator::assumptions_explain() const {
   const TestedSystem tested = tested_system();
   const VectorXd step = tested.system.step().unknowns;
@@ -600,7 +598,7 @@ bool FlightCalibrator::assumptions_explain() const {
          process_factors(model_.knots, check) == VectorXd::Ones(kCorrections);
 }
 
-/// What one more step would do with those equations, and how well that is known.
+/// The next step with these equations, and its uncertainty.
 void FlightCalibrator::test_assumptions() {
   const auto [model, priors, system] = tested_system();
   const auto considered = static_cast<Index>(start_.considered);
@@ -622,7 +620,7 @@ void FlightCalibrator::test_assumptions() {
   const double clock_off = std::abs(model_.clock_offset - options_.mount.clock_offset.value);
   if (std::abs(late.value) > kDelayConsidered * late.sigma ||
       (!priors_.held[clock] && clock_off > kDelayConsidered * start_.prior_sigma[clock])) {
-    // By how much everything else moves where the delay is free.
+    // Shift of everything else if the delay is free.
     const VectorXd moves = system.solve(VectorXd::Unit(system.size(), system.size() - 1));
     may_be_off_ = std::hypot(late.value, late.sigma) / moves[moves.size() - 1] *
                   moves.segment(system.size() - size, model_.unknowns().size());
@@ -634,13 +632,13 @@ void FlightCalibrator::test_assumptions() {
     judge_held({.name = names[row],
                 .held = values[row],
                 .stated_sigma = start_.prior_sigma[row],
-                .told = values[row] + steps[i],
+                .from_flight = values[row] + steps[i],
                 .sigma = std::sqrt(covariance(i, i))},
                options_.sensor, result_);
   }
 }
 
-/// What was mended of the trajectory, in numbers and words.
+/// Changes made to the trajectory, in numbers and words.
 void FlightCalibrator::fill_trajectory_fit() {
   TrajectoryFit& fit = result_.trajectory_fit;
   for (int c = 0; c < kCorrections; ++c) {

@@ -22,7 +22,7 @@ constexpr int kIntervalParts = 8;
 /// Share of a shot's variance that stays its own, however rough the ground is.
 constexpr double kLeastOwnShare = 0.25;
 
-/// What the shots of a cell that counts do to the functions, patch by patch, weighted.
+/// Effect of the shots of a counted cell on the functions, patch by patch, weighted.
 struct PatchSums {
   std::int32_t plane = 0;
   Eigen::Matrix<float, Eigen::Dynamic, RoughGround::kPatches> sums;  // [functions, patches]
@@ -45,15 +45,15 @@ std::vector<PatchSums> patch_sums(const FlightRows& rows, const PlaneOfShot& pla
   return all;
 }
 
-/// What the errors of the shots of one piece do to the functions.
+/// Effect of the errors of the shots of one piece on the functions.
 struct PieceErrors {
-  MatrixXd noise;  // [functions, functions]: of what is each shot's own, or a sample's
-  MatrixXd parts;  // [functions, 6 parts]: by the trajectory's process
+  MatrixXd noise;  // [functions, functions]: of each shot's own errors, or a sample's
+  MatrixXd parts;  // [functions, 6 parts]: of the trajectory's process
   std::vector<PatchSums> patches;
   std::size_t interval = 0;
 };
 
-/// How errors of shots move functions of the solution.
+/// Effect of errors of shots on functions of the solution.
 struct FunctionErrors {
   const FlightShots& shots;
   const PlaneOfShot& plane;
@@ -67,7 +67,7 @@ struct FunctionErrors {
   PieceErrors of_piece(const FlightRows& rows) const;
 
  private:
-  /// What the shots of a sample or of a part of the interval have in common.
+  /// Common errors of the shots of a sample or of a part of the interval.
   void add_shared(const FlightRows& rows, const MatrixXd& pose, const VectorXd& weight,
                   const VectorXd& weight_behind, const MatrixXd& moved, PieceErrors& own) const;
 };
@@ -102,7 +102,7 @@ PieceErrors FunctionErrors::of_piece(const FlightRows& rows) const {
     }
   }
   const VectorXd weight = values.col(globals + 11);
-  // Rows of shots that are lost may hold NaN.
+  // Rows of lost shots may hold NaN.
   for (Index i = 0; i < n; ++i) {
     if (weight[i] == 0) moved.row(i).setZero();
   }

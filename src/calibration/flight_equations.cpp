@@ -23,7 +23,7 @@ namespace {
 
 using Eigen::Index;
 
-/// Shots of a piece at most: some milliseconds.
+/// Most shots of a piece: some milliseconds.
 constexpr std::size_t kPieceShots = 32768;
 constexpr int kTwoKnots = 2 * kCorrections;
 
@@ -72,7 +72,7 @@ void require_knots(const FlightShots& shots, const FlightModel& model) {
   require_length("rows of the corrections", model.corrections.rows(), kCorrections);
   require_length("corrections", model.corrections.cols(), knots.size());
   if (!model.corrections.allFinite()) {
-    throw InvalidArgument("corrections contain numbers that are not finite");
+    throw InvalidArgument("corrections contain non-finite numbers");
   }
   std::size_t shot = 0;
   for (const TrajectoryKnots::Interval& interval : knots.intervals) {
@@ -168,7 +168,7 @@ class RunSorter {
   std::vector<std::uint32_t> begin_, order_;
 };
 
-/// What all calls of the kernel share.
+/// Arguments common to all calls of the kernel.
 class FlightCalls {
  public:
   FlightCalls(const FlightShots& shots, const ShotPoses& poses, const PlaneOfShot& plane,
@@ -228,7 +228,7 @@ class FlightCalls {
 
   int globals() const { return model_.unknowns().size(); }
 
-  /// @param arguments  products, plane_products and rows: what is wanted
+  /// @param arguments  products, plane_products and rows: requested outputs
   FlightCounts call(const FlightPiece& piece, const RunSorter& sorter,
                     const std::vector<FlightRun>& runs, FlightArguments arguments) const {
     FlightArguments a = all_;
@@ -275,7 +275,7 @@ class FlightCalls {
   FlightArguments all_;
 };
 
-/// What the kernel has summed up of one piece.
+/// Sums of the kernel over one piece.
 struct PieceSums {
   std::vector<double> products, plane_products;
   std::vector<std::int32_t> planes;

@@ -135,7 +135,7 @@ class RowWriter {
 };
 
 /// Writes the row of one group: the columns of the products, padding, the plane's columns.
-/// @return which lanes are of no use, and why
+/// @return which lanes are unusable, and why
 template <TrainLayout N>
 FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
                              const FlightPlane& plane, const std::uint32_t* shots,
@@ -217,7 +217,7 @@ FlightCounts fill_flight_row(const FlightArguments& a, FlightConstants<N>& c,
   const Lanes present = Batch::load_aligned(used) > half;
   weight = xsimd::select(good & present, weight, zero);
 
-  // A row that is lost may hold NaN: zero it by itself.
+  // A lost row may hold NaN: zero it separately.
   const bool all_good = xsimd::all(good);
   const Batch scale = xsimd::sqrt(weight);
   const auto put = [&](Batch*& column, const Batch& value) {

@@ -12,7 +12,7 @@ namespace risley::calibration {
 
 struct ShotPose;
 
-/// A piece of ground as the kernel wants it, local frame.
+/// A piece of ground for the kernel, local frame.
 struct FlightPlane {
   double normal[3], tangent[2][3], centre[3];
 };
@@ -23,7 +23,7 @@ struct FlightRun {
   const FlightPlane* plane = nullptr;
 };
 
-/// Columns that are no parameter of the train: boresight 3, lever arm 3, range offset, clock.
+/// Columns other than the parameters of the train: boresight 3, lever arm 3, range offset, clock.
 inline constexpr int kMountColumns = 8;
 inline constexpr int kPlaneColumns = 3;
 
@@ -38,14 +38,14 @@ struct FlightArguments {
   const int* places = nullptr;
   const int* place_begin = nullptr;
   int free_count = 0;
-  bool drift = false;               ///< one more column behind those: the drift of the clock
-  bool delay = false;               ///< and one behind it: a delay of the attitudes
+  bool drift = false;               ///< one more column after those: the drift of the clock
+  bool delay = false;               ///< and one after it: a delay of the attitudes
   double since = 0;                 ///< begin_ns after the time about which the clock drifts, s
   double body_from_sensor[9] = {};  ///< column by column
   double lever_arm[3] = {};
   double range_offset = 0;
   double clock_step = 0;               ///< from the poses' time to the shots', s
-  double corrections[2][6] = {};       ///< at the knot before and the one behind
+  double corrections[2][6] = {};       ///< at the previous and the next knot
   std::int64_t begin_ns = 0;           ///< of the knot before
   double per_ns = 0;                   ///< 1 / time between the knots
   double range_variance = 0;           ///< m^2
@@ -63,7 +63,7 @@ struct FlightArguments {
   const FlightRun* runs = nullptr;
   std::size_t run_count = 0;
 
-  /// Columns of the unknowns that the whole flight shares.
+  /// Columns of the unknowns common to the whole flight.
   int global_count() const {
     return kMountColumns + free_count + (drift ? 1 : 0) + (delay ? 1 : 0);
   }

@@ -24,7 +24,7 @@ constexpr double kDelaySigmas = 3;
 /// The clock offset contradicts its statement beyond this many sigmas.
 constexpr double kClockSigmas = 4;
 
-/// What sigmas of corrections are in the words of a trajectory.
+/// Names of the corrections in the words of a trajectory.
 trajectories::PoseAccuracy accuracy_of(const Eigen::Matrix<double, kCorrections, 1>& sigma,
                                        double heading) {
   const auto of = [&](trajectories::PoseError error) {
@@ -130,16 +130,16 @@ void judge_clock_offset(FlightCalibration& c) {
                         kClockSigmas * std::hypot(clock.prior_sigma, clock.sigma);
   if (c.clock_contradicts) {
     warn(c.warnings, kWarning.clocks_disagree,
-         "{}; correct the times or what the mount states of them", clock_in_words(c));
+         "{}; correct the times or the mount's values for them", clock_in_words(c));
   }
 }
 
 void judge_held(HeldParameter held, const sensors::Sensor& sensor, FlightCalibration& c) {
-  held.significant =
-      std::abs(held.told - held.held) > kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
+  held.significant = std::abs(held.from_flight - held.held) >
+                     kTestedSigmas * std::hypot(held.sigma, held.stated_sigma);
   if (held.significant) {
     warn(c.warnings, kWarning.held_contradicted,
-         "the strips contradict what is held: {}; the results are off by more than their sigmas. "
+         "the strips contradict held values: {}; the results are off by more than their sigmas. "
          "Estimate it as well ({})",
          in_words(held, sensor), name_of(kSetting.free));
   }
@@ -153,16 +153,16 @@ void judge_control(const scenes::KnownGround& ground, SeenControl seen, FlightCa
          "known ground \"{}\" is left out: {} shots within {:g} m of it{}", ground.name, seen.shots,
          ground.radius,
          seen.shots < GroundCellOptions{}.least_shots
-             ? fmt::format(", at least {} are needed; is it on the map that is stated?",
+             ? fmt::format(", at least {} are needed; is it on the stated map?",
                            GroundCellOptions{}.least_shots)
              : " are not on a plane");
   } else if (seen.significant) {
-    warn(
-        c.warnings, kWarning.control_doubtful,
-        "known ground \"{}\" contradicts the flight: the strips see it {:.3f} m {} what is stated, "
-        "{:.0f} of its sigmas. Is the place right, and is the ground flat within {:g} m of it?",
-        ground.name, std::abs(seen.off), seen.off > 0 ? "above" : "below",
-        std::abs(seen.off) / seen.sigma, ground.radius);
+    warn(c.warnings, kWarning.control_doubtful,
+         "known ground \"{}\" contradicts the flight: the strips place it {:.3f} m {} the stated "
+         "value, {:.0f} of its sigmas. Is the place right, and is the ground flat within {:g} m of "
+         "it?",
+         ground.name, std::abs(seen.off), seen.off > 0 ? "above" : "below",
+         std::abs(seen.off) / seen.sigma, ground.radius);
   }
   c.control.push_back(std::move(seen));
 }
@@ -179,7 +179,7 @@ void warn_of_trajectory(std::int64_t begin_ns, FlightCalibration& c) {
     if (fit.factor[i] == 1) continue;
     warn(c.warnings, kWarning.trajectory_errors,
          "the trajectory's error {} is {:.2g} times as large as stated (chi2 of its corrections "
-         "{:.3g}, {:.3g} expected); the adjustment counts it as that large, and the sigmas with it",
+         "{:.3g}, {:.3g} expected); the adjustment assumes the larger value, and so do the sigmas",
          correction_name(i), fit.factor[i], fit.chi2[i], fit.expected[i]);
   }
   if (!fit.fits) c.warnings.push_back({kWarning.model_incomplete, misfit_in_words(c)});

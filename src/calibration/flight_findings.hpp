@@ -10,32 +10,33 @@
 
 namespace risley::calibration {
 
-/// A drift of the clock, or an error of a held or known value, counts beyond this many sigmas.
+/// A drift of the clock, or an error of a held or known value, is significant beyond this many
+/// sigmas.
 constexpr double kTestedSigmas = 5;
 
-/// Mount and sensor with the unknowns that were found. Unknowns and their covariance are known.
+/// Mount and sensor with the adjusted unknowns. Unknowns and their covariance are known.
 /// @param held        [globals]
-/// @param considered  number of the last globals: held, and may be off
+/// @param considered  number of the last globals: held, and possibly off
 void fill_mount_and_sensor(const FlightCalibrationOptions& options, const FlightModel& model,
                            const std::vector<bool>& held, std::size_t considered,
                            FlightCalibration& c);
 
-// Each takes down whether an assumption fails, and warns of it.
+// Each records whether an assumption fails, and warns if so.
 
 /// @param seconds  between the first shot and the last
 void judge_clock_drift(double value, double sigma, double seconds, FlightCalibration& c);
 void judge_attitude_delay(double value, double sigma, FlightCalibration& c);
-/// A clock offset that takes what it cannot be is an error of something else.
+/// An implausible clock offset is an error of something else.
 void judge_clock_offset(FlightCalibration& c);
 void judge_held(HeldParameter held, const sensors::Sensor& sensor, FlightCalibration& c);
 
 void judge_control(const scenes::KnownGround& ground, SeenControl seen, FlightCalibration& c);
 
-/// Warns of what was mended of the trajectory, and of what was not.
-/// @param begin_ns  from which times count
+/// Warns of the changes made to the trajectory, and of those that failed.
+/// @param begin_ns  origin of the times
 void warn_of_trajectory(std::int64_t begin_ns, FlightCalibration& c);
 
-/// The trajectory with what was found of its errors.
+/// The trajectory with its estimated errors.
 /// @param sigma  of the corrections
 trajectories::Trajectory corrected(const trajectories::Trajectory& trajectory,
                                    const FlightModel& model,

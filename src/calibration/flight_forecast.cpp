@@ -31,15 +31,15 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr std::uint64_t kRangeNoise = 1703;  // random stream
-/// Where the grid of cells lies does not matter; not along a strip's edge.
+/// The position of the grid of cells is arbitrary; not along a strip's edge.
 constexpr double kGridShift = 0.382;
-/// Places of the ground at which points are looked at.
+/// Number of places of the ground at which points are evaluated.
 constexpr std::size_t kGroundPlaces = 24;
-/// A calibration takes off twice what noise of the normals seems to tell, of which it has had once.
+/// A calibration subtracts twice the spurious information from noisy normals, having added it once.
 constexpr double kSpuriousOfTrueNormals = 1;
 constexpr double kParameterStep = 1e-6;
 
-/// Everything of one flight that equations are made of.
+/// Everything needed for the equations of one flight.
 struct ForecastFlight {
   FlightShots shots;
   ShotPoses poses;
@@ -71,8 +71,8 @@ void append(const FlightShots& more, FlightShots& shots) {
   add(more.strip, shots.strip);
 }
 
-/// Gives cells that were found with noise the planes of those that were found without: normals that
-/// lean by chance seem to determine what they cannot.
+/// Gives cells found with noise the planes of those found without: normals that lean by chance seem
+/// to determine unobservable quantities.
 void take_true_planes(const GroundCells& truth, GroundCells& cells) {
   std::vector<std::vector<std::int32_t>> seen(cells.planes.size());
   for (std::size_t i = 0; i < cells.plane.size(); ++i) {
@@ -87,7 +87,7 @@ void take_true_planes(const GroundCells& truth, GroundCells& cells) {
   }
 }
 
-/// How a point moves with the unknowns of a flight: three rows of [unknowns].
+/// Derivatives of a point by the unknowns of a flight: three rows of [unknowns].
 struct PointRates {
   MatrixXd of_all;  ///< [3, 6 knots + globals]
   Eigen::Matrix<double, 3, kCorrections> of_pose;
@@ -158,22 +158,22 @@ PointRates rates_of(const ForecastFlight& work, std::size_t row) {
   return rates;
 }
 
-/// Two points of one cell by different strips.
+/// Two points of one cell from different strips.
 struct Place {
   std::size_t first = 0, second = 0;  // rows of the shots
 };
 
-/// Places all over the ground that several strips see.
+/// Places all over the ground that several strips cover.
 std::vector<Place> places_of(const ForecastFlight& work) {
   std::vector<std::vector<std::size_t>> rows(work.cells.planes.size());
   for (std::size_t i = 0; i < work.shots.size(); ++i) {
     const std::int32_t plane = work.cells.plane[i];
     if (plane == kNoPlane) continue;
     std::vector<std::size_t>& own = rows[plane];
-    // The first shot of every strip that a cell has seen.
+    // The first shot of every strip in a cell.
     if (own.empty() || work.shots.strip[own.back()] != work.shots.strip[i]) own.push_back(i);
   }
-  // Every cell counts alike, and of its pairs of strips one after the other.
+  // Every cell counts equally, with its pairs of strips in turn.
   std::vector<Place> places;
   for (std::size_t k = 0; k < kGroundPlaces; ++k) {
     const std::size_t cell = (2 * k + 1) * rows.size() / (2 * kGroundPlaces);
@@ -201,7 +201,7 @@ SharedPointErrors point_errors(const ForecastFlight& work, const FlightSystem& s
   for (Index i = 0; i < points; ++i) {
     functionals.middleCols<3>(3 * i) = rates[i].of_all.transpose();
   }
-  // What is held and may be off moves points itself, and all that is adjusted.
+  // Held quantities that may be wrong displace points directly and through all adjusted quantities.
   MatrixXd held_moves(3 * points, work.start.considered);
   const std::vector<bool>& held = work.start.priors.held;
   const MatrixXd changes = system.held_changes();
@@ -292,8 +292,7 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   if (work.shots.size() == 0) {
     throw EstimationError(
         "no shot of the plan meets the terrain within the sensor's range: do the heights of plan "
-        "and "
-        "terrain fit together, and does the mount say which way the sensor looks?");
+        "and terrain agree, and does the mount point the sensor the right way?");
   }
   FlightModel& model = work.start.model;
   const double variance = stated_range_variance(calibration);
@@ -323,10 +322,10 @@ FlightForecast forecast(const PlannedFlight& planned, const FlightForecastOption
   result.rough_cells = work.cells.rough;
   result.cell_size = calibration.cell_size;
   if (work.cells.planes.size() < kFewestCells) {
-    throw EstimationError(fmt::format(
-        "only {} cells of {:g} m of ground are seen by several strips, at least {} are needed: do "
-        "the strips of the plan overlap, and are there enough shots?",
-        work.cells.planes.size(), calibration.cell_size, kFewestCells));
+    throw EstimationError(
+        fmt::format("only {} cells of {:g} m of ground are covered by several strips, at least {} "
+                    "are needed: do the strips of the plan overlap, and are there enough shots?",
+                    work.cells.planes.size(), calibration.cell_size, kFewestCells));
   }
   progress.report(0.4);
   model.planes = work.cells.planes;

@@ -40,7 +40,7 @@ std::vector<std::size_t> by_time(const std::vector<RangedRecording>& recordings)
   return order;
 }
 
-/// What is known of the sensor before the flight.
+/// Prior knowledge of the sensor before the flight.
 sensors::Sensor sensor_before(const sensors::Sensor& given, const Belief& belief) {
   sensors::Sensor sensor = given;
   sensor.angular_velocity = belief.sensor.angular_velocity;

@@ -36,9 +36,9 @@ struct Rates {
   Eigen::Vector3d velocity{0, 0, 0}, angular_velocity{0, 0, 0};
 };
 
-/// Slopes of straight lines through the records around each. What the clock's derivative is made of
-/// must not hold the noise of single records: it would go along with the residuals that the same
-/// noise makes, and that bias more shots do not cure. docs/theory/flight.md
+/// Slopes of straight lines through the records around each. The clock's derivative must not
+/// contain the noise of single records: it would correlate with the residuals due to the same
+/// noise, which is a bias that more shots do not reduce. docs/theory/flight.md
 std::vector<Rates> smooth_rates(const trajectories::Interpolation& local) {
   const trajectories::Trajectory& trajectory = local.trajectory();
   const auto& times = trajectory.time_ns;
@@ -47,7 +47,7 @@ std::vector<Rates> smooth_rates(const trajectories::Interpolation& local) {
   std::vector<Rates> rates(times.size());
   for_each_block(times.size(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      // At least one neighbour on each side, where there is one.
+      // At least one neighbour on each side, if there is one.
       std::size_t first = i, last = i;
       while (first > 0 && gap_behind[first - 1] == 0 &&
              (first == i || times[i] - times[first - 1] <= kRateWindow_ns)) {
@@ -79,7 +79,7 @@ std::vector<Rates> smooth_rates(const trajectories::Interpolation& local) {
   return rates;
 }
 
-/// Columns of the rows that a function names.
+/// Columns of the rows returned by a function.
 template <class Column>
 void copy_rows(const Column& from, const std::vector<std::size_t>& rows, Column& to) {
   if (from.empty()) return;
@@ -120,8 +120,8 @@ void require_flight_shots(const FlightShots& shots) {
     }
     if (shots.strip[i] < shots.strip[i - 1]) {
       refuse_row("strip", i,
-                 fmt::format("= {}, allowed {} and more, that of the shot before it",
-                             shots.strip[i], shots.strip[i - 1]));
+                 fmt::format("= {}, allowed {} and more, as the shot before it", shots.strip[i],
+                             shots.strip[i - 1]));
     }
   }
 }

@@ -73,9 +73,9 @@ void set_model(const FlightCalibrationOptions& options, FlightStart& start) {
       parameter.prior_sigma = options.angle_sigma;
     }
   }
-  // What is held and may be off is carried along: indices above all. Air and wedges are held by
-  // convention, and the index that a recording determines belongs to them; the beam sees them
-  // together.
+  // Held quantities that may be off are included: indices above all. Air and wedges are held by
+  // convention, and the index that a recording determines belongs to them; the beam depends on all
+  // of them together.
   for (estimation::FreeParameter& held : estimation::uncertain_held(sensor, start.model.free)) {
     if (held.name.starts_with("wedge_angle") || held.name == "refractive_index_air") continue;
     start.model.free.push_back(std::move(held));
@@ -97,8 +97,8 @@ void set_priors(const FlightCalibrationOptions& options, FlightStart& start) {
     start.prior_sigma[FlightUnknowns::parameter(static_cast<int>(j))] =
         start.model.free[j].prior_sigma;
   }
-  // A calibration's covariance, and that of a mount that was found with it, take the place of the
-  // single sigmas.
+  // A calibration's covariance, and that of a mount from the same adjustment, replace the single
+  // sigmas.
   MatrixXd covariance = start.prior_sigma.cwiseAbs2().asDiagonal();
   const sensors::Sensor& sensor = options.sensor;
   require_length("rows of the sensor's covariance", sensor.covariance.rows(),
@@ -108,7 +108,7 @@ void set_priors(const FlightCalibrationOptions& options, FlightStart& start) {
   const algebra::NamedCovariance stated =
       trajectories::joint_covariance({sensor.covariance_names, sensor.covariance}, options.mount);
   const std::vector<std::string> names = unknown_names(start.model);
-  std::vector<std::pair<Index, Index>> known;  // unknown, its row of what is stated
+  std::vector<std::pair<Index, Index>> known;  // unknown, its row in the stated covariance
   const Index adjusted = globals - static_cast<Index>(start.considered);
   for (std::size_t i = 0; i < stated.names.size(); ++i) {
     const auto at = std::ranges::find(names, stated.names[i]) - names.begin();
@@ -120,13 +120,13 @@ void set_priors(const FlightCalibrationOptions& options, FlightStart& start) {
     for (const auto& [j, column] : known) covariance(i, j) = stated.matrix(row, column);
     start.prior_sigma[i] = std::sqrt(covariance(i, i));
   }
-  // What has a sigma of 0 is held; any information keeps the matrix regular.
+  // Quantities with a sigma of 0 are held; any information keeps the matrix regular.
   for (Index i = 0; i < globals; ++i) {
     if (!(start.prior_sigma[i] > 0)) covariance(i, i) = 1;
   }
   const algebra::SymmetricSolver solver(covariance);
   if (!solver.positive()) {
-    throw InvalidArgument("the covariance of the sensor's parameters is not positive");
+    throw InvalidArgument("the covariance of the sensor's parameters is not positive definite");
   }
   start.priors.information = solver.inverse();
 }

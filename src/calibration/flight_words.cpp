@@ -49,8 +49,8 @@ std::string in_words(const TrajectoryJump& jump, std::int64_t begin_ns) {
     return 1e-9 * static_cast<double>(time_ns - begin_ns);
   };
   return fmt::format(
-      "the trajectory jumps{} {:.2f} to {:.2f} s after the first shot ({} {}), {:.0f} "
-      "sigmas beyond what is stated of its errors",
+      "the trajectory jumps{} {:.2f} to {:.2f} s after the first shot ({} {}), {:.0f} sigmas "
+      "beyond its stated errors",
       sizes.empty() ? std::string(", in a direction that the strips hardly determine,")
                     : " by " + sizes,
       since(jump.begin_ns), since(jump.end_ns), jump.between_strips ? "after strip" : "strip",
@@ -60,8 +60,8 @@ std::string in_words(const TrajectoryJump& jump, std::int64_t begin_ns) {
 std::string clock_in_words(const FlightCalibration& c) {
   const FlightUnknown& clock = clock_of(c);
   return fmt::format(
-      "the strips ask for a clock offset of {:.3g} ms, {:.0f} sigmas from the {:.3g} +- {:.2g} ms "
-      "that are stated: the times of sensor or trajectory are not what they are said to be",
+      "the strips require a clock offset of {:.3g} ms, {:.0f} sigmas from the stated {:.3g} +- "
+      "{:.2g} ms: the times of sensor or trajectory are not as stated",
       1e3 * clock.value,
       std::abs(clock.value - clock.start) / std::hypot(clock.prior_sigma, clock.sigma),
       1e3 * clock.start, 1e3 * clock.prior_sigma);
@@ -70,8 +70,8 @@ std::string clock_in_words(const FlightCalibration& c) {
 std::string misfit_in_words(const FlightCalibration& c) {
   const TrajectoryFit& fit = c.trajectory_fit;
   return fmt::format(
-      "the errors of the trajectory do not follow what is stated of them, even with {} jump{} and "
-      "larger sigmas: the results may be off by more than their sigmas",
+      "the errors of the trajectory are larger than stated, even with {} jump{} and larger sigmas: "
+      "the results may be off by more than their sigmas",
       fit.jumps.size(), fit.jumps.size() == 1 ? "" : "s");
 }
 
@@ -91,7 +91,7 @@ std::optional<CalibrationVerdict> contradiction_of(const FlightCalibration& c) {
     return CalibrationVerdict{
         CalibrationCode::undecided, misfit_in_words(c),
         "process the trajectory again (GNSS fix, alignment, lever arm of its antenna), or state "
-        "larger or shorter errors of it"};
+        "larger errors or shorter correlation times for it"};
   }
   return std::nullopt;
 }

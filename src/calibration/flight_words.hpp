@@ -20,14 +20,14 @@ std::string in_words(const AttitudeDelay& delay);
 /// @param begin_ns  from which times count
 std::string in_words(const TrajectoryJump& jump, std::int64_t begin_ns);
 
-/// How far the clock offset is from what was stated of it.
+/// Deviation of the clock offset from its stated value.
 std::string clock_in_words(const FlightCalibration& c);
 
-/// That the trajectory does not fit what is stated of it, whatever was mended.
+/// Statement that the trajectory does not fit its stated errors, even after changes.
 std::string misfit_in_words(const FlightCalibration& c);
 
-/// The verdict on a flight whose times or trajectory contradict what is stated of them; none where
-/// they do not.
+/// The verdict on a flight whose times or trajectory contradict their stated errors; none if they
+/// do not.
 std::optional<CalibrationVerdict> contradiction_of(const FlightCalibration& c);
 
 }  // namespace risley::calibration

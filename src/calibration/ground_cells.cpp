@@ -30,10 +30,10 @@ using Eigen::Vector3d;
 constexpr double kFarthest = 1e6;  // m
 constexpr double kCauchyMads = 1.5;
 constexpr int kFits = 8;
-/// Scatter that still is that of a plane, over the noise: a little unevenness, and what chance does
-/// to the median of n distances, 1.2 / sqrt(n), two and a half times.
+/// Largest scatter of a plane, over the noise: a little unevenness, and the effect of chance on the
+/// median of n distances, 1.2 / sqrt(n), two and a half times.
 constexpr double kUnevenness = 1.1, kScatterSigmas = 3;
-/// Points of a cell that its plane is fitted to: the adjustment takes all.
+/// Most points of a cell for fitting its plane: the adjustment uses all.
 constexpr std::size_t kFittedPoints = 512;
 /// Sigma of an unknown that a pair of strips does not determine, m: far beyond any terrain.
 constexpr double kShiftPrior = 1;
@@ -127,7 +127,7 @@ std::optional<FittedGround> fit(const ShotPoints& points, std::span<const std::u
   return result;
 }
 
-/// The plane of some points, or why there is none.
+/// The plane of some points, or the reason why there is none.
 struct Outcome {
   std::optional<FittedGround> ground;
   bool rough = false;
@@ -387,7 +387,8 @@ std::vector<StripPair> strip_pairs(const ShotPoints& points,
     }
     own.pair.mean /= count;
     own.pair.rms = std::sqrt(own.squares / count);
-    // What the shift leaves is the noise of the cells; at first it is all of the difference.
+    // The residuals after the shift are the noise of the cells; at first it is all of the
+    // difference.
     double variance = std::max(own.squares / count, 1e-12);
     for (int iteration = 0; iteration < 3; ++iteration) {
       const Eigen::Matrix3d hessian =

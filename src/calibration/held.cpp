@@ -13,9 +13,9 @@ using estimation::FreeParameter;
 }  // namespace
 
 Held held_of(const sensors::Sensor& sensor, const Belief& belief, const PlanarProblem& problem) {
-  // What the sensor computes with and light meets, too.
+  // Common to the sensor's computation and the true optics.
   const auto in_both = [&](int at) { return is_held_material(at, problem); };
-  // What the true prisms have by themselves.
+  // Specific to the true prisms.
   std::vector<FreeParameter> own = estimation::uncertain_held(sensor, problem.free);
   std::erase_if(own, [&](const FreeParameter& parameter) {
     return is_material(parameter.places.front(), sensor.prisms());

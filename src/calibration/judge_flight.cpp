@@ -23,8 +23,8 @@ using Eigen::VectorXd;
 
 /// Combinations that the flight determines less well than prior knowledge are named.
 constexpr double kUntold = 1;
-/// A mean error of the trajectory that keeps this part of its sigma and goes with a boresight angle
-/// by this correlation is determined only as a sum with it.
+/// A mean error of the trajectory that keeps this part of its sigma and correlates this strongly
+/// with a boresight angle is determined only as a sum with it.
 constexpr double kKeptSigma = 0.6, kTiedCorrelation = 0.8;
 constexpr std::size_t kDatumBeams = 4000;
 
@@ -95,7 +95,7 @@ std::vector<NotTold> not_told_of(const FlightEvidence& e, const MatrixXd& all) {
     not_told.push_back(
         {estimation::direction_text(weak), weak.sigma / std::hypot(1.0, weak.sigma)});
   }
-  // Errors of the trajectory that stay as they are all flight long look like a boresight.
+  // Constant errors of the trajectory look like a boresight.
   constexpr const char* kMeans[] = {"tilts about east", "tilts about north", "heading"};
   const TrajectoryKnots& knots = e.model.knots;
   for (Index c = 3; c < kCorrections; ++c) {
@@ -145,7 +145,7 @@ FlightJudgement judge_flight(const FlightEvidence& e) {
   const MatrixXd all = flight_covariance(e.shots, e.poses, e.plane, e.model, e.weights, e.priors,
                                          e.system, functionals, e.ground);
   result.not_told = not_told_of(e, all);
-  // What was held and may be off, one sigma each, moves everything else along.
+  // Held quantities that may be off, one sigma each, shift everything else.
   const MatrixXd changes = e.system.held_changes();
   const auto considered = static_cast<Index>(e.considered);
   MatrixXd movement = MatrixXd::Zero(globals, globals + considered + e.further.cols());

@@ -10,8 +10,7 @@
 
 namespace risley::calibration {
 
-/// The last equations of a calibration in flight and what they were made of; all of it must outlive
-/// this.
+/// The last equations of a calibration in flight and their inputs; all of it must outlive this.
 struct FlightEvidence {
   const FlightShots& shots;
   const ShotPoses& poses;
@@ -20,15 +19,17 @@ struct FlightEvidence {
   const FlightWeights& weights;
   const FlightPriors& priors;
   const Eigen::VectorXd& prior_sigma;  ///< [globals]
-  std::size_t considered = 0;          ///< number of the last free parameters: held, and may be off
+  std::size_t considered = 0;          ///< number of the last free parameters: held, and possibly
+                                       ///< off
   const FlightSystem& system;
-  const Eigen::VectorXd* inverse_diagonal = nullptr;  ///< of the system, where it is known already
-  /// [globals, errors]: what unstated errors, one sigma each, do to the globals; or none.
+  const Eigen::VectorXd* inverse_diagonal = nullptr;  ///< of the system, if already known [globals,
+                                                      ///< errors]: effect of unstated errors, one
+                                                      ///< sigma each, on the globals; or none.
   Eigen::MatrixXd further{};
   const RoughGround* ground = nullptr;  ///< or none: planes
 };
 
-/// What the evidence shows: of a calibration that was made, or of one that is planned.
+/// Conclusions from the evidence of a calibration, real or planned.
 FlightJudgement judge_flight(const FlightEvidence& evidence);
 
 }  // namespace risley::calibration

@@ -8,7 +8,7 @@
 
 namespace risley::calibration {
 
-/// All shots of one recording and where the adjustment has them.
+/// All shots of one recording and their positions in the adjustment.
 struct LabelledShots {
   RangedShots shots;    ///< at rotation angles from all recordings together
   double pointing = 0;  ///< pointing_of_angles()
@@ -24,7 +24,7 @@ struct ViewDistances {
 };
 
 /// @param recording  that the view is of
-/// @param labels     of its shots: those to take have the view's row
+/// @param labels  of its shots: those with the view's row are selected
 ViewDistances view_distances(const PlanarProblem& problem, std::size_t view,
                              const LabelledShots& recording, const std::vector<int>& labels);
 

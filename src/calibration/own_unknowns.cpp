@@ -12,7 +12,7 @@ using Eigen::MatrixXd;
 
 namespace {
 
-/// How many of a wall's places are unknowns of the whole: they come first.
+/// Number of a wall's places that are unknowns of the whole system: they come first.
 Index unknowns_among(const std::vector<Index>& places, Index unknowns) {
   Index count = 0;
   while (count < std::ssize(places) && places[count] < unknowns) {

@@ -23,7 +23,7 @@ using Eigen::Index;
 constexpr std::size_t kAdjustedBlock = 4096;
 constexpr double kStandsStill = 1e-10;  // relative change of the standard deviation of unit weight
 
-/// Points of one view and the derivatives of their distances from a plane yet to be fitted.
+/// Points of one view and the derivatives of their distances from a plane to be fitted.
 struct Cloud {
   std::vector<Vector3<double>> points;
   Plane plane;
@@ -142,7 +142,7 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
                                const Progress& progress) {
   if (problem.views.empty()) throw EstimationError("no wall to calibrate on");
   const Index free = problem.free.size();
-  // Every view is a wall of its own in the sensor's frame.
+  // Every view is a separate wall in the sensor's frame.
   std::vector<Wall> walls;
   for (WallView& view : problem.views) {
     walls.push_back(problem.walls[view.wall]);
@@ -208,7 +208,7 @@ PlanarSolution adjust_as_paper(PlanarProblem problem, int most_iterations,
     const auto shots = static_cast<double>(own.size());
     solution.redundancy.push_back(shots * redundancy / static_cast<double>(solution.shots));
     solution.distance_sigma.push_back(unit_weight / std::sqrt(shots));
-    // As ranges, like every other adjustment has them.
+    // As ranges, as in every other adjustment.
     const PlaneEquations equations = plane_equations(own, plane_view(problem, v));
     solution.chi2.push_back(equations.cost);
     solution.lost += equations.lost;

@@ -30,18 +30,18 @@ using Eigen::Index;
 
 constexpr double kLeastDamping = 1e-12;
 constexpr double kMostDamping = 1e12;
-/// A step that is damped by more promises little wherever it stands.
+/// A step with more damping promises little anywhere.
 constexpr double kMostConvergedDamping = 1e-3;
-/// Steps that promise to lower the cost by less are taken unasked, in the unit of one squared
-/// sigma: so near the minimum what the derivatives leave out (the beam's origin) decides what the
-/// cost does, and not whether the step is right.
+/// Steps that promise to lower the cost by less are taken without a check, in the unit of one
+/// squared sigma: so near the minimum the terms omitted from the derivatives (the beam's origin)
+/// determine the change of the cost, and not whether the step is right.
 constexpr double kSmallPromise = 1e-2;
-/// Steps with the walls' shape, and the squared length, in sigmas of all unknowns together, of one
-/// that is small enough to be the last.
+/// Number of steps with the walls' shape, and the squared length, in sigmas of all unknowns
+/// together, of a step small enough to be the last.
 constexpr int kMostShapeSteps = 6;
 constexpr double kSmallShapeStep = 1e-2;
 
-/// Chi-square that a sound sample with these degrees of freedom exceeds once in 10,000.
+/// Chi-square that a correct sample with these degrees of freedom exceeds once in 10,000.
 double critical_chi2(int degrees_of_freedom) {
   constexpr double kCritical[] = {0.0, 15.137, 18.421, 21.108};
   return kCritical[std::clamp(degrees_of_freedom, 0, 3)];
@@ -98,7 +98,7 @@ void move(PlanarProblem& p, const Unknowns& at, const Step& step) {
 struct FlatSolution {
   SharedSolution shared;
   std::vector<WithoutOwn> walls;
-  double promised = 0;  ///< by how much the step lowers the cost
+  double promised = 0;  ///< decrease of the cost by the step
   bool positive = true;
 
   Step step(const ShapeProblem& problem) const {
@@ -142,7 +142,7 @@ FlatSolution solve_flat(const ShapeProblem& problem, double damping = 0) {
 }
 
 /// Information on the free parameters when everything else is unknown. Directions without any
-/// information come out as zero, also where the others cannot be separated.
+/// information come out as zero, even if the others cannot be separated.
 Eigen::MatrixXd eliminated(const Eigen::MatrixXd& hessian, Index free) {
   const Index rest = hessian.rows() - free;
   if (rest <= 0) return hessian;
@@ -162,8 +162,8 @@ PriorTest test_of(std::string name, bool station, const Eigen::VectorXd& misfit,
   test.name = std::move(name);
   test.station = station;
   test.misfit = misfit.norm();
-  // Covariance of prior less adjusted: what the data added, and what considered quantities make of
-  // it. Directions in which the data say nothing have no misfit and are no degrees of freedom.
+  // Covariance of prior less adjusted: contribution of the data and of considered quantities.
+  // Directions without information in the data have no misfit and are not degrees of freedom.
   const Eigen::MatrixXd covariance =
       sigma * sigma * Eigen::MatrixXd::Identity(misfit.size(), misfit.size()) - posterior +
       considered;
@@ -233,7 +233,7 @@ void check(const PlanarProblem& p) {
   }
 }
 
-/// Whether any wall has a shape to be found.
+/// Whether any wall has an unknown shape.
 bool has_shape(const PlanarProblem& p) {
   return !p.shape.parameters.empty() && std::ranges::any_of(p.views, [](const WallView& view) {
     return !view.cell_begin.empty();
@@ -249,7 +249,7 @@ std::size_t used_cells(const WallView& view) {
   return used;
 }
 
-/// Gauss-Newton with the walls' shape integrated out, from where flat walls have led.
+/// Gauss-Newton with the walls' shape integrated out, from the solution with flat walls.
 /// @param[in,out] system  that of the last step when it returns
 /// @return whether the steps became small
 bool take_shape_steps(PlanarProblem& problem, const Unknowns& at, const Places& places,
@@ -272,8 +272,8 @@ bool take_shape_steps(PlanarProblem& problem, const Unknowns& at, const Places& 
   return false;
 }
 
-/// What all unknowns of one wall's views say of their redundancy: the trace of covariance times
-/// normal equations, view by view.
+/// Contribution of one wall's views to their redundancy: the trace of covariance times normal
+/// equations, view by view.
 void take_redundancy(const PlanarSystem& system, const Eigen::MatrixXd& covariance,
                      const std::vector<std::size_t>& views, std::vector<double>& redundancy) {
   for (const std::size_t v : views) {
@@ -298,7 +298,7 @@ struct Uncertainty {
   bool positive = false;
 };
 
-/// What was adjusted beside the parameters.
+/// Adjusted quantities other than the parameters.
 void fill_numbers(const PlanarProblem& p, const Unknowns& at, const Eigen::MatrixXd& covariance,
                   PlanarSolution& solution) {
   std::vector<double> values;
@@ -319,12 +319,12 @@ void fill_numbers(const PlanarProblem& p, const Unknowns& at, const Eigen::Matri
   solution.number_cross_covariance = covariance.block(at.free(), 0, at.numbers(), at.free());
 }
 
-/// Nothing is known: as it is where directions are without information.
+/// Nothing is known, as in directions without information.
 Uncertainty no_information(const PlanarProblem& problem, const PlanarSystem& system) {
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
   const Index n = system.problem.unknowns, considered = considered_size(problem);
   Uncertainty result;
-  // With what can be eliminated of the walls' own unknowns.
+  // With as many of the walls' own unknowns eliminated as possible.
   Eigen::MatrixXd whole = system.problem.system;
   for (const WallSums& wall : system.problem.walls) {
     const Index others = wall.system.cols() - wall.own;
@@ -371,7 +371,7 @@ Uncertainty uncertainty_of(const PlanarProblem& problem, const ShapeSolution& sh
   return {shape.normal, shape.covariance, shape.response, shape.own, true};
 }
 
-/// What was adjusted, how well, and what is to be said of prior knowledge.
+/// Adjusted quantities, their accuracy, and the test of prior knowledge.
 void fill_uncertainty(const PlanarProblem& problem, const Unknowns& at,
                       const Uncertainty& uncertainty, PlanarSolution& solution) {
   const Index free = at.free();

@@ -19,8 +19,8 @@ using Eigen::Index;
 
 namespace {
 
-/// Columns of one wall's sums: its own unknowns, and then those of the whole system that its views
-/// have to do with.
+/// Columns of one wall's sums: its own unknowns, and then those of the whole system coupled with
+/// its views.
 class WallLayout {
  public:
   WallLayout(const PlanarProblem& p, const HeldQuantities& held, const Unknowns& at,
@@ -55,7 +55,7 @@ class WallLayout {
   const std::vector<Index>& places() const { return places_; }
   Index own() const { return own_; }
   Index size() const { return own_ + std::ssize(places_); }
-  /// Of an unknown that all walls share: a parameter or a number.
+  /// Of an unknown common to all walls: a parameter or a number.
   Index shared(Index unknown) const { return own_ + unknown; }
   /// Negative where it is held.
   Index rotation(std::size_t recording) const { return rotation_[recording]; }
@@ -70,13 +70,13 @@ class WallLayout {
   std::vector<Index> places_, rotation_, first_of_recording_;
 };
 
-/// d columns of one view's equations / d those columns of its wall that it has to do with.
+/// d columns of one view's equations / d the coupled columns of its wall.
 struct Chain {
   std::vector<Index> at;  ///< columns of the wall
   Eigen::MatrixXd to;     ///< [columns of the view, at]
 };
 
-/// Takes columns as they are added.
+/// Registers columns as they are added.
 class ChainBuilder {
  public:
   explicit ChainBuilder(Index rows) : rows_(rows) {}
@@ -124,7 +124,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
     number(at.range_term(i), columns.range_term(static_cast<int>(i)));
   }
   number(at.range_offset(), columns.range_offset());
-  // The tangents in the sensor's frame are those of the scene turned, see plane_view().
+  // The tangents in the sensor's frame are the rotated ones of the scene, see plane_view().
   const Wall& wall = p.walls[seen.wall];
   const auto [u1, u2] = tangents_of(wall.normal);
   if (const Index normal = at.normal(seen.wall); normal >= 0) {
@@ -144,7 +144,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
   for (Index j = 0; j < std::ssize(p.considered); ++j) {
     const Index own = chain.add(layout.believed() + j);
     for (const int place : p.considered[j].places) {
-      // The other error parameters that the sensor believes in only act through the angles.
+      // The sensor's other error parameters only act through the angles.
       if (is_held_material(place, p)) chain.set(places.column(place), own, 1.0);
     }
     if (p.angle_sensitivity.empty()) continue;
@@ -170,7 +170,7 @@ Chain chain_of(const PlanarProblem& p, const HeldQuantities& held, const Unknown
 }
 
 /// Adds the cells of one view to those of its wall.
-/// @return chi2 of what they scatter within themselves
+/// @return chi2 of the scatter within them
 double add_cells(const PlanarProblem& p, std::size_t view, const PlaneColumns& columns,
                  const PlaneEquations& equations, const Chain& chain, WallSums& sums) {
   const WallView& seen = p.views[view];
@@ -179,7 +179,7 @@ double add_cells(const PlanarProblem& p, std::size_t view, const PlaneColumns& c
   const Eigen::Vector3d& position = p.stations[seen.recording].position;
   const double stand_u = eigen(u1).dot(position), stand_v = eigen(u2).dot(position);
   const Index cells = grid.cells.size();
-  // A shot's row by the wall's height, and that times its place against the middle of its cell:
+  // A shot's row by the wall's height, and that times its place relative to the middle of its cell:
   // u - middle = -side n1 / d + (stand - middle).
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows = equations.cells;
   double within = equations.cost;
@@ -235,7 +235,7 @@ ViewSystem add_view(const PlanarProblem& p, std::size_t view, const PlaneColumns
   return own;
 }
 
-/// Adds what is known of an unknown before to normal equations whose residual is last.
+/// Adds prior knowledge of an unknown to normal equations whose residual is last.
 void tie(Index unknown, double sigma, double off, Eigen::MatrixXd& system) {
   const double information = 1.0 / (sigma * sigma);
   const Index residual = system.cols() - 1;
@@ -245,7 +245,7 @@ void tie(Index unknown, double sigma, double off, Eigen::MatrixXd& system) {
   system(residual, residual) += information * off * off;
 }
 
-/// What is known before of the unknowns that walls share.
+/// Prior knowledge of the unknowns that walls share.
 void add_priors(const PlanarProblem& p, const Unknowns& at, Eigen::MatrixXd& system) {
   for (std::size_t j = 0; j < p.prior_sigma.size(); ++j) {
     if (!std::isfinite(p.prior_sigma[j])) continue;

@@ -11,8 +11,8 @@
 
 namespace risley::calibration {
 
-/// Where each unknown stands: those that all walls share in one vector, and those of one wall alone
-/// (its normal, and its distance from every recording that sees it) in one for every wall.
+/// Positions of the unknowns: those common to all walls in one vector, and those of a single wall
+/// (its normal, and its distance from every recording that sees it) in one vector per wall.
 class Unknowns {
  public:
   explicit Unknowns(const PlanarProblem& problem);
@@ -22,7 +22,7 @@ class Unknowns {
   Eigen::Index shared() const { return shared_; }
   /// Sizes and range errors, which follow the free parameters.
   Eigen::Index numbers() const { return numbers_; }
-  /// Negative where the quantity is held.
+  /// Negative if the quantity is held.
   Eigen::Index prism_size(std::size_t number) const { return size_[number]; }
   Eigen::Index range_term(std::size_t number) const { return term_[number]; }
   Eigen::Index range_offset() const { return offset_; }
@@ -38,7 +38,7 @@ class Unknowns {
   std::vector<Eigen::Index> own_, normal_, distance_;
 };
 
-/// Places of the flat parameter vector that plane_equations() differentiates by.
+/// Places of the flat parameter vector by which plane_equations() differentiates.
 class Places {
  public:
   Places(const PlanarProblem& problem, const HeldQuantities& held);
@@ -53,7 +53,7 @@ class Places {
 };
 
 /// Considered quantities: believed parameters, then the mean angles of every recording. Held ones
-/// have the columns behind them.
+/// have the columns after them.
 Eigen::Index considered_size(const PlanarProblem& problem);
 Eigen::MatrixXd considered_covariance(const PlanarProblem& problem);
 
@@ -65,12 +65,12 @@ Eigen::Vector2d misfit_of(const Wall& wall);
 /// Adjusted after stated rotation, scene frame, rad.
 Eigen::Vector3d misfit_of(const StationPose& station);
 
-/// What one view says of its unknowns.
+/// Information of one view on its unknowns.
 struct ViewSystem {
   std::vector<Eigen::Index> at;  ///< their columns in the sums of the wall
   Eigen::MatrixXd normal;        ///< J' W J of them
   double cost = 0;
-  double scatter = 0;     ///< chi2 of what cells scatter within themselves, where they are summed
+  double scatter = 0;     ///< chi2 of the scatter within cells, if they are summed
   std::size_t shots = 0;  ///< that met their plane
 };
 

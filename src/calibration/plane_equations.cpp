@@ -15,7 +15,7 @@
 namespace risley::calibration {
 namespace {
 
-/// Shots that one task sums up: fixed, so that sums do not depend on the number of threads.
+/// Shots summed by one task: fixed, so that sums do not depend on the number of threads.
 constexpr std::size_t kChunkShots = 8192;
 
 void check(const RangedShots& shots, const PlaneView& view, const ResidualColumns& columns) {
@@ -52,12 +52,12 @@ void check(const RangedShots& shots, const PlaneView& view, const ResidualColumn
   require_finite("distance", view.plane.distance, "m");
 }
 
-/// Shots that one task sums up.
+/// Shots summed by one task.
 struct Chunk {
   std::size_t begin = 0, end = 0, first_cell = 0;
 };
 
-/// Of about equal numbers of shots, divided where a cell ends if there are any.
+/// Of about equal numbers of shots, divided at the ends of cells if there are any.
 std::vector<Chunk> chunks_of(std::size_t shots, std::span<const std::uint32_t> cell_begin) {
   std::vector<Chunk> chunks;
   if (cell_begin.empty()) {

@@ -19,8 +19,8 @@ using Lanes = xsimd::batch_bool<double>;
 constexpr std::size_t kLanes = Batch::size;
 constexpr double kLargest = __DBL_MAX__;
 
-/// Groups of shots whose rows are kept until they are multiplied with each other: enough that the
-/// sums stay in registers for a while, few enough that the rows stay in the nearest cache.
+/// Groups of shots whose rows are kept until they are multiplied with each other: enough for the
+/// sums to stay in registers for a while, few enough for the rows to stay in the nearest cache.
 constexpr std::size_t kGroups = 16;
 constexpr std::size_t kBlock = kGroups * kLanes;
 
@@ -36,7 +36,7 @@ class Products {
     }
   }
 
-  /// Where the columns of a group go, each times the root of the weight.
+  /// Destination of a group's columns, each times the root of the weight.
   Batch* row(std::size_t group) { return rows_ + group * stride_; }
   /// Adds the products of the first groups.
   void add(std::size_t groups) { sums_.add(rows_, stride_, groups); }
@@ -56,7 +56,7 @@ class Products {
   Batch rows_[kGroups * Sums::padded(kMost)];
 };
 
-/// Everything of a call that is the same for all shots, but for the emitters of a group.
+/// Everything of a call that is the same for all shots, except for the emitters of a group.
 template <TrainLayout N>
 struct Constants {
   EmitterLanes<Batch, N> emitters;
@@ -99,7 +99,7 @@ struct Constants {
   static Vector3<Batch> vector(const double* v) { return {Batch(v[0]), Batch(v[1]), Batch(v[2])}; }
 };
 
-/// The columns of one block of shots. Behind the last shot of a call follow some that are lost.
+/// The columns of one block of shots. After the last shot of a call follow some lost ones.
 template <TrainLayout N>
 class ShotBlock {
  public:
@@ -214,7 +214,7 @@ class Walks {
     const Vector3<Batch>& origin() const { return path.origin(); }
   };
 
-  /// Where the beams of a group meet the plane, and how that depends on their directions.
+  /// Points where the beams of a group meet the plane, and their derivatives by the directions.
   void meet_plane(const Constants<N>& c, std::size_t g) {
     const Vector3<Batch>& direction = trace_[g].direction();
     Meeting& m = meeting_[g];
@@ -276,7 +276,7 @@ class Walks {
     *column++ = slope;
     *column++ = scale * residual;
 
-    // Comparison with NaN is false: so is what a beam that does not get through leads to.
+    // Comparison with NaN is false, and so are results of a blocked beam.
     const Lanes good = (m.approach > Batch(kLeastApproach)) & (m.range > zero) &
                        (xsimd::abs(residual) <= Batch(kLargest)) & (variance > zero) &
                        (variance <= Batch(kLargest));

@@ -15,13 +15,13 @@ namespace risley::calibration {
 /// as parallel to it.
 inline constexpr double kLeastApproach = 1e-3;
 
-/// Terms of the range errors at most: near, incidence, intensity and one per emitter.
+/// Most terms of the range errors: near, incidence, intensity and one per emitter.
 inline constexpr int kMostRangeTerms = 3 + kMaxEmitters;
-/// Sizes of prisms that one call differentiates by at most: every thickness and spacing.
+/// Most sizes of prisms by which one call differentiates: every thickness and spacing.
 inline constexpr int kMostSizes = 2 * kMaxPrisms;
 
 /// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Columns are
-/// those of all shots; the call works on shots [begin, end).
+/// those of all shots; the call processes shots [begin, end).
 struct PlaneArguments {
   const double* parameters = nullptr;     ///< whole flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
@@ -32,7 +32,7 @@ struct PlaneArguments {
   int place_count = 0;
   const double* size_rates = nullptr;  ///< d face position / d size [size_count][2 prisms]
   int size_count = 0;
-  const double* term_values = nullptr;  ///< [term_count], what the columns of terms count
+  const double* term_values = nullptr;  ///< [term_count], factors of the terms' columns
   int term_count = 0;
   double range_offset = 0;
   double range_variance = 0;

@@ -8,15 +8,15 @@
 
 namespace risley::calibration {
 
-/// What is known of any plane before: keeps those of few shots regular and weighs nothing.
+/// Prior of any plane: keeps planes with few shots regular and has negligible weight.
 inline constexpr double kPlaneTiltSigma = 10, kPlaneOffsetSigma = 1000;  // rad, m
 
-/// What is known of a plane before, of its two tilts and its offset.
+/// Prior of a plane, of its two tilts and its offset.
 struct PlaneKnowledge {
   Eigen::Vector3d information{1 / (kPlaneTiltSigma * kPlaneTiltSigma),
                               1 / (kPlaneTiltSigma * kPlaneTiltSigma),
                               1 / (kPlaneOffsetSigma * kPlaneOffsetSigma)};
-  Eigen::Vector3d off{0, 0, 0};  ///< of what is known from what there is
+  Eigen::Vector3d off{0, 0, 0};  ///< from the current value to the known one
 };
 
 PlaneKnowledge knowledge_of(const PlanePrior& prior, const GroundPlane& plane);

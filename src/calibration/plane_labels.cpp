@@ -11,17 +11,17 @@
 namespace risley::calibration {
 namespace {
 
-/// Of labels and fits: ends an exchange of a few points to and fro.
+/// Limit for alternating labels and fits: ends an exchange of a few points back and forth.
 constexpr int kMostLabelRounds = 10;
-/// A plane is there where it has this share of the points around, see docs/theory/calibration.md,
-/// and as many as fix a plane.
+/// A plane is present where it has this share of the surrounding points, see
+/// docs/theory/calibration.md, and enough to fix a plane.
 constexpr double kLeastShare = 0.1;
 constexpr std::size_t kLeastNear = 3;
 /// Of the points in a plane's own cells: a slice of a body has less than half of them
-/// (PlaneSegmentation.ScatteredPointsAreNoPlane). A cell is its own where it holds a quarter.
+/// (PlaneSegmentation.ScatteredPointsAreNoPlane). A cell belongs to it if it holds a quarter.
 constexpr double kLeastFill = 0.5, kOwnCell = 0.25;
-/// Planes at a smaller angle (half a degree) are parallel but for noise; one is then the other
-/// where it has half of its points (PlaneSegmentation.OneSurfaceIsOnePlane). Rad.
+/// Planes at a smaller angle (half a degree) are parallel except for noise; one is then the other
+/// if it has half of its points (PlaneSegmentation.OneSurfaceIsOnePlane). Rad.
 constexpr double kNearlyParallel = 0.0087, kParallelShare = 0.5;
 /// Planes at a smaller angle (5 degrees) differ so slowly in range that the strip in which noise
 /// decides between them would be most of both. Rad.
@@ -42,7 +42,7 @@ class Labeller {
   }
 
  private:
-  /// Labels and fits in turn until no label changes. Points at edges take no part in the fits.
+  /// Alternates labels and fits until no label changes. Points at edges are excluded from the fits.
   void settle() {
     for (int round = 0; round < kMostLabelRounds && !planes_.empty(); ++round) {
       std::vector<int> labels = nearest_labels();
@@ -54,8 +54,8 @@ class Labeller {
     label_ = nearest_labels();
   }
 
-  /// Every point goes to the plane it is nearest to, in sigmas, among those that are there: a plane
-  /// is where it holds a share of the points around. Elsewhere it would take the tails of another
+  /// Assigns every point to the nearest plane, in sigmas, among those present: a plane is present
+  /// where it holds a share of the surrounding points. Elsewhere it would take the tails of another
   /// plane's noise, all on one side.
   std::vector<int> nearest_labels() {
     const std::size_t planes = planes_.size();
@@ -102,8 +102,8 @@ class Labeller {
   }
 
   /// Whether a beam passes an edge of two planes so closely that noise decides which of them its
-  /// point is nearer to. The point's own noise plays no part in the answer: leaving such points out
-  /// cuts no tail.
+  /// point is nearer to. The decision ignores the point's own noise: excluding such points cuts no
+  /// tail.
   bool doubtful(const Plane& a, const Plane& b, const Beam& beam) const {
     if (std::abs(dot(a.normal, b.normal)) > std::cos(kCrossing)) return false;
     const double cosine_a = dot(a.normal, beam.direction);
@@ -139,7 +139,7 @@ class Labeller {
 
   void remove(std::size_t plane) { planes_.erase(planes_.begin() + plane); }
 
-  /// Removes the smallest plane that is none after all. @return whether there was one
+  /// Removes the smallest invalid plane. @return whether there was one
   bool drop_one() {
     const auto rows = members();
     std::optional<std::size_t> worst;

@@ -8,11 +8,11 @@
 
 namespace risley::calibration {
 
-/// Part of a smaller plane's points that lies near a larger one where both are one surface: some of
+/// Share of a smaller plane's points that lies near a larger one if both are one surface: some of
 /// the rest are outliers. PlaneSegmentation.OneSurfaceIsOnePlane
 inline constexpr double kOneSurfaceShare = 0.9;
 
-/// Planes and the points that are theirs.
+/// Planes and their points.
 struct LabelledPlanes {
   std::vector<Plane> planes;
   std::vector<int> label;              ///< [points], row of planes, -1 for clutter
@@ -20,8 +20,8 @@ struct LabelledPlanes {
   bool narrow = false;                 ///< some filled no area and were dropped
 };
 
-/// Every point to the plane that it is nearest to, and fits, in turn until no label changes. Planes
-/// that are none after all are dropped, and those that are one surface become one.
+/// Alternates assigning every point to its nearest plane, and fits, until no label changes. Invalid
+/// planes are dropped, and planes of one surface are merged.
 LabelledPlanes label_planes(const ScannedPoints& points, std::vector<Plane> planes);
 
 }  // namespace risley::calibration

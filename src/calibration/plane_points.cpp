@@ -20,7 +20,7 @@
 namespace risley::calibration {
 namespace {
 
-/// Shots of a block with a range and a sound direction, and how many others there are.
+/// Shots of a block with a range and a valid direction, and the number of others.
 struct SoundShots {
   RangedShots shots;
   std::vector<std::int64_t> time_ns;
@@ -65,7 +65,7 @@ SoundShots sound_shots(const estimation::Estimate& estimate, estimation::ShotRan
   return sound;
 }
 
-/// Takes the shots of an estimate in parallel, some megabytes of rotor states at a time.
+/// Copies the shots of an estimate in parallel, some megabytes of rotor states at a time.
 void take_shots(const estimation::Estimate& estimate, RangedRecording& recording) {
   const std::size_t size = estimate.series.size();
   std::vector<SoundShots> blocks(block_count(size));
@@ -103,7 +103,7 @@ void RangedShots::resize(int prisms, std::size_t shots) {
   require_between("number of prisms", prisms, 1, kMaxPrisms);
   rotation_angle.resize(prisms);
   angle_covariance.resize(prisms * (prisms + 1) / 2);
-  // At once: of long columns, most of the time goes into memory that is touched for the first time.
+  // All at once: most of the time for long columns goes into first touching their memory.
   const std::size_t angles = prisms, covariances = angle_covariance.size();
   parallel::for_each(angles + covariances + 2, [&](std::size_t i) {
     if (i < angles) {
@@ -167,7 +167,7 @@ RangedRecording ranged_recording(const estimation::Estimate& estimate, std::stri
 }
 
 std::vector<std::size_t> spread_rows(std::size_t shots, std::size_t most) {
-  // Places within equal parts by the golden ratio, which falls into step with nothing periodic.
+  // Places within equal parts by the golden ratio, which beats with nothing periodic.
   constexpr double kGolden = 0.6180339887498949;
   const std::size_t count = std::min(shots, most);
   std::vector<std::size_t> rows(count);

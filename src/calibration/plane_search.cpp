@@ -15,25 +15,25 @@
 namespace risley::calibration {
 namespace {
 
-/// What each stream of random numbers is for.
+/// Purpose of each stream of random numbers.
 constexpr std::uint64_t kOrderStream = 1, kSampleStream = 2;
 
-/// Points that candidates are scored on: shares are then known to 1 %, sqrt(0.25 / 2000).
+/// Number of points on which candidates are scored: shares are then known to 1 %, sqrt(0.25 /
+/// 2000).
 constexpr std::size_t kScored = 2000;
-/// Probability that no trial hit the largest plane thrice. That takes log(kMissed) / log(1 -
+/// Probability that no trial hit the largest plane three times. That takes log(kMissed) / log(1 -
 /// share^3) trials: 52 for half of the points, 860 for a fifth; the bounds lie beyond. Smaller
 /// planes are left to triples of near points.
 constexpr double kMissed = 1e-3;
 constexpr int kFewestTrials = 60, kMostTrials = 1000;
-/// How far the near points of a triple lie apart, rad (six and two degrees):
-/// docs/theory/calibration.md
+/// Distance of the near points of a triple, rad (six and two degrees): docs/theory/calibration.md
 constexpr double kFartherTriple = 0.105, kNearTriple = 0.035;
-/// Near triples with this part of the best score are refitted before they are judged. Each costs
-/// four fits, so their number is bounded.
+/// Near triples with this part of the best score are refitted before the decision. Each costs four
+/// fits, so their number is bounded.
 constexpr double kWorthPolishing = 0.4;
 constexpr int kMostPolished = 40;
-/// Candidates set aside for filling no area: each takes its points out of the search, and what is
-/// left of a scan after this many rows of points is no wall either.
+/// Most candidates set aside for filling no area: each removes its points from the search, and the
+/// rest of a scan after this many rows of points is not a wall either.
 constexpr int kMostRejected = 4;
 
 /// Support of a candidate among the points it was scored on.
@@ -81,7 +81,7 @@ class Search {
   }
 
  private:
-  /// All beams in random order, so that the first ones are a fair choice.
+  /// All beams in random order, so that the first ones are a fair sample.
   std::vector<std::size_t> shuffled() const {
     const RandomStream random(points_.options.seed, kOrderStream);
     std::vector<std::size_t> order(points_.beams.size());
@@ -116,7 +116,7 @@ class Search {
   }
 
   /// RANSAC. Triples are drawn from everywhere, from about six and from about two degrees in turn:
-  /// the near ones find small planes, whose points far ones hardly ever hit thrice.
+  /// the near ones find small planes, which far ones hardly ever hit three times.
   std::optional<Candidate> largest_plane(const std::vector<std::size_t>& rest) {
     const std::vector<std::size_t> scored(rest.begin(),
                                           rest.begin() + (std::min(kScored, rest.size())));
@@ -132,7 +132,7 @@ class Search {
       const auto through = plane_through(points_.beams[a], points_.beams[b], points_.beams[c]);
       if (!through) continue;
       Candidate candidate{*through, score(*through, scored)};
-      // Noise tilts a plane through near points: it deserves a fit before it is judged.
+      // Noise tilts a plane through near points: it is refitted before the decision.
       const double bar =
           best ? (near > 0 && polished_ones < kMostPolished ? kWorthPolishing : 1.0) : 0.0;
       if (best && candidate.score.value <= bar * best->score.value) continue;
@@ -164,7 +164,7 @@ class Search {
     return result;
   }
 
-  /// Fits a plane to the points near it, first within twice the gate. The weights fall to nothing
+  /// Fits a plane to the points near it, first within twice the gate. The weights fall to zero
   /// towards the gate (Tukey), so that a step on the wall does not tilt the plane.
   Plane polished(Plane plane, const std::vector<std::size_t>& rows) const {
     for (const PointNoise* noise : {&wide_, &points_.noise, &points_.noise, &points_.noise}) {

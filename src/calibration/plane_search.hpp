@@ -14,8 +14,7 @@ struct FoundCandidates {
   bool narrow = false;  ///< some fill no area and were set aside
 };
 
-/// RANSAC: the largest plane, fitted to its points, then the next one among the points that no
-/// earlier one explains.
+/// RANSAC: the largest plane, fitted to its points, then the next one among the unexplained points.
 FoundCandidates search_planes(const ScannedPoints& points);
 
 }  // namespace risley::calibration

@@ -22,13 +22,13 @@
 namespace risley::calibration {
 namespace {
 
-/// Shots of a piece, those that are not chosen included, and of what one task works on.
+/// Shots of a piece, including those not chosen, and of one task.
 constexpr std::uint64_t kPlannedPieceShots = std::uint64_t{1} << 18U;
 constexpr std::size_t kTaskShots = 16384;
 constexpr std::uint64_t kChoice = 1701, kPenetration = 1702;  // random streams
 constexpr double kBillion = 1e9;
 
-/// Shots of one strip before it is known where they end.
+/// Shots of one strip before their end points are known.
 struct FiredShots {
   std::vector<std::uint64_t> number;
   std::vector<std::int64_t> time_ns;  // of the trajectory
@@ -61,7 +61,7 @@ void fire(const PlannedFlight& planned, std::uint64_t first, std::uint64_t last,
   }
 }
 
-/// Sends shots to the terrain. @return their ranges, NaN where a shot ends nowhere
+/// Sends shots to the terrain. @return their ranges, NaN if a shot ends nowhere
 std::vector<double> ranges_of(const PlannedFlight& planned, const scenes::Terrain& terrain,
                               const trajectories::Interpolation& poses, const FiredShots& fired,
                               std::uint64_t seed, PlannedPiece& piece) {
@@ -106,7 +106,7 @@ std::vector<double> ranges_of(const PlannedFlight& planned, const scenes::Terrai
 
 trajectories::Flight flown(const PlannedFlight& planned) {
   trajectories::FlightPlan plan = planned.plan;
-  plan.origin.reset();  // the map's axes are all that is needed
+  plan.origin.reset();  // only the map's axes are needed
   return trajectories::fly(plan);
 }
 

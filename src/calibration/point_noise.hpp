@@ -9,13 +9,13 @@
 
 namespace risley::calibration {
 
-/// A point as the sensor sees it.
+/// A point as seen by the sensor.
 struct Beam {
   Vector3<double> direction;  ///< unit vector
   double range = 0;           ///< m
 };
 
-/// Noise of a point and how many sigmas still belong to a plane.
+/// Noise of a point and the number of sigmas that still belong to a plane.
 struct PointNoise {
   double range_variance, pointing_variance, gate_square;
 

@@ -13,20 +13,20 @@ namespace {
 
 using Eigen::Index;
 
-/// A jump counts beyond this many sigmas: there are thousands of steps.
+/// A jump is significant beyond this many sigmas: there are thousands of steps.
 constexpr double kJumpSigmas = 5;
-/// One jump also shows in the steps beside it, up to here.
+/// One jump also shows in the neighbouring steps, up to here.
 constexpr double kJumpsApart = 4;  // s
-/// Share of a step's variance that the flight has to determine.
-constexpr double kLeastTold = 1e-3;
+/// Share of a step's variance that the flight must determine.
+constexpr double kLeastDetermined = 1e-3;
 /// The process counts as larger than stated beyond this many sigmas of chi2, if it is this many
-/// times as large. Where one error is, nothing vouches for the others.
+/// times as large. If one error is present, the others are less certain.
 constexpr double kProcessSigmas = 5, kLeastRatio = 1.3;
 constexpr double kOthersSigmas = 1, kOthersRatio = 1.1;
-/// Nothing is concluded from less, and little from less than the second number.
+/// No conclusion from less, and only a weak one from less than the second number.
 constexpr double kLeastExpected = 1, kHardlyTold = 15;
 
-/// Share of what all steps determine that is to be left away from jumps. Median of chi2 with one
+/// Share of the information of all steps that must remain away from jumps. Median of chi2 with one
 /// degree of freedom.
 constexpr double kLeastLeft = 0.15, kMedianOfChi2 = 0.4549;
 
@@ -48,7 +48,7 @@ ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& 
   const Index count = knots.size();
   ProcessCheck check;
   check.score = Eigen::MatrixXd::Zero(kCorrections, std::max<Index>(count - 1, 0));
-  check.told = check.jump = check.score;
+  check.determined = check.jump = check.score;
   check.chi2 = check.expected = Eigen::VectorXd::Zero(kCorrections);
   for (int c = 0; c < kCorrections; ++c) {
     const KnotSteps steps = knot_steps(knots, priors.process, c, priors.breaks);
@@ -62,13 +62,13 @@ ProcessCheck check_process(const TrajectoryKnots& knots, const Eigen::MatrixXd& 
             decay * (decay * band.diagonal[at - kCorrections] - 2 * band.next[at - kCorrections]);
       }
       const double before = steps.sigma[k] * steps.sigma[k];
-      const double told = std::clamp(1 - variance / before, 0.0, 1.0);
+      const double determined = std::clamp(1 - variance / before, 0.0, 1.0);
       check.chi2[c] += off * off / before;
-      check.expected[c] += told;
-      if (k == 0 || told < kLeastTold) continue;
-      check.told(c, k - 1) = told;
-      check.score(c, k - 1) = off / std::sqrt(before * told);
-      check.jump(c, k - 1) = off / told;
+      check.expected[c] += determined;
+      if (k == 0 || determined < kLeastDetermined) continue;
+      check.determined(c, k - 1) = determined;
+      check.score(c, k - 1) = off / std::sqrt(before * determined);
+      check.jump(c, k - 1) = off / determined;
     }
   }
   return check;
@@ -101,17 +101,17 @@ Eigen::VectorXd process_factors(const TrajectoryKnots& knots, const ProcessCheck
         })) {
       continue;
     }
-    chi2 += check.score.col(k).cwiseAbs2().cwiseProduct(check.told.col(k));
-    expected += check.told.col(k);
+    chi2 += check.score.col(k).cwiseAbs2().cwiseProduct(check.determined.col(k));
+    expected += check.determined.col(k);
   }
-  // Where jumps are everywhere, the middle of all steps says more than what is left.
-  const Eigen::VectorXd of_all = check.told.rowwise().sum();
+  // If jumps are everywhere, the median of all steps is more informative than the remaining ones.
+  const Eigen::VectorXd of_all = check.determined.rowwise().sum();
   if (expected.sum() < kLeastLeft * of_all.sum()) {
     expected = of_all;
     for (Index c = 0; c < kCorrections; ++c) {
       std::vector<double> squares;
       for (Index k = 0; k < check.score.cols(); ++k) {
-        if (check.told(c, k) > 0) squares.push_back(std::pow(check.score(c, k), 2));
+        if (check.determined(c, k) > 0) squares.push_back(std::pow(check.score(c, k), 2));
       }
       chi2[c] = squares.empty() ? 0 : expected[c] * median(squares) / kMedianOfChi2;
     }

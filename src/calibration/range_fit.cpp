@@ -9,13 +9,13 @@
 namespace risley::calibration {
 namespace {
 
-/// Sines of the least angles (0.06 degree) that three points make with each other and their plane
-/// with a beam: flatter ones fix no normal, since directions are no better known.
+/// Sines of the smallest angles (0.06 degree) that three points form with each other and their
+/// plane with a beam: flatter ones fix no normal, since directions are no better known.
 constexpr double kLeastSine = 1e-3;
 /// Cosine of the flattest incidence: the predicted range of a flatter one is 10,000 times the
 /// distance of the plane.
 constexpr double kLeastCosine = 1e-4;
-/// Reciprocal condition at which a solution has three digits left of sixteen.
+/// Reciprocal condition at which three of a solution's sixteen digits remain.
 constexpr double kLeastCondition = 1e-13;
 
 }  // namespace

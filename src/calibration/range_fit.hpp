@@ -24,7 +24,7 @@ class RangeFit {
   /// @param factor  on the weight of the beam
   void add(const Beam& beam, double factor = 1.0);
 
-  /// The plane one Gauss-Newton step on, or none when the points do not determine one.
+  /// The plane after one Gauss-Newton step, or none when the points do not determine one.
   std::optional<Plane> step() const;
 
  private:

@@ -14,7 +14,7 @@ namespace {
 using Eigen::Index;
 constexpr int kPatches = RoughGround::kPatches;
 
-/// Most shots that are used: more hardly add anything.
+/// Most shots used: more hardly improve the result.
 constexpr std::size_t kRoughShots = 400'000;
 /// Ground counts as rough beyond this many sigmas.
 constexpr double kRoughSigmas = 5;

@@ -9,8 +9,8 @@
 
 namespace risley::calibration {
 
-/// How the ground departs from its planes: the mean product of two residuals for every two patches
-/// of a cell, over some cells. Nothing where chance explains all of it.
+/// Departure of the ground from its planes: the mean product of two residuals for every two patches
+/// of a cell, over some cells. Nothing if chance explains all of it.
 /// @param points  of the shots; with `grid`, they define the patches
 std::optional<RoughGround> rough_ground(const FlightShots& shots, const ShotPoses& poses,
                                         const PlaneOfShot& plane, const ShotPoints& points,

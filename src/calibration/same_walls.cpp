@@ -22,18 +22,18 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Planes as they are found are off by a degree, which the adjustment will mend, and by what the
-/// sensor was moved between recordings.
+/// Planes as found are off by a degree, which the adjustment will correct, and by the motion of the
+/// sensor between recordings.
 constexpr double kSamePlane = radians_from_degrees(3.0);
 constexpr double kFarthestShift = 0.5;  // m
-/// Distances that a shift does not explain, of the distance and at least, m.
+/// Distances not explained by a shift, relative and absolute, m.
 constexpr double kDistancePart = 0.005, kDistanceAtLeast = 0.02;
-/// Walls that fix a turn meet at more than this angle.
+/// Walls that fix a rotation meet at more than this angle.
 constexpr double kSteepest = radians_from_degrees(20.0);
-/// Part of the points of a recording that must lie on walls of the other.
+/// Share of the points of a recording that must lie on walls of the other.
 constexpr double kLeastShared = 0.7;
-/// Another turn fits as well when it explains as many points, and a shift shorter by this, m, does
-/// not distinguish them.
+/// Another rotation fits as well if it explains as many points, and a shift shorter by this, m,
+/// does not distinguish them.
 constexpr double kAsWell = 0.95, kShorterShift = 0.3, kOtherTurn = radians_from_degrees(10.0);
 
 struct Pose {
@@ -44,7 +44,7 @@ struct Pose {
 
 using Planes = std::vector<const FoundPlane*>;
 
-/// The turn that takes two directions to two others as well as it can.
+/// The best rotation from two directions to two others.
 Matrix3d turn_between(const Vector3d& a1, const Vector3d& b1, const Vector3d& a2,
                       const Vector3d& b2) {
   const Matrix3d product =
@@ -57,7 +57,7 @@ Matrix3d turn_between(const Vector3d& a1, const Vector3d& b1, const Vector3d& a2
 
 Vector3d normal_of(const FoundPlane& plane) { return eigen(plane.plane.normal); }
 
-/// The pose with its shift, and how much of the recording it explains; nothing where distances
+/// The pose with its shift, and the share of the recording that it explains; nothing if distances
 /// contradict it.
 std::optional<Pose> checked(const Planes& own, const Planes& reference, const Matrix3d& turn) {
   Pose pose{turn, Vector3d::Zero(), 0};
@@ -76,8 +76,8 @@ std::optional<Pose> checked(const Planes& own, const Planes& reference, const Ma
     }
     if (best != nullptr) pairs.emplace_back(plane, best);
   }
-  // n . shift = distance in the reference less the own one; along what no wall determines there is
-  // none.
+  // n . shift = distance in the reference less the own one; zero along directions that no wall
+  // determines.
   Matrix3d normal = 1e-6 * Matrix3d::Identity();
   Vector3d right = Vector3d::Zero();
   for (const auto& [plane, other] : pairs) {
@@ -160,8 +160,8 @@ FoundPoses poses_before_same_walls(const std::vector<FoundPlane>& found,
         continue;
       }
       poses.why_not = fmt::format(
-          "the walls of {} and {} fit in several ways, as in a square room: say how the sensor was "
-          "turned ({})",
+          "the walls of {} and {} fit in several ways, as in a square room: state how the sensor "
+          "was turned ({})",
           recordings[r], recordings[poses.reference], name_of(kSetting.stations));
       return poses;
     }

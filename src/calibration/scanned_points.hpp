@@ -12,7 +12,7 @@
 
 namespace risley::calibration {
 
-/// The points that planes are looked for among.
+/// The points in which planes are searched.
 struct ScannedPoints {
   ScannedPoints(std::vector<Beam> all, const SegmentationOptions& settings)
       : options(settings),

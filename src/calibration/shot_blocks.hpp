@@ -9,8 +9,7 @@
 
 namespace risley::calibration {
 
-/// Shots that one task works on: some milliseconds. What is done shot by shot does not depend on
-/// it.
+/// Shots of one task: some milliseconds. Results computed shot by shot do not depend on it.
 inline constexpr std::size_t kBlockShots = 65536;
 
 inline std::size_t block_count(std::size_t shots) {

@@ -24,9 +24,10 @@ using Eigen::Index;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-/// A lean counts from this chi2 of its two tilts on: chance reaches it once in 20,000 cells.
+/// A lean is significant from this chi2 of its two tilts on: chance reaches it once in 20,000
+/// cells.
 constexpr double kLeaningChi2 = 20;
-/// Surroundings are squares of this size, and count with at least this many cells.
+/// Surroundings are squares of this size, with at least this many cells.
 constexpr double kSurroundings = 20;  // m
 constexpr std::size_t kFewestNeighbours = 20;
 constexpr int kMeanRounds = 2;
@@ -53,7 +54,7 @@ bool is_like(const Vector2d& slope, const GroundPlane& plane, const Matrix2d& in
   return lean.dot(information * lean) < kLeaningChi2;
 }
 
-/// Slope of most of some planes: the mean of those that are like the median but for noise.
+/// Slope of most of some planes: the mean of those that differ from the median only by noise.
 Vector2d common_slope(const std::vector<GroundPlane>& planes,
                       const std::vector<Matrix2d>& information,
                       const std::vector<std::size_t>& members) {

@@ -11,11 +11,11 @@
 
 namespace risley::calibration {
 
-/// What the shots say about the two tilts of every plane, whatever its offset.
+/// Information of the shots on the two tilts of every plane, for any offset.
 std::vector<Eigen::Matrix2d> tilt_information(std::size_t planes, const FlightEquations& equations);
 
-/// Planes that lean as their surroundings do, but for noise, made to lean just so: a cell that
-/// leans by chance would suggest shifts across it, and its shots do not follow.
+/// Planes that differ from their surroundings only by noise are aligned with them: a cell that
+/// leans by chance would suggest shifts across it that its shots do not support.
 /// docs/theory/flight.md
 /// @param information  of the tilts of every plane
 std::vector<GroundPlane> smooth_ground(const std::vector<GroundPlane>& planes,

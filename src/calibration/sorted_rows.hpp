@@ -9,8 +9,8 @@
 
 namespace risley::calibration {
 
-/// Rows sorted by a number below `count`, in their own order where it is the same. Rows with
-/// another number, such as a negative one, are left out.
+/// Rows sorted by a number below `count`, in their own order for equal numbers. Rows with another
+/// number, such as a negative one, are dropped.
 template <class Row = std::size_t>
 struct SortedRows {
   std::vector<std::size_t> begin{0};  ///< [count + 1]

@@ -22,11 +22,11 @@ namespace risley::calibration {
 namespace {
 
 constexpr std::size_t kLeastPoints = 5;  ///< of a cell
-/// Cells that a smooth surface of degree 1, 2 and 3 needs.
+/// Number of cells needed for a smooth surface of degree 1, 2 and 3.
 constexpr std::array<std::size_t, 4> kLeastCells{1, 10, 20, 40};
 constexpr double kTukey = 4.685;        ///< in robust sigmas: cells beyond have no weight
 constexpr int kMostWeightRounds = 30;   ///< of weights and fits
-constexpr double kOff = 2.5;            ///< sigmas of a cell that stands off
+constexpr double kOff = 2.5;            ///< sigmas of a cell of a step
 constexpr double kAround = 1.5;         ///< the same of its neighbours
 constexpr double kLeastRegion = 3;      ///< cells of a step
 constexpr double kSignificant = 6.0;    ///< sigmas of all cells of a step together
@@ -34,11 +34,11 @@ constexpr double kLeastHeight = 0.005;  ///< of a step, m
 constexpr double kAboveWaves = 3.0;     ///< least height in robust sigmas of the surface's waves
 constexpr double kCore = 0.7;           ///< of its height: cells that lie wholly within a step
 constexpr double kInside = 0.5;         ///< of its height: cells that lie mostly within a step
-constexpr double kSeparable = 4.0;      ///< sigmas of one point: height that decides its side
+constexpr double kSeparable = 4.0;      ///< sigmas of one point: the height decides its side
 
 /// Means over one cell.
 struct Cell {
-  /// Whether it has enough points to count. A step runs on through cells that have too few.
+  /// Whether it has enough points. A step continues through cells that have too few.
   bool full = false;
   int column = 0, row = 0;
   double x = 0, y = 0;                  ///< middle on the grid, rad
@@ -55,7 +55,7 @@ class SmoothSurface {
  public:
   /// Fits the medians of cells robustly: Tukey's weights, one degree after the other, so that no
   /// region gets weight again by bending a higher degree.
-  /// @param full  number of the cells that count
+  /// @param full  number of the counted cells
   SmoothSurface(std::vector<Cell>& cells, std::size_t full) {
     std::array<double, 4> box{cells[0].x, cells[0].x, cells[0].y, cells[0].y};
     for (const Cell& cell : cells) {
@@ -120,7 +120,7 @@ class SmoothSurface {
           }
         }
       }
-      // What cells in one row do not determine is zero.
+      // Directions not determined by cells in one row are zero.
       const Eigen::VectorXd solution = algebra::times(algebra::pseudo_inverse(normal), right);
       double change = 0;
       for (std::size_t j = 0; j < terms; ++j) {
@@ -189,7 +189,7 @@ class Grid {
   }
 
   std::vector<Cell> cells;  ///< those that hold points
-  std::size_t full = 0;     ///< number of them that hold enough to count
+  std::size_t full = 0;     ///< number of those with enough points
 
   std::span<const std::size_t> rows_of(const Cell& cell) const {
     return {order_.data() + cell.begin, cell.end - cell.begin};
@@ -255,7 +255,7 @@ class StepSearch {
  public:
   StepSearch(Grid& grid, const SmoothSurface& surface, const SurfaceResiduals& residuals)
       : grid_(grid), surface_(surface), residuals_(residuals) {
-    // What the cells scatter beyond their noise is waves: a step must stand out from them.
+    // Scatter of cells beyond their noise is waves: a step must stand out from them.
     std::vector<double> sigmas;
     for (const Cell& cell : grid.cells) {
       if (cell.full) sigmas.push_back(cell.centre_sigma);
@@ -311,8 +311,7 @@ class StepSearch {
            std::abs(sum) > kSignificant * surface_.spread() * std::sqrt(count);
   }
 
-  /// Height, middle and size of a region. Cells that its border crosses do not count for the
-  /// height.
+  /// Height, middle and size of a region. Cells on its border are excluded from the height.
   StepRegion measured(const std::vector<std::size_t>& region) const {
     std::vector<double> offsets;
     offsets.reserve(region.size());
@@ -345,8 +344,8 @@ class StepSearch {
     return residuals_.distance[row] - surface_(grid_.x_of(row), residuals_.zenith[row]);
   }
 
-  /// Claims the cells of a step and those around it that share in it, and their rows. A high step
-  /// decides by itself which rows of a cell on its border are its own.
+  /// Claims the cells of a step and the neighbours that share in it, and their rows. A high step
+  /// determines by itself which rows of a cell on its border are its own.
   void take(std::vector<std::size_t> region, int place, StepRegion& step) {
     const double sign = step.height > 0 ? 1.0 : -1.0;
     for (std::size_t c : region) grid_.cells[c].region = place;
@@ -363,8 +362,8 @@ class StepSearch {
       const Cell& cell = grid_.cells[c];
       const bool border = cell.offset / step.height < kCore;
       for (std::size_t i : grid_.rows_of(cell)) {
-        const bool tells = std::abs(step.height) > kSeparable * residuals_.sigma[i];
-        if (border && tells && height_of(i) / step.height < 0.5) continue;
+        const bool is_clear = std::abs(step.height) > kSeparable * residuals_.sigma[i];
+        if (border && is_clear && height_of(i) / step.height < 0.5) continue;
         step.rows.push_back(i);
       }
     }

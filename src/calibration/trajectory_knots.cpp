@@ -32,7 +32,7 @@ double correlation_time(const trajectories::ErrorProcess& process, int correctio
   return process.correlation_times()[static_cast<Index>(error_of(correction))];
 }
 
-/// A time among knots of one strip: the knot before it, and the weight of the one behind that.
+/// A time among knots of one strip: the previous knot, and the weight of the next one.
 struct KnotPlace {
   std::size_t knot = 0;
   double weight = 0;
@@ -57,11 +57,11 @@ void require_columns_of(const TrajectoryKnots& knots, const Eigen::MatrixXd& col
   require_length("corrections", columns.cols(), knots.size());
 }
 
-/// The knots before and behind a time.
+/// The knots before and after a time.
 struct Neighbours {
   const TrajectoryKnots& knots;
   std::int64_t time_ns;
-  std::size_t next;  ///< the first knot behind the time
+  std::size_t next;  ///< the first knot after the time
 
   Neighbours(const TrajectoryKnots& all, std::int64_t at)
       : knots(all),
@@ -166,7 +166,7 @@ KnotSteps knot_steps(const TrajectoryKnots& knots, const trajectories::ErrorProc
       const double apart = seconds(knots.time_ns[k] - knots.time_ns[k - 1]);
       // In sigmas of the process, whose variance is 1 everywhere.
       steps.decay[k] = std::exp(-apart / time) * sigma / before;
-      // Both knots of two strips may have one time: what they have in common is then known well.
+      // Both knots of two strips may have one time: their common part is then known well.
       steps.sigma[k] *= std::sqrt(std::max(-std::expm1(-2 * apart / time), 1e-12));
     }
     before = sigma;
@@ -202,8 +202,8 @@ Eigen::MatrixXd covariance_between_knots(const trajectories::ErrorProcess& proce
   require_above("spacing", spacing, 0, "s");
   require_at_least("parts", parts, 1);
   const double sigma = sigma_at(process, correction, begin_ns + (end_ns - begin_ns) / 2);
-  // Of two places by what share of the interval they are apart, less 1: differences of covariances
-  // count, and those of close places are small.
+  // Distance of two places as a share of the interval, less 1: differences of covariances are
+  // needed, and those of close places are small.
   const auto covariance = [&](double share) {
     return sigma * sigma * std::expm1(-std::abs(share) * spacing / time);
   };
@@ -229,7 +229,7 @@ Eigen::Matrix<double, kCorrections, 1> correction_at(const TrajectoryKnots& knot
   if (near.within_strip()) return near.between(corrections);
   Eigen::Matrix<double, kCorrections, 1> found;
   for (int c = 0; c < kCorrections; ++c) {
-    // Expected of a Gauss-Markov process that is known before, behind, or on both sides.
+    // Expectation of a Gauss-Markov process that is known before, after, or on both sides.
     double before = 0, left = 0, after = 0, right = 0;
     const double time = correlation_time(process, c);
     const auto in_sigmas = [&](std::size_t knot) {

@@ -22,15 +22,15 @@
 namespace risley::calibration {
 namespace {
 
-/// A calibration is written where it is better with this probability: of 400 random ones on one to
+/// A calibration is written if it is better with this probability: of 400 random ones on one to
 /// five walls (statistics.RandomUnits) none that was written was worse.
 constexpr double kBetter = 0.99;
 
-/// A sigma interval this wide that holds the tolerance leaves open on which side the error is.
+/// A sigma interval this wide around the tolerance leaves open on which side the error is.
 constexpr double kOpenSigmas = 2;
 /// A total error in flight of fewer sigmas may be the boresight's.
 constexpr double kToldSigmas = 3;
-/// Beams of a grid over all rotation angles that the prisms of a flight are compared with.
+/// Number of beams, on a grid over all rotation angles, for comparing the prisms of a flight.
 constexpr double kMostBeams = 4096;
 
 bool contradicts(const PriorTest& test) {
@@ -63,19 +63,19 @@ std::string tolerance_words(const JudgedError& error, double tolerance) {
   return words;
 }
 
-/// Which recording would determine what these walls do not.
+/// The recording that would determine the quantities that these walls do not.
 std::string better_scan() {
   return fmt::format(
       "scan walls that are tilted steeply against the sensor's axis and fill its field of view, or "
       "more distant ones, or the same walls twice from one spot with the sensor rolled by 180 "
-      "degrees; or give what is known of walls and poses ({}, {})",
+      "degrees; or state known normals and poses ({}, {})",
       name_of(kSetting.planes), name_of(kSetting.stations));
 }
 
 CalibrationVerdict undecided_words(const Calibration& c) {
   if (std::ranges::any_of(c.prior_tests, contradicts)) {
     return {CalibrationCode::undecided, c.reason,
-            fmt::format("check the normals and poses that were stated, or leave them out ({}, {})",
+            fmt::format("check the stated normals and poses, or omit them ({}, {})",
                         name_of(kSetting.planes), name_of(kSetting.stations))};
   }
   if (c.unit_doubted) {
@@ -120,8 +120,8 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
   }
   if (worst != nullptr) {
     reason = fmt::format(
-        "{} {} contradicts the data: it is off by {:.3g} degrees from what is stated, chi2 {:.3g} "
-        "where {:.3g} is the limit",
+        "{} {} contradicts the data: it is off by {:.3g} degrees from the stated value, chi2 "
+        "{:.3g} where {:.3g} is the limit",
         worst->station ? "station" : "plane", worst->name, degrees_from_radians(worst->misfit),
         worst->chi2, worst->critical);
     std::string others;
@@ -138,8 +138,8 @@ std::string reason_of_failure(const Calibration& c, const PlanarSolution& soluti
 
 std::string reason_of_ranges(const Calibration& c, const std::vector<RangedRecording>& recordings,
                              double range_noise) {
-  // Sound units scatter by a third of their specification at least; centimetres for millimetres,
-  // metres for feet are further off.
+  // Healthy units scatter by at least a third of their specification; confusing centimetres with
+  // millimetres or metres with feet is further off.
   constexpr double kMostOff = 3.0;
   const auto assumed =
       std::ranges::find_if(recordings, [](const RangedRecording& one) { return one.unit_assumed; });
@@ -164,8 +164,8 @@ CalibrationVerdict verdict_of(const Calibration& c) {
       change.size() == 0 ? 0.0 : change.dot(algebra::SymmetricSolver(covariance).solve(change));
   if (!(chi2 > significant_chi2(freedom))) {
     const std::string confirmed = fmt::format(
-        "the walls confirm what the sensor believes of itself to {} degree, {} (chi2 {:.3g} of "
-        "{:.0f} parameters)",
+        "the walls confirm the sensor's own parameters to {} degree, {} (chi2 {:.3g} of {:.0f} "
+        "parameters)",
         plain_text(degrees_from_radians(c.datum.total), 2), offset_text(c.datum.total), chi2,
         freedom);
     if (c.tolerance > 0 && !(c.datum.total <= c.tolerance)) {
@@ -176,11 +176,11 @@ CalibrationVerdict verdict_of(const Calibration& c) {
               better_scan()};
     }
     return {CalibrationCode::as_believed, confirmed,
-            "keep what the sensor believes: these walls leave open whether the calibration is "
+            "keep the sensor's own parameters: these walls leave open whether the calibration is "
             "better"};
   }
   const std::string moved = in_words(c.pointing_error);
-  // Walls that wave can be thicker about the right plane than about one that was fitted to them.
+  // Wavy walls can be thicker about the right plane than about one fitted to them.
   if (c.rms_after >= std::hypot(c.rms_before, c.shape.sigma)) {
     return {CalibrationCode::not_better,
             fmt::format("{}; but the walls are {:.4g} mm thick before and {:.4g} mm after", moved,
@@ -198,9 +198,9 @@ CalibrationVerdict verdict_of(const Calibration& c) {
   const JudgedError error{c.pointing_error.errors.total, c.pointing_error.total_sigma};
   const std::string words = moved + tolerance_words(error, c.tolerance);
   if (c.tolerance > 0 && !error.beyond(c.tolerance)) {
-    return {CalibrationCode::off_within_tolerance, words,
-            "keep the unit, which is within the tolerance; the calibration makes its clouds better "
-            "all the same"};
+    return {
+        CalibrationCode::off_within_tolerance, words,
+        "keep the unit, which is within the tolerance; the calibration still improves its clouds"};
   }
   return {CalibrationCode::bent, words,
           "use the calibration for this unit's clouds, and repeat it on other walls"};
@@ -212,7 +212,7 @@ std::string in_words(const HeldParameter& held, const sensors::Sensor& sensor) {
   const std::string unit = info.unit == "1" ? "" : " " + info.unit;
   return fmt::format("{} is held at {:.6g} +- {:.2g}{}, and the strips say {:.6g} +- {:.2g}{}",
                      held.name, in_unit(held.held), in_unit(held.stated_sigma), unit,
-                     in_unit(held.told), in_unit(held.sigma), unit);
+                     in_unit(held.from_flight), in_unit(held.sigma), unit);
 }
 
 PointingError pointing_error_of(const FlightCalibration& c) {
@@ -267,7 +267,7 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
             fmt::format("estimate {} as well ({})", held.name, name_of(kSetting.free))};
   }
   if (auto contradiction = contradiction_of(c)) return *contradiction;
-  // Of the change of some unknowns, and how many these are.
+  // Of the change of some unknowns, and their number.
   const auto significance = [&](std::size_t from) {
     std::vector<Eigen::Index> rows;
     for (std::size_t i = from; i < c.unknowns.size(); ++i) {
@@ -288,7 +288,7 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
   };
   const auto all = significance(0), prisms = significance(FlightUnknowns{}.size());
   const std::string strips =
-      fmt::format("strips were {:.3g} mm apart with what was stated and are {:.3g} mm apart now",
+      fmt::format("strips were {:.3g} mm apart with the given values and are {:.3g} mm apart now",
                   1e3 * c.rms_before, 1e3 * c.rms_after);
   if (significant(all) && c.rms_after >= c.rms_before) {
     return {CalibrationCode::not_better, strips,
@@ -299,8 +299,7 @@ CalibrationVerdict verdict_of(const FlightCalibration& c) {
             fmt::format("the strips confirm what the sensor believes of its prisms (chi2 {:.3g} "
                         "of {:.0f} parameters); {}",
                         prisms.first, prisms.second, strips),
-            "use the mount that was found, with the calibration beside it, for clouds of this "
-            "platform"};
+            "use the adjusted mount, with the calibration beside it, for clouds of this platform"};
   }
   const PointingError& found = c.pointing_error;
   const bool total_is_told = found.errors.total >= kToldSigmas * found.total_sigma;
@@ -355,8 +354,8 @@ std::vector<Warning> warnings_of(const Calibration& c, const PlanarSolution& sol
   }
   for (const SurfaceStep& step : c.steps) {
     warn(warnings, kWarning.uneven_plane,
-         "{}: a region of {:.2g} degrees stands {:.0f} mm off plane {} (azimuth {:.1f}, zenith "
-         "{:.1f}); its {} shots are left out",
+         "{}: a region of {:.2g} degrees stands {:.0f} mm off {} (azimuth {:.1f}, zenith "
+         "{:.1f}); its {} shots are not used",
          recordings[step.recording].name, degrees_from_radians(step.size), 1e3 * step.height,
          c.planes[step.plane].name, degrees_from_radians(step.azimuth),
          degrees_from_radians(step.zenith), step.points);

@@ -12,14 +12,14 @@
 namespace risley::calibration {
 namespace {
 
-/// The surface of every view, by the shots that some labels give it; rows of steps are those of the
+/// The surface of every view, from the shots with some labels; rows of steps are those of the
 /// view's recording.
 template <class LabelsOf>
 std::vector<SurfaceReport> inspect_views(const PlanarProblem& problem,
                                          const std::vector<LabelledShots>& recordings,
                                          const LabelsOf& labels_of) {
   std::vector<SurfaceReport> reports(problem.views.size());
-  // The largest first: one thread would be left alone with it.
+  // The largest first: otherwise one thread would be left with it at the end.
   std::vector<std::size_t> order(reports.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {

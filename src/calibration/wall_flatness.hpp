@@ -11,8 +11,8 @@
 
 namespace risley::calibration {
 
-/// Takes regions that stand off their wall out of the labels. They are looked for among the
-/// outliers too, where most shots of a larger step are.
+/// Removes regions that stand off their wall from the labels. The search includes the outliers,
+/// which hold most shots of a larger step.
 /// @param[in,out] recordings  of the problem
 std::vector<SurfaceStep> leave_out_steps(const PlanarProblem& problem,
                                          std::vector<LabelledShots>& recordings);

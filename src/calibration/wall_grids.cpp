@@ -19,15 +19,15 @@
 namespace risley::calibration {
 namespace {
 
-/// Narrower cells change nothing that the shortest waves leave, wider ones are not linear in them:
+/// Narrower cells gain nothing for the shortest waves, wider ones are not linear in them:
 /// docs/theory/calibration.md, section Walls have shape. M.
 constexpr double kLeastSpacing = 0.3;
-/// Cells of one wall at most: the time of a solution grows with them.
+/// Most cells of one wall: the time of a solution grows with them.
 constexpr double kMostCells = 6000;
-/// The process is defined so far beyond the shots, in cells.
+/// The process extends this far beyond the shots, in cells.
 constexpr int kMargin = 2;
 
-/// Where the shots of a view meet their wall, in the coordinates of the wall's grid, m.
+/// Points where the shots of a view meet their wall, in the coordinates of the wall's grid, m.
 struct WallPlaces {
   std::vector<double> u, v;
 };
@@ -54,8 +54,8 @@ WallPlaces places_of(const PlanarProblem& problem, std::size_t view) {
   return places;
 }
 
-/// Where all places lie but for one in a thousand at each end, which a wall that is met at a
-/// grazing angle has far away, with a margin of a tenth.
+/// Extent of all places except for one in a thousand at each end, which are far away on a wall at
+/// grazing incidence, with a margin of a tenth.
 struct PlaceExtent {
   double least = 0, most = 0;
 
@@ -129,8 +129,8 @@ void lay_grid(PlanarProblem& problem, std::size_t wall, const std::vector<std::s
   problem.walls[wall].grid = std::move(grid);
 }
 
-/// How recordings were placed, from the distances of walls that they share; along what no wall
-/// determines they keep their stated places.
+/// Positions of recordings from the distances of shared walls; along directions that no wall
+/// determines they keep their stated positions.
 void find_positions(PlanarProblem& problem) {
   constexpr double kDistanceSigma = 0.002, kPositionSigma = 0.3;  // m
   if (!problem.stations_known || problem.stations.size() < 2) return;
@@ -146,7 +146,7 @@ void find_positions(PlanarProblem& problem) {
   for (Eigen::Index s = 0; s < stations; ++s) {
     const StationPose& station = problem.stations[s];
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      // The first one is the scene's origin but for what was stated.
+      // The first one is the scene's origin except for stated values.
       add(Eigen::VectorXd::Unit(size, 3 * s + axis), station.position[axis],
           s == 0 ? 1e-3 * kDistanceSigma : kPositionSigma);
     }

@@ -14,14 +14,14 @@
 namespace risley::calibration {
 namespace {
 
-/// Found planes are off by the calibration errors that the adjustment will find: a degree or two.
-/// WallMatching.AsFarAsUncalibratedPlanesMayBeOff
+/// Planes as found are off by the calibration errors that the adjustment will find: a degree or
+/// two. WallMatching.AsFarAsUncalibratedPlanesMayBeOff
 constexpr double kSameDirection = radians_from_degrees(5.0);
 constexpr double kSameDistance = 0.05;        // of the distance
 constexpr double kSameDistanceAtLeast = 0.3;  // m
 
-/// A found plane as the scene has it: its normal away from the scene's origin, which is towards the
-/// station where that stands behind the wall.
+/// A found plane in the scene's frame: its normal away from the scene's origin, which is towards
+/// the station if that stands behind the wall.
 Plane in_scene(const Plane& plane, const scenes::Station& station) {
   const Vector3<double> normal = station.scene_from_sensor(plane.normal);
   const double distance = plane.distance + dot(normal, station.position);
@@ -145,8 +145,8 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
         fmt::format("none of the known planes is seen: the largest plane of {} is at {}",
                     recordings[found.front().recording], normal_text(first)));
   }
-  // A station that shares no wall with another one says nothing about the datum, or is not where it
-  // is said to be.
+  // A station that shares no wall with another one carries no information on the datum, or is not
+  // at its stated place.
   if (!stations.empty() && recordings.size() > 1) {
     for (std::size_t r = 0; r < recordings.size(); ++r) {
       const FoundPlane* own = nullptr;
@@ -173,7 +173,7 @@ WallMatching match_walls(std::vector<FoundPlane>& found, const std::vector<std::
       throw EstimationError(message);
     }
   }
-  // Walls without shots are no unknowns.
+  // Walls without shots are not unknowns.
   std::vector<std::size_t> row(result.walls.size());
   std::vector<Wall> seen;
   for (std::size_t w = 0; w < result.walls.size(); ++w) {

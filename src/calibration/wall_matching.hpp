@@ -12,13 +12,13 @@
 
 namespace risley::calibration {
 
-/// A plane that was found in one recording.
+/// A plane found in one recording.
 struct FoundPlane {
   std::size_t recording = 0;
   Plane plane;  ///< sensor frame
   std::size_t points = 0;
   std::size_t wall = 0;  ///< row of WallMatching::walls
-  double side = 1.0;     ///< -1 where the wall was seen from behind
+  double side = 1.0;     ///< -1 if the wall was seen from behind
 };
 
 /// Which planes of which recordings are the same wall.
@@ -29,8 +29,8 @@ struct WallMatching {
   std::vector<Warning> warnings;
 };
 
-/// Without stations and known planes every found plane is a wall of its own: nothing is known of
-/// the poses. Otherwise planes are compared in the scene's frame, by normal and distance, with the
+/// Without stations and known planes every found plane is a separate wall: nothing is known of the
+/// poses. Otherwise planes are compared in the scene's frame, by normal and distance, with the
 /// known ones and with each other.
 /// @param[in,out] found   gets its walls
 /// @param recordings      names [recordings]

@@ -14,11 +14,12 @@
 namespace risley::calibration {
 namespace {
 
-/// How far directions may be bent before the first adjustment, 1 sigma: docs/theory/calibration.md
+/// Possible distortion of directions before the first adjustment, 1 sigma:
+/// docs/theory/calibration.md
 constexpr double kStartPointing = radians_from_degrees(0.1);
 
 /// A smaller plane a few sigmas off a larger one is a step of it: two planes that nearly coincide
-/// could not share out their shots.
+/// could not divide their shots.
 void absorb_steps(const std::vector<Vector3<double>>& points, const SegmentationOptions& settings,
                   Segmentation& segmentation) {
   for (std::size_t k = segmentation.planes.size(); k-- > 1;) {

@@ -11,14 +11,14 @@
 
 namespace risley::calibration {
 
-/// How well a point is known before anything is calibrated.
+/// Uncertainty of a point before the calibration.
 struct StartNoise {
   double range = 0;     ///< 1 sigma, m
-  double pointing = 0;  ///< 1 sigma of a direction that its rotation angles give it, rad
+  double pointing = 0;  ///< 1 sigma of a direction due to its rotation angles, rad
 };
 
-/// Walls in some shots of one recording, seen with optics that may still be wrong by a little. A
-/// smaller plane a few sigmas off a larger one is a step of that and none of its own.
+/// Finds walls in some shots of one recording, with optics that may still be slightly wrong. A
+/// smaller plane a few sigmas off a larger one is a step of that one and not a separate plane.
 Segmentation search_walls(const RangedShots& shots, const PrismTrain& train,
                           const PrismGeometry& geometry, const StartNoise& noise,
                           std::uint64_t seed);

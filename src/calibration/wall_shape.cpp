@@ -34,9 +34,9 @@ using Eigen::MatrixXd;
 /// Smoothness nu of the process, and the power nu + 1 of kappa^2 - Laplace that is its precision.
 constexpr int kSmoothness = 2, kPower = kSmoothness + 1;
 
-/// Parameters that weigh less against the likeliest ones are left aside.
+/// Candidates with less weight relative to the likeliest ones are skipped.
 constexpr double kUnlikely = 1e-3;
-/// Parameters that weigh less change no digit of what is found.
+/// Candidates with less weight do not change any digit of the result.
 constexpr double kHopeless = 1e-15;
 
 /// Numbers of the nodes: those along the shorter side follow each other, which keeps the band
@@ -125,13 +125,13 @@ class Precision {
   std::vector<Eigen::SparseMatrix<double>> powers_;  ///< of it [kPower + 1]
 };
 
-/// One wall's part of the normal equations when its cells' own parts are integrated out.
+/// One wall's part of the normal equations with its cells' own parts integrated out.
 struct WallEquations {
   BandMatrix nodes;          ///< J' W J of the nodes
   BandMatrix::Rows columns;  ///< with unknowns, quantities and the residual [nodes, columns]
 };
 
-/// Integrates a part of its own out of every cell.
+/// Integrates the own part out of every cell.
 /// @param[in,out] system  less what the cells take
 /// @return the wall's equations, and the log of the determinant of the cells' parts
 std::pair<WallEquations, double> without_white_part(const WallSums& sums, double white,
@@ -173,7 +173,7 @@ std::pair<WallEquations, double> without_white_part(const WallSums& sums, double
   return {std::move(equations), log_determinant};
 }
 
-/// What one wall takes out of the system for some parameters of its process.
+/// Contribution of one wall to the system for some parameters of its process.
 struct WallShare {
   MatrixXd system;
   double log_determinant = 0;  ///< of the nodes' matrix over that of the process
@@ -191,8 +191,8 @@ WallShare share_of(const Precision& precision, WallEquations equations, const Sh
   return share;
 }
 
-/// Tries the parameters of a prior from the likeliest one before the data on, and goes on beside
-/// those that turn out likely: most of a grid is not worth its time.
+/// Tries the candidates of a prior starting from the likeliest one before the data, and continues
+/// beside those that turn out likely: most of a grid is not worth its time.
 class ShapeSearch {
  public:
   ShapeSearch(const ShapeProblem& problem, const ShapePrior& prior)
@@ -214,7 +214,7 @@ class ShapeSearch {
   }
 
  private:
-  /// A wall's equations, and what its cells' own parts take from the system.
+  /// A wall's equations, and the reduction of the system by its cells' own parts.
   struct WithoutWhite {
     WallEquations equations{BandMatrix(0, 0), {}};
     MatrixXd taken;
@@ -259,7 +259,8 @@ class ShapeSearch {
 
   void try_all(const std::vector<std::size_t>& rows) {
     for (const std::size_t row : rows) without_white(prior_.parameters[row].white);
-    // What remains of walls that many recordings share is large: no more of it than threads need.
+    // The remaining matrix of walls shared by many recordings is large: no more copies than threads
+    // need.
     const std::size_t together =
         1 + parallel::thread_count() / std::max<std::size_t>(problem_.walls.size(), 1);
     for (std::size_t first = 0; first < rows.size(); first += together) {
@@ -295,8 +296,8 @@ class ShapeSearch {
     }
   }
 
-  /// Parameters that add nothing to the mean are no parameters any more: of walls that many
-  /// recordings share, each keeps megabytes.
+  /// Candidates that add nothing to the mean are freed: for walls shared by many recordings, each
+  /// keeps megabytes.
   void forget_hopeless() {
     const double least = best() + std::log(kHopeless);
     for (Tried& one : tried_) {
@@ -316,7 +317,7 @@ class ShapeSearch {
     return tried_[row].done && tried_[row].log_weight > best() + std::log(kUnlikely);
   }
 
-  /// How many steps of the values that occur two sets of parameters are apart.
+  /// Distance of two candidates in steps of the occurring values.
   int steps_between(const ShapeParameters& a, const ShapeParameters& b) const {
     int steps = 0;
     for (const auto member :
@@ -408,7 +409,7 @@ class ShapeSearch {
       const Eigen::VectorXd off = step - own.step;
       own.covariance += weight * off * off.transpose();
     }
-    // The step of these against where they follow to when the others step.
+    // The step of these unknowns against the one that follows from the step of the others.
     const Tried& likeliest = tried_[solution.likeliest];
     const WithoutOwn& part = likeliest.walls[wall];
     Eigen::VectorXd off = own.step;

@@ -41,7 +41,7 @@ class ProfileBuilder {
     s.before2 += before * before;
     s.after2 += after * after;
   }
-  /// Adds what another one was given.
+  /// Adds the data of another one.
   void add(const ProfileBuilder& other) {
     for (std::size_t i = 0; i < sums_.size(); ++i) {
       sums_[i].count += other.sums_[i].count;
@@ -115,7 +115,7 @@ double rms_where_seen(const WallGrid& grid, const Eigen::VectorXd& height) {
   return std::sqrt(squares / static_cast<double>(grid.cells.size()));
 }
 
-/// What the shots of one view say.
+/// Statistics of the shots of one view.
 struct ViewThickness {
   CalibratedPlane plane;
   double squares_before = 0, squares_after = 0;

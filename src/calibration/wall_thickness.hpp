@@ -11,7 +11,7 @@
 
 namespace risley::calibration {
 
-/// How thick the walls' points are with the believed parameters and with the adjusted ones.
+/// Thickness of the walls' points with the believed parameters and with the adjusted ones.
 struct WallThickness {
   std::vector<CalibratedPlane> planes;  ///< [views]
   std::vector<ThicknessProfile> profiles;
@@ -20,7 +20,7 @@ struct WallThickness {
 };
 
 /// @param solution    of the problem
-/// @param believed    what the sensor computed directions with
+/// @param believed  with which the sensor computed directions
 /// @param recordings  [recordings], with labels
 WallThickness wall_thickness(const PlanarSolution& solution, const PrismTrain& believed,
                              const std::vector<LabelledShots>& recordings);

@@ -17,7 +17,7 @@
 namespace risley::cloud {
 namespace {
 
-/// A writer of any format that gets points as the cloud's header announces them, and nothing more
+/// A writer of any format that gets points as announced in the cloud's header, and nothing more
 /// once it has failed or was closed.
 class CheckedWriter final : public CloudWriter {
  public:
@@ -42,7 +42,7 @@ class CheckedWriter final : public CloudWriter {
  private:
   void require_sound() const {
     if (sound_) return;
-    throw FileError(path_, {}, "is incomplete: points given before could not be written");
+    throw FileError(path_, {}, "is incomplete: earlier points could not be written");
   }
 
   std::unique_ptr<CloudWriter> writer_;

@@ -17,10 +17,16 @@ namespace {
 
 using Eigen::Index;
 
-/// Part of a variance that is rounding: what is left of one that others determine.
+/// Share of a variance that counts as rounding: the remainder of one that others determine.
 constexpr double kRoundedPivot = 1e-12;
 
-/// Lower triangle L with L L^T = C. A quantity that the ones before determine gets a zero column.
+bool has_any(const sensors::RangeErrors& errors) {
+  return errors.near != 0 || errors.incidence != 0 || errors.per_decade != 0 ||
+         std::ranges::any_of(errors.emitter, [](double error) { return error != 0; });
+}
+
+}  // namespace
+
 Eigen::MatrixXd lower_factor(const Eigen::MatrixXd& c) {
   const Index n = c.rows();
   Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(n, n);
@@ -35,23 +41,18 @@ Eigen::MatrixXd lower_factor(const Eigen::MatrixXd& c) {
   return factor;
 }
 
-bool has_any(const sensors::RangeErrors& errors) {
-  return errors.near != 0 || errors.incidence != 0 || errors.per_decade != 0 ||
-         std::ranges::any_of(errors.emitter, [](double error) { return error != 0; });
-}
-
-}  // namespace
-
 Factors::Factors(PointingModel& model, const SensorBelief& belief)
     : model_(model), belief_(belief), range_values_(sensors::range_values(model.train.emitters())) {
   for (int place = 0; place < all_places(); ++place) model_.places.push_back(place);
 }
 
-void Factors::add(const algebra::NamedCovariance& uncertain, bool moves_beam, bool moves_angles) {
+void Factors::add(const algebra::NamedCovariance& uncertain, bool moves_beam, bool moves_angles,
+                  bool of_recording) {
   const Eigen::MatrixXd factor = lower_factor(uncertain.matrix);
   const auto& of_mount = trajectories::mount_names();
   for (Index j = 0; j < factor.cols(); ++j) {
     CommonFactor common = nothing(uncertain.names[j]);
+    common.of_recording = of_recording;
     for (Index i = j; i < factor.rows(); ++i) {
       const std::string& name = uncertain.names[i];
       if (double* number = range_number(name, common)) {
@@ -85,6 +86,7 @@ void Factors::add_angles(const algebra::NamedCovariance& uncertain) {
       lower_factor(algebra::propagated(belief_.angle_sensitivity, uncertain.matrix));
   for (int j = 0; j < prisms(); ++j) {
     CommonFactor common = nothing(fmt::format("rotation_angle_{}_deg", prism_letter(j)));
+    common.of_recording = true;
     common.weights.segment(all_places(), prisms()) = factor.col(j);
     keep(std::move(common));
   }
@@ -134,6 +136,7 @@ CommonFactor Factors::nothing(std::string name) const {
           Eigen::VectorXd::Zero(all_places() + prisms() + std::ssize(model_.sizes)),
           0.0,
           {},
+          false,
           {}};
 }
 

@@ -14,24 +14,29 @@
 
 namespace risley::cloud {
 
+/// Lower triangle L with L L^T = C. A quantity determined by the previous ones gets a zero column.
+Eigen::MatrixXd lower_factor(const Eigen::MatrixXd& c);
+
 /// Builds the common factors of a model.
 class Factors {
  public:
   Factors(PointingModel& model, const SensorBelief& belief);
 
   /// The quantities may be parameters, sizes of prisms, range errors and those of a mount.
-  /// @throws InvalidArgument for a name that is none of these
+  /// @throws InvalidArgument for another name
   /// @param moves_beam    errors of the parameters move the beam at given rotation angles
-  /// @param moves_angles  they also move the rotation angles that were found
-  void add(const algebra::NamedCovariance& uncertain, bool moves_beam, bool moves_angles);
+  /// @param moves_angles  they also move the estimated rotation angles
+  /// @param of_recording  as CommonFactor
+  void add(const algebra::NamedCovariance& uncertain, bool moves_beam, bool moves_angles,
+           bool of_recording);
 
-  /// What errors of the believed parameters do to the rotation angles, as one factor per prism.
+  /// Effect of errors of the believed parameters on the rotation angles, as one factor per prism.
   void add_angles(const algebra::NamedCovariance& uncertain);
 
-  /// Those of the prisms' sizes and of the range errors that the calibration's covariance has not.
+  /// Those of the prisms' sizes and of the range errors not in the calibration's covariance.
   void add_geometry(const sensors::Sensor& sensor);
 
-  /// Leaves only the places that some factor has.
+  /// Keeps only the places used by some factor.
   void finish();
 
  private:

@@ -31,26 +31,28 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using trajectories::Frame;
 
-/// Places of the trajectory in the cloud's table stand so far apart: straight lines between them
-/// are off by millimetres, which moves a covariance by nothing.
+/// Spacing of the trajectory's places in the cloud's table: straight lines between them are off by
+/// millimetres, which does not affect a covariance.
 constexpr std::int64_t kTableStep_ns = 1'000'000'000;
-/// Points of one call may lie so far from their middle for the expansion of the map, and so far off
-/// may it be, m.
+/// Largest distance of the points of one call from their middle for the expansion of the map, and
+/// its largest error, m.
 constexpr double kWidestExpansion = 1500, kExpansionError = 1e-5;
-/// Coordinates of files that hold whole multiples of a step begin at a multiple of this, m.
+/// Coordinates in files with multiples of a step begin at a multiple of this, m.
 constexpr double kOffsetStep = 1000;
 
-/// Says when a trajectory leaves the area that a map is meant for; empty when it does not.
-/// @throws InvalidArgument far away from it, where a map is of no use
-std::string far_from_map(const MapProjection& map, const trajectories::Trajectory& trajectory) {
+/// Message when positions leave a map's area of use; empty when they do not.
+/// @param what  they are of
+/// @throws InvalidArgument far away from it, where a map is not usable
+std::string far_from_map(const MapProjection& map, std::span<const Vector3d> positions,
+                         std::string_view what) {
   constexpr std::size_t kPlaces = 100;
   constexpr double kFarAway = 6 * kRadiansPerDegree;  // the width of a zone of UTM
   if (!map.area()) return {};
   double farthest = 0;
   trajectories::Geodetic where;
   for (std::size_t i = 0; i <= kPlaces; ++i) {
-    const trajectories::Geodetic place = trajectories::geodetic_from_geocentric(
-        trajectory.position[(trajectory.size() - 1) * i / kPlaces]);
+    const trajectories::Geodetic place =
+        trajectories::geodetic_from_geocentric(positions[(positions.size() - 1) * i / kPlaces]);
     const double beyond = map.area()->beyond(place.latitude, place.longitude);
     if (beyond <= farthest) continue;
     farthest = beyond;
@@ -61,10 +63,10 @@ std::string far_from_map(const MapProjection& map, const trajectories::Trajector
   if (farthest <= kRounded) return {};
   std::string words = fmt::format(
       "crs {} is for {} (latitude {:.2f} to {:.2f}, longitude {:.2f} to {:.2f} degrees), and the "
-      "trajectory is at latitude {:.4f}, longitude {:.4f}: is it the right zone?",
+      "{} is at latitude {:.4f}, longitude {:.4f}: is it the right zone?",
       map.name(), map.area()->name.empty() ? "another area" : map.area()->name,
       degrees_from_radians(map.area()->south), degrees_from_radians(map.area()->north),
-      degrees_from_radians(map.area()->west), degrees_from_radians(map.area()->east),
+      degrees_from_radians(map.area()->west), degrees_from_radians(map.area()->east), what,
       degrees_from_radians(where.latitude), degrees_from_radians(where.longitude));
   if (farthest > kFarAway) throw InvalidArgument(words);
   return words;
@@ -90,59 +92,84 @@ void copy_matrix(const Matrix3d& m, double (&numbers)[9]) {
 }  // namespace
 
 struct Georeference::State {
-  explicit State(const MovingPlatform& what)
-      : platform(what),
-        interpolation(platform.trajectory),
-        path(what.trajectory, interpolation, what.mount),
-        errors(what.errors ? std::optional<trajectories::ErrorProcess>(std::in_place, *what.errors,
-                                                                       what.trajectory)
-                           : std::nullopt) {}
+  /// Of a sensor that moves.
+  struct Flight {
+    explicit Flight(const MovingPlatform& what)
+        : platform(what),
+          interpolation(what.trajectory),
+          path(what.trajectory, interpolation, what.mount),
+          errors(what.errors ? std::optional<trajectories::ErrorProcess>(
+                                   std::in_place, *what.errors, what.trajectory)
+                             : std::nullopt) {}
 
-  const MovingPlatform& platform;
-  trajectories::Interpolation interpolation;
-  SensorPath path;
-  std::optional<trajectories::ErrorProcess> errors;
+    const MovingPlatform& platform;
+    trajectories::Interpolation interpolation;
+    SensorPath path;
+    std::optional<trajectories::ErrorProcess> errors;
+  };
+
+  std::optional<Flight> flight;              ///< of a sensor that moves
+  const StandingSensor* standing = nullptr;  ///< of one that stands
+  Frame frame = Frame::local;
   std::optional<MapProjection> map;
+  bool map_assumed = false;  ///< not given by any input
   std::int64_t shift_ns = 0;
   std::optional<std::int64_t> utc_shift_ns;  ///< of the trajectory's time
   std::string beyond_area;                   ///< in words; empty: within the map's area of use
-  bool clock_known = false;                  ///< the recording says what its clock counts
+  bool clock_known = false;                  ///< the recording states the time scale of its clock
 
-  /// The map about a place of the trajectory's frame, or that frame itself.
+  /// @param positions  of the sensor  @param what  they are of
+  void open_map(const std::string& crs, const std::string& datum,
+                std::span<const Vector3d> positions, std::string_view what) {
+    const Vector3d& first = positions.front();
+    if (frame == Frame::geocentric) {
+      map_assumed = crs.empty();
+      const trajectories::Geodetic place = trajectories::geodetic_from_geocentric(first);
+      map.emplace(map_assumed ? utm_zone_of(place.latitude, place.longitude) : crs, datum);
+      map->project(first);  // rejects a place outside the map's reach
+      beyond_area = far_from_map(*map, positions, what);
+    } else if (!crs.empty()) {
+      throw InvalidArgument(
+          fmt::format("crs = \"{}\" with a {} in a local frame, which has no place on a map: give "
+                      "no crs, or a {} with latitudes and longitudes",
+                      crs, what, what));
+    }
+  }
+
+  /// The map about a place of the frame, or that frame itself.
   MapTangent tangent(const Vector3d& place) const {
     return map ? map->tangent(place) : MapTangent();
   }
 
   /// North, east and down at a place, axes of the map.
   Matrix3d map_from_ned(const MapTangent& tangent, const Vector3d& place) const {
-    return tangent.jacobian() * trajectories::ned_axes(platform.trajectory.frame, place);
+    return tangent.jacobian() * trajectories::ned_axes(frame, place);
+  }
+
+  /// What a header says of coordinates. @param place  in the middle, in the frame
+  void announce_map(PointFrame& of, const Vector3d& place) const {
+    const Vector3d value = tangent(place).value();
+    of.wkt = map->wkt();
+    of.text =
+        fmt::format("{}, heights {}", map->name(),
+                    map->has_height_system() ? "of its height system" : "above the ellipsoid");
+    of.axes = {"easting", "northing", "height"};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      of.offset[axis] = kOffsetStep * std::round(value[static_cast<Index>(axis)] / kOffsetStep);
+    }
   }
 };
 
 Georeference::Georeference(const MovingPlatform& platform,
                            recordings::TimeReference recording_clock, std::int64_t first_time_ns) {
   trajectories::require_mount(platform.mount);
-  state_ = std::make_unique<State>(platform);
+  state_ = std::make_unique<State>();
   State& s = *state_;
-  const trajectories::Trajectory& trajectory = s.platform.trajectory;
-  const Vector3d& first = trajectory.position.front();
-  if (trajectory.frame == Frame::geocentric) {
-    std::string crs = s.platform.crs;
-    if (crs.empty()) {
-      const trajectories::Geodetic place = trajectories::geodetic_from_geocentric(first);
-      crs = utm_zone_of(place.latitude, place.longitude);
-    }
-    s.map.emplace(crs, s.platform.datum);
-    s.map->project(first);  // refuses a place that the map does not reach
-    s.beyond_area = far_from_map(*s.map, trajectory);
-  } else if (!s.platform.crs.empty()) {
-    throw InvalidArgument(fmt::format(
-        "crs = \"{}\" with a trajectory in a frame of its own, which no map knows: give no crs, or "
-        "a trajectory with latitudes and longitudes",
-        s.platform.crs));
-  }
-  const double offset_ns = 1e9 * s.platform.mount.clock_offset.value;
-  s.shift_ns = std::llround(offset_ns);
+  s.flight.emplace(platform);
+  const trajectories::Trajectory& trajectory = platform.trajectory;
+  s.frame = trajectory.frame;
+  s.open_map(platform.crs, platform.datum, trajectory.position, "trajectory");
+  s.shift_ns = std::llround(1e9 * platform.mount.clock_offset.value);
   if (recording_clock == recordings::TimeReference::utc) {
     const auto shift = trajectories::shift_from_utc_ns(trajectory, first_time_ns);
     s.clock_known = shift.has_value();
@@ -151,47 +178,70 @@ Georeference::Georeference(const MovingPlatform& platform,
   s.utc_shift_ns = trajectories::shift_to_utc_ns(trajectory);
 }
 
+Georeference::Georeference(const StandingSensor& sensor) {
+  require_at_least("number of the station", sensor.number, 1);
+  state_ = std::make_unique<State>();
+  state_->standing = &sensor;
+  state_->frame = sensor.pose.frame;
+  state_->open_map(sensor.crs, sensor.datum, {&sensor.pose.position, 1}, "station");
+}
+
 Georeference::~Georeference() = default;
 
 void Georeference::find_poses(std::span<const std::int64_t> times_ns, SensorPoses& poses,
                               std::vector<std::size_t>& rows, InstructionSet set) const {
+  if (state_->standing != nullptr) {
+    const StandingPose& pose = state_->standing->pose;
+    poses.resize(times_ns.size());
+    poses.lever_arm = Vector3d::Zero();
+    for (Index axis = 0; axis < 3; ++axis) {
+      const auto k = static_cast<std::size_t>(axis);
+      std::ranges::fill(poses.reference[k], pose.position[axis]);
+      std::ranges::fill(poses.velocity[k], 0.0);
+      std::ranges::fill(poses.rate[k], 0.0);
+    }
+    for (std::size_t k = 0; k < 9; ++k) std::ranges::fill(poses.turn[k], pose.turn.data()[k]);
+    std::ranges::fill(poses.strip, state_->standing->number);
+    rows.resize(times_ns.size());
+    std::iota(rows.begin(), rows.end(), std::size_t{0});
+    return;
+  }
   std::vector<std::int64_t> shifted(times_ns.begin(), times_ns.end());
   for (std::int64_t& time_ns : shifted) time_ns += state_->shift_ns;
-  state_->path.find(shifted, poses, rows, set);
+  state_->flight->path.find(shifted, poses, rows, set);
 }
 
 void Georeference::announce(CloudHeader& header) const {
   const State& s = *state_;
-  const trajectories::Trajectory& trajectory = s.platform.trajectory;
   header.has_own_covariance = header.has_covariance;
   header.has_point_source = true;
-  const auto middle = static_cast<std::size_t>(trajectory.size() / 2);
-  const MapTangent tangent = s.tangent(trajectory.position[middle]);
-  if (s.map) {
-    header.frame.wkt = s.map->wkt();
-    header.frame.text =
-        fmt::format("{}, heights {}", s.map->name(),
-                    s.map->has_height_system() ? "of its height system" : "above the ellipsoid");
-    header.frame.axes = {"easting", "northing", "height"};
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      header.frame.offset[axis] = kOffsetStep * std::round(tangent.value()[axis] / kOffsetStep);
-    }
-  } else {
-    header.frame.text = "of the trajectory: X east, Y north, Z up where it says so";
-    header.frame.axes = {"x of the trajectory's frame", "y of the trajectory's frame", "up"};
+  if (s.standing != nullptr) {
+    header.frame.name = "stations";
+    header.frame.text = "of the stations: X east, Y north, Z up";
+    header.frame.axes = {"east", "north", "up"};
+    if (s.map) s.announce_map(header.frame, s.standing->pose.position);
+    return;
   }
+  const trajectories::Trajectory& trajectory = s.flight->platform.trajectory;
+  const auto middle = static_cast<std::size_t>(trajectory.size() / 2);
+  header.frame.name = "trajectory";
+  header.frame.text = "of the trajectory: X east, Y north, Z up if it says so";
+  header.frame.axes = {"x of the trajectory's frame", "y of the trajectory's frame", "up"};
+  if (s.map) s.announce_map(header.frame, trajectory.position[middle]);
   header.time_reference =
       s.utc_shift_ns ? recordings::TimeReference::utc : recordings::TimeReference::relative;
-  if (!s.errors || !header.has_covariance) return;
+  const auto& process = s.flight->errors;
+  if (!process || !header.has_covariance) return;
   TrajectoryErrors& errors = header.trajectory.emplace();
   const auto copy = [](const trajectories::PoseErrorVector& from, std::array<double, 6>& to) {
     std::ranges::copy(from, to.begin());
   };
-  copy(s.errors->correlation_times(), errors.correlation_time);
-  copy(s.errors->white(), errors.white);
-  errors.sample_interval = s.platform.errors->sample_interval;
+  copy(process->correlation_times(), errors.correlation_time);
+  copy(process->white(), errors.white);
+  errors.sample_interval = s.flight->platform.errors->sample_interval;
   errors.first_sample_ns = trajectory.time_ns.front() + s.utc_shift_ns.value_or(0);
-  const Matrix3d axes = s.map_from_ned(tangent, trajectory.position[middle]);
+  const Vector3d& place_there = trajectory.position[middle];
+  const Matrix3d axes = s.map_from_ned(s.tangent(place_there), place_there);
   for (std::size_t k = 0; k < 3; ++k) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       errors.axes_from_ned[k][axis] = axes(axis, k);
@@ -204,7 +254,7 @@ void Georeference::announce(CloudHeader& header) const {
     const Vector3d place = s.map ? s.map->project(trajectory.position[i]) : trajectory.position[i];
     errors.time_ns.push_back(trajectory.time_ns[i] + s.utc_shift_ns.value_or(0));
     errors.position.push_back({place.x(), place.y(), place.z()});
-    copy(s.errors->sigmas(trajectory.time_ns[i]), errors.sigma.emplace_back());
+    copy(process->sigmas(trajectory.time_ns[i]), errors.sigma.emplace_back());
   }
 }
 
@@ -216,7 +266,7 @@ void Georeference::apply(Points& points, const SensorPoses& poses, InstructionSe
   if (n == 0) return;
   const bool covariance = !points.covariance[kXX].empty();
 
-  // Where the points are, and the map about their middle.
+  // Location of the points, and the map about their middle.
   const auto& [first_x, first_y, first_z] = poses.reference;
   const Vector3d local(first_x.front(), first_y.front(), first_z.front());  // keeps digits
   const auto columns = std::make_unique_for_overwrite<double[]>(6 * n);
@@ -262,10 +312,11 @@ void Georeference::apply(Points& points, const SensorPoses& poses, InstructionSe
   const Matrix3d& jacobian = tangent.jacobian();
   const Matrix3d ned = s.map_from_ned(tangent, center);
   Matrix3d position = Matrix3d::Zero(), turning = Matrix3d::Zero();
-  if (s.errors) {  // sigmas change slowly
+  if (s.flight && s.flight->errors) {  // sigmas change slowly
+    const trajectories::ErrorProcess& errors = *s.flight->errors;
     const std::int64_t time_ns = points.time_ns[n / 2] + s.shift_ns;
     const trajectories::PoseErrorVector variance =
-        s.errors->sigmas(time_ns).cwiseAbs2() + s.errors->white().cwiseAbs2();
+        errors.sigmas(time_ns).cwiseAbs2() + errors.white().cwiseAbs2();
     position = ned * variance.head<3>().asDiagonal() * ned.transpose();
     turning = ned * variance.tail<3>().asDiagonal() * ned.transpose();
   }
@@ -285,7 +336,7 @@ void Georeference::apply(Points& points, const SensorPoses& poses, InstructionSe
     copy_matrix(tangent.half_hessian(axis), to_map.half_hessian[axis]);
   }
   copy_matrix(jacobian, to_map.jacobian);
-  // A frame that is its own map is expanded about the local place, which has fewer digits.
+  // A frame without a map is expanded about the local place, which has fewer digits.
   copy_vector(s.map ? middle : Vector3d(Vector3d::Zero()), to_map.center);
   copy_vector(s.map ? tangent.value() : local, to_map.value);
   std::vector<double*> loading;
@@ -315,20 +366,20 @@ void Georeference::apply(Points& points, const SensorPoses& poses, InstructionSe
 std::vector<Warning> Georeference::warnings() const {
   const State& s = *state_;
   std::vector<Warning> warnings;
-  if (!s.errors) {
+  if (s.flight && !s.flight->errors) {
     warn(warnings, kWarning.taken_as_exact,
-         "the trajectory states no accuracy: covariances hold the sensor's and the mount's part "
-         "alone");
+         "the trajectory states no accuracy: covariances include only the sensor and the mount");
   }
-  if (!s.clock_known) {
+  if (s.flight && !s.clock_known) {
+    const MovingPlatform& platform = s.flight->platform;
     warn(warnings, kWarning.clock_unknown,
-         "the recording does not say what its clock counts: its times, with the mount's offset of "
-         "{:g} s, are taken as the trajectory's ({}); a sensor that is set by PPS and NMEA counts "
-         "UTC, 18 s less than GPS time",
-         s.platform.mount.clock_offset.value, words_of(s.platform.trajectory.time_scale));
+         "the recording does not state the time scale of its clock: its times, with the mount's "
+         "offset of {:g} s, are taken as the trajectory's ({}); a sensor that is set by PPS and "
+         "NMEA counts UTC, 18 s less than GPS time",
+         platform.mount.clock_offset.value, words_of(platform.trajectory.time_scale));
   }
   if (!s.beyond_area.empty()) warnings.push_back({kWarning.outside_map, s.beyond_area});
-  if (s.map && s.platform.crs.empty()) {
+  if (s.map_assumed) {
     warn(warnings, kWarning.map_assumed,
          "no map was named: points are in {} with ellipsoidal heights", s.map->name());
   }
@@ -339,10 +390,11 @@ std::vector<Warning> Georeference::warnings() const {
            operation);
     }
   }
-  for (const trajectories::TrajectoryGap& gap : s.interpolation.gaps()) {
+  if (!s.flight) return warnings;
+  for (const trajectories::TrajectoryGap& gap : s.flight->interpolation.gaps()) {
     warn(warnings, kWarning.trajectory_gaps,
-         "the trajectory has no records for {:.3f} s from {:.3f} s on: shots of that time have no "
-         "points",
+         "the trajectory has no records for {:.3f} s from {:.3f} s on: shots in that interval have "
+         "no points",
          1e-9 * static_cast<double>(gap.end_ns - gap.begin_ns),
          1e-9 * static_cast<double>(gap.begin_ns));
   }
@@ -351,19 +403,20 @@ std::vector<Warning> Georeference::warnings() const {
 
 std::int64_t Georeference::clock_shift_ns() const { return state_->shift_ns; }
 const std::vector<trajectories::FlownStrip>& Georeference::strips() const {
-  return state_->path.strips();
+  static const std::vector<trajectories::FlownStrip> kNone;
+  return state_->flight ? state_->flight->path.strips() : kNone;
 }
 
 std::vector<StripLine> Georeference::strip_lines() const {
   const State& s = *state_;
   std::vector<StripLine> lines;
-  for (const trajectories::FlownStrip& strip : s.path.strips()) {
+  for (const trajectories::FlownStrip& strip : strips()) {
     std::array<Vector3d, 2> ends;
     for (std::size_t k = 0; k < 2; ++k) {
-      const auto pose = s.interpolation.at(k == 0 ? strip.begin_ns : strip.end_ns);
+      const auto pose = s.flight->interpolation.at(k == 0 ? strip.begin_ns : strip.end_ns);
       if (!pose) return {};
       const Vector3d place =
-          pose->position + pose->attitude * trajectories::lever_arm(s.platform.mount);
+          pose->position + pose->attitude * trajectories::lever_arm(s.flight->platform.mount);
       ends[k] = s.tangent(place).map(place);
     }
     lines.push_back({"",

@@ -15,7 +15,7 @@ using Vector = Vector3<Batch>;
 using Matrix = Matrix3<Batch>;
 constexpr std::size_t kLanes = Batch::size;
 
-/// The shots of one group: those from `at` on, the last one again where there are fewer.
+/// The shots of one group: those from `at` on, with the last one repeated if there are fewer.
 struct Group {
   std::size_t at = 0, count = kLanes;
 
@@ -99,7 +99,7 @@ Symmetric broadcast_symmetric(const double (&c)[6]) {
 }  // namespace
 
 void follow_path(const PathArguments& a) {
-  // A column at a time: all begin at much the same place of a page, too many for a cache's set.
+  // One column at a time: all begin at nearly the same place of a page, too many for a cache's set.
   for (std::size_t k = 0; k < kPathNumbers; ++k) {
     Batch coefficients[kPathPowers];
     for (std::size_t power = 0; power < kPathPowers; ++power) {

@@ -8,7 +8,7 @@
 
 namespace risley::cloud {
 
-/// Where a sensor is along its path: of each time a reference point and a rotation.
+/// A sensor's path: for each time a reference point and a rotation.
 inline constexpr std::size_t kPathNumbers = 12;
 /// Of time, from 0 on, in the polynomials of a stretch of the path.
 inline constexpr std::size_t kPathPowers = 6;
@@ -16,7 +16,7 @@ inline constexpr std::size_t kPathPowers = 6;
 /// Poses of shots on one stretch of a sensor's path. Columns have one entry per shot.
 struct PathArguments {
   std::size_t shots = 0;
-  const double* part = nullptr;  ///< of the stretch that has passed
+  const double* part = nullptr;  ///< elapsed part of the stretch
   /// Of each power of the part: reference point from the origin, m, and rotation, column by column
   /// [kPathPowers][kPathNumbers].
   const double* coefficients = nullptr;
@@ -30,7 +30,7 @@ struct PoseColumns {
   double lever_arm[3] = {};
 };
 
-/// Points of the sensor's frame put into the trajectory's. Columns have one entry per shot.
+/// Transforms points of the sensor's frame to the trajectory's. Columns have one entry per shot.
 struct PlaceArguments {
   PoseColumns poses;
   std::size_t shots = 0;
@@ -40,13 +40,13 @@ struct PlaceArguments {
   double* place[3] = {};        ///< from the local place, axes of the frame, m
 };
 
-/// Places of the frame put onto a map, with their covariances and loadings.
+/// Transforms places of the frame to a map, with their covariances and loadings.
 struct MapArguments {
   PoseColumns poses;
   std::size_t shots = 0;
   const double *arm[3] = {}, *place[3] = {};  ///< as PlaceArguments
   double* point[3] = {};                      ///< in: sensor frame, m; out: of the map, m
-  double center[3] = {};           ///< about which the map is expanded, from the local place, m
+  double center[3] = {};           ///< centre of the map's expansion, from the local place, m
   double value[3] = {};            ///< of the map there, m
   double jacobian[9] = {};         ///< row by row
   double half_hessian[3][9] = {};  ///< 1/m
@@ -54,11 +54,11 @@ struct MapArguments {
   double* own_covariance[6] = {};  ///< the same
   std::size_t loadings = 0;
   double* const* loading = nullptr;  ///< [loadings * 3] in: axes of the sensor; out: map, m
-  double shifted[6] = {};            ///< covariance that every point gets, upper triangle, m^2
+  double shifted[6] = {};            ///< covariance added to every point, upper triangle, m^2
   double turned_by[6] = {};          ///< covariance of rotations of the body, map axes, rad^2
 };
 
-/// Shots as they would have been from one place.
+/// Transforms shots as if fired from one place.
 struct StandArguments {
   PoseColumns poses;
   std::size_t shots = 0;

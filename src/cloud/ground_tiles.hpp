@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Cells and pixels of the ground, kept in square tiles that are made where there are points.
+// Cells and pixels of the ground, in square tiles that are created where points fall.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ constexpr std::int32_t divided(std::int32_t value, std::int32_t by) {
   return value >= 0 ? value / by : -((by - 1 - value) / by);
 }
 
-/// Squares of ground, each with its data, made when they are asked for the first time.
+/// Squares of ground, each with its data, created on first access.
 template <class Tile>
 class TileMap {
  public:
@@ -40,7 +40,7 @@ class TileMap {
     const auto at = tiles_.find(key);
     return at == tiles_.end() ? nullptr : at->second.get();
   }
-  /// nullptr where there would be more than `most`.
+  /// nullptr if there would be more than `most`.
   Tile* open(std::int32_t column, std::int32_t row, std::size_t most) {
     const std::uint64_t key = key_of(column, row);
     if (key == last_key_) return last_;

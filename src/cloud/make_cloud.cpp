@@ -16,6 +16,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/saturating.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/trajectories/clock.hpp"
@@ -29,22 +30,24 @@ namespace {
 
 using recordings::Observations;
 
-/// Rows at the beginning that the sensor's belief is found from: ten seconds of a Mid-40, see
+/// Rows at the beginning used for the sensor's belief: ten seconds of a Mid-40, see
 /// docs/theory/cloud.md.
 constexpr std::size_t kBeginningRows = std::size_t{1} << 20;
-/// Shots of it that are enough: the believed parameters move points by far less than the
-/// calibration.
+/// Enough shots of it: the believed parameters move points by far less than the calibration.
 constexpr std::size_t kBeliefShots = std::size_t{1} << 18;
-/// Rows that are worked on together: some seconds, so that the start of each piece costs little.
+/// Rows processed together: some seconds, so that the start of each piece costs little.
 constexpr std::size_t kPieceRows = std::size_t{1} << 18;
-/// The same where no rotation angles are needed: a surface's worth.
+/// The same if no rotation angles are needed: enough for a surface.
 constexpr std::size_t kReportedRows = std::size_t{1} << 16;
-/// Rows that one task works on: the sixty columns of a moving sensor are 1 MB.
+/// For a running sensor: duration of the analysis before there are points, and time before a chunk
+/// for which the rotors are followed, ns.
+constexpr std::int64_t kLiveBeginningNs = 1'000'000'000, kLiveOverlapNs = 3 * kOverlapNs;
+/// Rows of one task: the sixty columns of a moving sensor are 1 MB.
 constexpr std::size_t kBlockRows = 2048;
 /// Directions beyond are damaged records: the rotors' motion is found without them, too.
 const double kOutlierChi2 = estimation::BatchMapOptions{}.outlier_chi2;
 
-/// Some rows of a piece on their way to the file.
+/// Rows of a piece being processed.
 struct RowBlock {
   std::vector<std::size_t> rows;
   std::vector<std::uint8_t> returns;  ///< of each row's shot
@@ -55,15 +58,16 @@ struct RowBlock {
   double azimuth_squares = 0, zenith_squares = 0;
 };
 
-/// All returns of a shot stand together.
+/// All returns of a shot are adjacent.
 bool same_shot(const Observations& o, std::size_t a, std::size_t b) {
   return o.time_ns[a] == o.time_ns[b] && o.return_number[a] != o.return_number[b];
 }
 
-/// Observations that are worked on together.
+/// Observations processed together.
 struct Piece {
   Observations rows;
-  std::size_t done = 0, end = 0;  ///< rows [done, end) become points, the others are there for them
+  std::size_t done = 0, end = 0;  ///< rows [done, end) become points, the others are context for
+                                  ///< them
   std::uint64_t first_row = 0;    ///< number of the first observation
   bool more = false;              ///< the recording goes on
   std::unique_ptr<RotorTracker> tracker;  ///< where rotation angles are needed
@@ -88,11 +92,23 @@ class CloudMaker::Work {
 
   bool next() {
     if (finished_) return false;
-    if (!writer_) piece_ = first_piece();
+    if (!writer_) {
+      piece_ = first_piece();
+    } else if (options_.live) {
+      std::unique_ptr<Piece> next;
+      if (piece_->more) next = piece_after(*piece_);
+      spare_ = std::move(piece_->rows);
+      piece_ = std::move(next);
+    }
     if (!piece_) {
       finish();
       finished_ = true;
       return false;
+    }
+    if (options_.live) {  // there is no time for the next rows
+      emit();
+      writer_->end_message();
+      return true;
     }
     // While the points of one piece are made and written, the next is read and its rotors tracked.
     std::unique_ptr<Piece> next;
@@ -123,11 +139,11 @@ class CloudMaker::Work {
     recordings::require_times(reader_.header());
   }
 
-  /// @return nothing where the recording holds nothing
+  /// @return nothing if the recording is empty
   std::unique_ptr<Piece> first_piece() {
     auto piece = std::make_unique<Piece>();
-    // Growing at the end would copy all: the last chunk may hold more than is wanted, packets stay
-    // whole.
+    // Growing at the end would copy everything: the last chunk may hold more than requested,
+    // packets stay complete.
     piece->rows.reserve((rotors_ ? kBeginningRows : kReportedRows) +
                         2 * recordings::kDefaultChunkRows);
     fill(*piece);
@@ -142,15 +158,17 @@ class CloudMaker::Work {
     auto piece = std::make_unique<Piece>();
     piece->rows = std::move(spare_);
     const std::size_t keep =
-        rotors_ ? overlap_begin(before.rows.time_ns, std::max(before.end, std::size_t{1}))
-                : before.end;
+        rotors_ || options_.live
+            ? overlap_begin(before.rows.time_ns, std::max(before.end, std::size_t{1}),
+                            options_.live ? kLiveOverlapNs : kOverlapNs)
+            : before.end;
     piece->rows.clear();
     piece->rows.append(before.rows, keep, before.rows.size());
     piece->done = before.end - keep;
     piece->first_row = before.first_row + keep;
     if (before.tracker) piece->tracker = std::make_unique<RotorTracker>(*before.tracker);
     fill(*piece);
-    if (piece->rows.size() == 0) return nullptr;
+    if (piece->rows.size() == piece->done) return nullptr;
     prepare(*piece);
     return piece;
   }
@@ -158,13 +176,12 @@ class CloudMaker::Work {
   /// Reads until a piece is full.
   void fill(Piece& piece) {
     recordings::Chunk chunk;
-    const std::size_t wanted = !rotors_ ? kReportedRows : (belief_ ? kPieceRows : kBeginningRows);
     piece.more = true;
-    while (piece.rows.size() < piece.done + wanted) {
+    while (!is_full(piece)) {
       try {
         piece.more = reader_.read(chunk);
       } catch (const FileError& error) {
-        summary_.damage = error;  // the sound part is worth keeping
+        summary_.damage = error;  // the undamaged part is worth keeping
         piece.more = false;
       }
       if (!piece.more) return;
@@ -175,10 +192,21 @@ class CloudMaker::Work {
     }
   }
 
-  /// Finds out which rows of a piece become points, and the rotation angles.
+  bool is_full(const Piece& piece) const {
+    const std::size_t rows = piece.rows.size() - piece.done;
+    if (!options_.live) {
+      return rows >= (!rotors_ ? kReportedRows : (belief_ ? kPieceRows : kBeginningRows));
+    }
+    if (!rotors_ || belief_) return rows > 0;
+    const auto& times = piece.rows.time_ns;
+    return rows > 0 && saturating_difference(times.back(), times.front()) >= kLiveBeginningNs;
+  }
+
+  /// Determines which rows of a piece become points, and the rotation angles.
   void prepare(Piece& piece) {
     const std::vector<std::int64_t>& time_ns = piece.rows.time_ns;
-    piece.end = piece.more && rotors_ ? overlap_begin(time_ns, time_ns.size()) : time_ns.size();
+    const bool overlaps = piece.more && rotors_ && !options_.live;
+    piece.end = overlaps ? overlap_begin(time_ns, time_ns.size()) : time_ns.size();
     if (piece.end <= piece.done) piece.end = time_ns.size();  // times that make no sense
     last_time_ns_ = time_ns[piece.end - 1];
     if (!rotors_ || piece.end <= piece.done) return;
@@ -193,7 +221,7 @@ class CloudMaker::Work {
     estimation::mirror(rows.azimuth, rows.zenith, calibration_.train.layout().axis_up);
   }
 
-  /// As many directions a second of the beginning as the belief wants; empty for all.
+  /// Number of directions a second of the beginning for the belief; empty for all.
   static std::optional<double> beginning_rate(const Observations& rows) {
     if (rows.size() <= kBeliefShots) return std::nullopt;
     const double seconds =
@@ -206,7 +234,7 @@ class CloudMaker::Work {
     return options_.platform ? std::optional(options_.platform->mount) : std::nullopt;
   }
 
-  /// Everything that wants to have seen the beginning of the recording.
+  /// Everything that needs the beginning of the recording.
   void set_up(Piece& piece) {
     if (rotors_) {
       estimation::ShotSelector selector({beginning_rate(piece.rows)});
@@ -220,38 +248,41 @@ class CloudMaker::Work {
       if (calibration_.reference != model_.reference &&
           model_.reference == sensors::CalibrationReference::planes) {
         warn(summary_.warnings, kWarning.calibration_doubtful,
-             "the recording's own directions do not agree with this sensor's parameters within "
-             "their sigmas: points go where the parameters send the beam");
+             "the recording's own directions disagree with this sensor's parameters beyond their "
+             "sigmas: points use the directions that the parameters give");
       }
       piece.tracker = std::make_unique<RotorTracker>(*belief_, options_.rate);
     } else {
       model_ =
           reported_pointing_model(calibration_, options_.pointing, options_.angle_noise, mount());
     }
+    if (options_.standing) header_.factors_of_source = stand(model_, options_.standing->pose);
     for (const CommonFactor& factor : model_.factors) summary_.factors.push_back(factor.name);
     if (model_.mount_of_another) {
       warn(summary_.warnings, kWarning.taken_as_exact,
-           "the mount was found together with another calibration than this one: what errors of "
-           "both have in common is not known, and points are stated as if that were nothing");
+           "the mount was adjusted together with a different calibration: their common errors are "
+           "unknown, and the covariances assume that there are none");
     }
     if (options_.platform) {
       georeference_ = std::make_unique<Georeference>(
           *options_.platform, reader_.header().time_reference, piece.rows.time_ns.front());
       first_time_ns_ = last_time_ns_ = piece.rows.time_ns.front();
+    } else if (options_.standing) {
+      georeference_ = std::make_unique<Georeference>(*options_.standing);
     }
     has_intensity_ = reader_.header().has_intensity;
     if (!has_intensity_ && calibration_.range_errors.per_decade != 0) {
       warn(summary_.warnings, kWarning.ranges_uncorrected,
-           "the recording has no intensities: ranges are not corrected by the {:.1f} mm that they "
-           "are longer for each tenth of the intensity",
+           "the recording has no intensities: ranges are not corrected by the {:.1f} mm by which "
+           "they grow with each tenth of the intensity",
            1e3 * calibration_.range_errors.per_decade);
     }
     surfaces_ = std::make_unique<ShotSurfaces>(calibration_, model_.angle_noise, has_intensity_,
-                                               georeference_.get());
+                                               options_.platform ? georeference_.get() : nullptr);
     const recordings::Device& device = reader_.header().devices.front();
     if (device.extrinsic_enabled) {
       warn(summary_.warnings, kWarning.pose_unused,
-           "the recording's extrinsics are not applied: points stand in the frame of the sensor");
+           "the recording's extrinsics are not applied: points are in the sensor's frame");
     }
     header_.sensor = fmt::format("{} {}", calibration_.manufacturer, calibration_.model);
     header_.serial = device.serial;
@@ -261,7 +292,12 @@ class CloudMaker::Work {
     header_.has_rotation_angles = rotors_;
     header_.has_covariance = options_.pointing.covariance;
     header_.has_own_covariance = options_.own_covariance && header_.has_covariance;
-    if (options_.loadings && header_.has_covariance) header_.factors = summary_.factors;
+    header_.has_row = options_.rows;
+    if (options_.loadings && header_.has_covariance) {
+      header_.factors = summary_.factors;
+    } else {
+      header_.factors_of_source = 0;
+    }
     if (georeference_) {
       georeference_->announce(header_);
       summary_.strips = georeference_->strips();
@@ -281,7 +317,11 @@ class CloudMaker::Work {
     }
     if (rotors_ && piece_->end > piece_->done && !repointing_known_) find_repointing();
     for (std::size_t begin = piece_->done; begin < piece_->end;) {
-      const std::size_t surface_end = surfaces_->find(piece_->rows, begin, piece_->end);
+      std::size_t surface_end = begin;
+      if (options_.live) {  // a single chunk has too few shots
+        surface_end = surfaces_->find(piece_->rows, 0, piece_->end);
+      }
+      if (surface_end <= begin) surface_end = surfaces_->find(piece_->rows, begin, piece_->end);
       write_rows(begin, surface_end);
       begin = surface_end;
     }
@@ -292,11 +332,12 @@ class CloudMaker::Work {
     for (std::size_t row = piece_->done; row < piece_->end; ++row) {
       ++(has_return(piece_->rows, row) ? summary_.without_rotation_angle : summary_.no_return);
     }
+    if (options_.live) return;  // memory must not grow
     warn(summary_.warnings, kWarning.points_missing, "no points from observations {} to {}: {}",
          piece_->first_row + piece_->done, piece_->first_row + piece_->end - 1, *piece_->failure);
   }
 
-  /// Looks up where the sensor is at every row of a block, and takes out rows that have no pose.
+  /// Looks up the pose of the sensor at every row of a block, and removes rows without one.
   void find_poses(RowBlock& block) const {
     std::vector<std::size_t> known;
     georeference_->find_poses(times_of(piece_->rows, block.rows), block.poses, known);
@@ -306,8 +347,8 @@ class CloudMaker::Work {
     keep_rows(block.returns, known);
   }
 
-  /// Blocks are made in parallel and written in order. No more of them are on their way than there
-  /// are, and they finish in order, so each is free again when its turn comes.
+  /// Blocks are computed in parallel and written in order. There are no more of them in progress
+  /// than slots, and they finish in order, so each slot is free again when its turn comes.
   void write_rows(std::size_t begin, std::size_t end) {
     const std::size_t threads = parallel::thread_count();
     blocks_.resize(threads > 1 ? 2 * threads : 1);
@@ -338,7 +379,7 @@ class CloudMaker::Work {
         ++returns;
         last = std::max<std::size_t>(last, piece_->rows.return_number[i]);
       }
-      // Alike in all rows of a shot, and no less than any of their numbers.
+      // Equal in all rows of a shot, and no less than any of their numbers.
       const auto number_of_returns = static_cast<std::uint8_t>(std::max(returns, last));
       for (std::size_t i = row; i < shot_end; ++i) {
         if (!has_return(piece_->rows, i)) {
@@ -365,7 +406,7 @@ class CloudMaker::Work {
       piece_->tracker->angles(piece_->rows, block.rows, shots.rotation_angle,
                               shots.angle_covariance);
     }
-    // Mostly every row has a return, and columns can be copied as they stand.
+    // Usually every row has a return, and columns can be copied directly.
     const bool whole = n > 0 && block.rows.back() - block.rows.front() + 1 == n;
     const auto take = [&](const auto& from, auto& to, const auto& change) {
       if (whole) {
@@ -384,6 +425,11 @@ class CloudMaker::Work {
     take(piece_->rows.intensity, points.intensity, same);
     take(piece_->rows.return_number, points.return_number, same);
     points.number_of_returns = block.returns;
+    if (header_.has_row) {
+      std::ranges::transform(block.rows, points.row.begin(), [this](std::size_t row) {
+        return static_cast<std::int64_t>(piece_->first_row + row);
+      });
+    }
     take(piece_->rows.tag, points.tag, same);
     take(piece_->rows.beam, points.beam, same);
     take(piece_->rows.beam, shots.beam, same);
@@ -403,7 +449,7 @@ class CloudMaker::Work {
     if (georeference_) georeference_->apply(points, block.poses);
   }
 
-  /// Takes out of a block what has no point.
+  /// Removes rows without a point from a block.
   void keep_sound(RowBlock& block) const {
     Points& points = block.points;
     const double noise = square(model_.angle_noise);
@@ -481,7 +527,7 @@ class CloudMaker::Work {
     summary_.zenith_residual_rms += block.zenith_squares;
   }
 
-  /// How far the calibration moves the beams, together and against each other, seen on shots of the
+  /// Shift of the beams by the calibration, together and relative to each other, for shots of the
   /// first piece.
   void find_repointing() {
     constexpr std::size_t kBeams = 2000;  // give a root mean square to 2 %, 1 / sqrt(2 * 2000)
@@ -492,7 +538,7 @@ class CloudMaker::Work {
     shots.resize(header_.prisms, rows.size());
     piece_->tracker->angles(piece_->rows, rows, shots.rotation_angle, shots.angle_covariance);
     double squares = 0, count = 0;
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // of the rotation that all beams share
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // of the rotation common to all beams
     Eigen::Vector3d moment = Eigen::Vector3d::Zero();
     std::vector<double> angles(shots.rotation_angle.size());
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -534,7 +580,7 @@ class CloudMaker::Work {
     summary_.azimuth_residual_rms = std::sqrt(summary_.azimuth_residual_rms / n);
     summary_.zenith_residual_rms = std::sqrt(summary_.zenith_residual_rms / n);
     if (distribution_) summary_.distribution = distribution_->summary();
-    if (sampler_) summary_.sample = sampler_->sample();
+    if (sampler_) summary_.sample = sampler_->take();
     writer_->close();
   }
 
@@ -557,7 +603,7 @@ class CloudMaker::Work {
   std::unique_ptr<CloudWriter> writer_;
   std::vector<RowBlock> blocks_;
   std::unique_ptr<Piece> piece_;  ///< that is being written
-  Observations spare_;            ///< memory of the one before, for the one after
+  Observations spare_;            ///< memory of the previous one, for the next one
   bool repointing_known_ = false, finished_ = false;
 };
 
@@ -565,7 +611,10 @@ CloudMaker::CloudMaker(recordings::Reader& reader, const sensors::Sensor& calibr
                        CloudSink sink, const CloudOptions& options, const Progress& progress) {
   if (options.distribution && !options.platform) {
     throw InvalidArgument(
-        "how points lie on the ground is of a sensor that moves: a trajectory is missing");
+        "the distribution of points on the ground needs a moving sensor: a trajectory is missing");
+  }
+  if (options.standing && options.platform) {
+    throw InvalidArgument("a sensor cannot stand on a station and move along a trajectory");
   }
   if (options.rate) require_above("rate", *options.rate, 0, "Hz");
   if (options.angle_noise) require_above("angle noise", *options.angle_noise, 0, "rad");
@@ -581,9 +630,13 @@ CloudSummary make_cloud(recordings::Reader& reader, const sensors::Sensor& calib
                         const std::string& path, const CloudOptions& options,
                         const Progress& progress) {
   const std::string format = find_cloud_format(path, options.writer.format).name;
-  const auto sink = [&](const CloudHeader& header) {
-    return create_cloud(path, header, options.writer);
-  };
+  CloudWriterOptions writer = options.writer;
+  if (writer.messages.message) {
+    const auto type = static_cast<std::uint8_t>(calibration.device_type);
+    writer.messages.message =
+        bags::of_generation(*writer.messages.message, recordings::is_second_generation(type));
+  }
+  const auto sink = [&](const CloudHeader& header) { return create_cloud(path, header, writer); };
   CloudMaker maker(reader, calibration, sink, options, progress);
   while (maker.next()) {
   }

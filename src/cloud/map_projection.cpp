@@ -41,9 +41,8 @@ struct FreeContext {
 using Object = std::unique_ptr<PJ, FreeObject>;
 using Context = std::unique_ptr<PJ_CONTEXT, FreeContext>;
 
-/// Has the library take its data from beside itself, where they came together, as in a wheel: its
-/// database is of its own version, and what PROJ_DATA names belongs to the library of some other
-/// program. Grids may still lie there.
+/// Makes the library use the data installed beside it, as in a wheel: its database must match its
+/// version, and PROJ_DATA may belong to another program's library. Grids may still lie there.
 void use_own_data(PJ_CONTEXT* context) {
   Dl_info library;
   if (dladdr(reinterpret_cast<const void*>(&proj_context_create), &library) == 0) return;
@@ -61,7 +60,7 @@ void use_own_data(PJ_CONTEXT* context) {
   proj_context_set_search_paths(context, static_cast<int>(names.size()), names.data());
 }
 
-/// The last thing that the library has to say, instead of its printing it.
+/// The library's last message, instead of its printing it.
 void keep_message(void* where, int /*level*/, const char* message) {
   *static_cast<std::string*>(where) = message;
 }
@@ -79,7 +78,7 @@ Object part_of(PJ_CONTEXT* context, const PJ* crs, int index) {
   return Object(proj_crs_get_sub_crs(context, crs, index));
 }
 
-/// Whether all axes of a system are in metres; otherwise says in what the first other one is.
+/// Whether all axes of a system are in metres; otherwise names the first other unit.
 bool in_metres(PJ_CONTEXT* context, const PJ* crs, std::string& unit) {
   const Object system(proj_crs_get_coordinate_system(context, crs));
   if (!system) return false;
@@ -115,6 +114,70 @@ std::optional<AreaOfUse> area_of(PJ_CONTEXT* context, const PJ* crs) {
                    radians_from_degrees(east), radians_from_degrees(north)};
 }
 
+/// A geographic or geocentric system as a geocentric one of the same datum.
+Object geocentric_of(PJ_CONTEXT* context, const PJ* system) {
+  if (type_of(context, system) == PJ_TYPE_GEOCENTRIC_CRS) {
+    return Object(proj_clone(context, system));
+  }
+  const Object datum(proj_crs_get_datum(context, system));
+  const Object ensemble(datum ? nullptr : proj_crs_get_datum_ensemble(context, system));
+  const PJ* of = datum ? datum.get() : ensemble.get();
+  if (of == nullptr) return {};
+  return Object(
+      proj_create_geocentric_crs_from_datum(context, proj_get_name(system), of, "metre", 1.0));
+}
+
+/// The missing grids needed for the best transformations between two systems, and their sources;
+/// empty if no grid would help.
+std::string missing_grids(PJ_CONTEXT* context, const PJ* from, const PJ* to) {
+  struct FreeFactory {
+    void operator()(PJ_OPERATION_FACTORY_CONTEXT* one) const {
+      proj_operation_factory_context_destroy(one);
+    }
+  };
+  struct FreeList {
+    void operator()(PJ_OBJ_LIST* list) const { proj_list_destroy(list); }
+  };
+  const std::unique_ptr<PJ_OPERATION_FACTORY_CONTEXT, FreeFactory> factory(
+      proj_create_operation_factory_context(context, nullptr));
+  if (!factory) return {};
+  proj_operation_factory_context_set_spatial_criterion(context, factory.get(),
+                                                       PROJ_SPATIAL_CRITERION_PARTIAL_INTERSECTION);
+  proj_operation_factory_context_set_grid_availability_use(context, factory.get(),
+                                                           PROJ_GRID_AVAILABILITY_IGNORED);
+  proj_operation_factory_context_set_allow_ballpark_transformations(context, factory.get(), 0);
+  const std::unique_ptr<PJ_OBJ_LIST, FreeList> ways(
+      proj_create_operations(context, from, to, factory.get()));
+  std::string words;
+  for (int i = 0; ways && i < proj_list_get_count(ways.get()) && words.empty(); ++i) {
+    const Object way(proj_list_get(context, ways.get(), i));
+    const int grids = way ? proj_coordoperation_get_grid_used_count(context, way.get()) : 0;
+    for (int k = 0; k < grids; ++k) {
+      const char *name = nullptr, *url = nullptr;
+      int available = 1;
+      proj_coordoperation_get_grid_used(context, way.get(), k, &name, nullptr, nullptr, &url,
+                                        nullptr, nullptr, &available);
+      if (available != 0 || name == nullptr) continue;
+      words += words.empty() ? "the grid " : " and ";
+      if (url == nullptr || *url == '\0') {
+        words += fmt::format(
+            "{} (PROJ {} does not know where to get it; later versions may: as a GeoTIFF it is "
+            "read under this name, too)",
+            name, proj_info().version);
+      } else {
+        words += fmt::format("{} (PROJ's projsync fetches it, or {})", name, url);
+      }
+    }
+  }
+  if (words.empty()) return {};
+  const char* folder = proj_context_get_user_writable_directory(context, 0);
+  return fmt::format(
+      "{} is missing: PROJ looks for it in the folders of the variable PROJ_DATA and in {}; "
+      "Debian's "
+      "package proj-data has a few grids",
+      words, folder == nullptr ? "its own" : folder);
+}
+
 Vector3d transformed(PJ* operation, PJ_DIRECTION direction, const Vector3d& place_m) {
   proj_errno_reset(operation);
   const PJ_COORD to =
@@ -123,6 +186,14 @@ Vector3d transformed(PJ* operation, PJ_DIRECTION direction, const Vector3d& plac
 }
 
 }  // namespace
+
+InvalidArgument GeographicSystem::at(double latitude, double longitude) const {
+  return InvalidArgument(
+      fmt::format("{}; the zone of this place (latitude {:.4f}, longitude {:.4f}) "
+                  "is {}",
+                  what(), degrees_from_radians(latitude), degrees_from_radians(longitude),
+                  utm_zone_of(latitude, longitude, system_)));
+}
 
 double AreaOfUse::beyond(double latitude, double longitude) const {
   const double of_latitude = std::max({0.0, south - latitude, latitude - north});
@@ -165,7 +236,7 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
   PJ_CONTEXT* context = state_->context.get();
   proj_log_func(context, &state_->message, keep_message);
   use_own_data(context);
-  proj_context_set_enable_network(context, 0);  // what is computed does not depend on a connection
+  proj_context_set_enable_network(context, 0);  // results do not depend on a network connection
   const auto create = [&](const char* what, const std::string& text) {
     Object object(proj_create(context, text.c_str()));
     if (!object || proj_is_crs(object.get()) == 0) {
@@ -177,12 +248,21 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
     }
     return object;
   };
-  const Object target = create("crs", crs), from = create("source", source);
+  const Object target = create("crs", crs);
   const Object horizontal = part_of(context, target.get(), 0);
   const Object vertical = part_of(context, target.get(), 1);
   const PJ* map = horizontal ? horizontal.get() : target.get();
   const std::string name = proj_get_name(target.get());
-  if (type_of(context, map) != PJ_TYPE_PROJECTED_CRS) {
+  const PJ_TYPE map_type = type_of(context, map);
+  if (map_type == PJ_TYPE_GEOGRAPHIC_2D_CRS || map_type == PJ_TYPE_GEOGRAPHIC_3D_CRS) {
+    throw GeographicSystem(
+        fmt::format(
+            "crs = \"{}\" ({}) has latitudes and longitudes: points are written as eastings "
+            "and northings in metres, as in a UTM zone",
+            crs, name),
+        proj_get_name(map));
+  }
+  if (map_type != PJ_TYPE_PROJECTED_CRS) {
     throw InvalidArgument(
         fmt::format("crs = \"{}\" ({}) is not a map projection: points are written as eastings and "
                     "northings in metres, as in a UTM zone",
@@ -198,34 +278,30 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
                       crs, name, unit));
     }
   }
-  const PJ_TYPE source_type = type_of(context, from.get());
-  if (source_type != PJ_TYPE_GEOCENTRIC_CRS && source_type != PJ_TYPE_GEOGRAPHIC_3D_CRS) {
-    throw InvalidArgument(fmt::format(
-        "source = \"{}\" ({}) is not three-dimensional: give the datum of the positions "
-        "with ellipsoidal heights, such as EPSG:4979 for WGS 84",
-        source, proj_get_name(from.get())));
-  }
-  // Positions come geocentric; a geographic system names their datum.
-  Object geocentric;
-  if (source_type == PJ_TYPE_GEOCENTRIC_CRS) {
-    geocentric.reset(proj_clone(context, from.get()));
+  Object from;
+  if (source.empty()) {
+    const Object own(proj_crs_get_geodetic_crs(context, map));
+    if (own) from.reset(proj_crs_promote_to_3D(context, nullptr, own.get()));
   } else {
-    const Object datum(proj_crs_get_datum(context, from.get()));
-    const Object ensemble(datum ? nullptr : proj_crs_get_datum_ensemble(context, from.get()));
-    const PJ* of = datum ? datum.get() : ensemble.get();
-    if (of != nullptr) {
-      geocentric.reset(proj_create_geocentric_crs_from_datum(context, proj_get_name(from.get()), of,
-                                                             "metre", 1.0));
+    from = create("source", source);
+    const PJ_TYPE type = type_of(context, from.get());
+    if (type != PJ_TYPE_GEOCENTRIC_CRS && type != PJ_TYPE_GEOGRAPHIC_3D_CRS) {
+      throw InvalidArgument(fmt::format(
+          "source = \"{}\" ({}) is not three-dimensional: give the datum of the positions "
+          "with ellipsoidal heights, such as EPSG:4979 for WGS 84",
+          source, proj_get_name(from.get())));
     }
   }
-  // A map alone takes heights above its ellipsoid along.
+  // Positions are geocentric; a geographic system names their datum.
+  const Object geocentric = from ? geocentric_of(context, from.get()) : Object();
+  // A map without a height system passes heights above its ellipsoid through.
   Object three(vertical ? proj_clone(context, target.get())
                         : proj_crs_promote_to_3D(context, nullptr, target.get()));
   if (!geocentric || !three) {
     throw InvalidArgument(
         fmt::format("crs = \"{}\" from \"{}\": PROJ says: {}", crs, source, state_->message));
   }
-  // Never a way that leaves out a grid or a change of datum without a word.
+  // Never a transformation that silently omits a grid or a change of datum.
   const char* const options[] = {"ALLOW_BALLPARK=NO", nullptr};
   Object operation(
       proj_create_crs_to_crs_from_pj(context, geocentric.get(), three.get(), nullptr, options));
@@ -233,13 +309,16 @@ MapProjection::MapProjection(const std::string& crs, const std::string& source)
     state_->operation.reset(proj_normalize_for_visualization(context, operation.get()));
   }
   if (!state_->operation) {
+    const std::string said = state_->message;
+    const std::string missing = missing_grids(context, geocentric.get(), three.get());
     throw InvalidArgument(fmt::format(
-        "PROJ cannot transform \"{}\" to \"{}\" ({}) with the files that are "
-        "installed: a grid for the change of datum or for the geoid is missing (Debian: "
-        "projinfo -s {} -t {} names the file; heights without a height system are "
-        "ellipsoidal and need none){}{}",
-        source, crs, name, source, crs,
-        state_->message.empty() ? "" : "; PROJ says: ", state_->message));
+        "PROJ cannot transform \"{}\" to \"{}\" ({}) with the files that are installed: {}; "
+        "heights "
+        "without a height system are ellipsoidal and need none",
+        proj_get_name(from.get()), crs, name,
+        missing.empty()
+            ? "no transformation between them is known" + (said.empty() ? said : ": " + said)
+            : missing));
   }
   state_->name = name;
   state_->has_height_system = vertical != nullptr;
@@ -328,13 +407,25 @@ std::string MapProjection::operation() const {
                       : fmt::format("{}, of unknown accuracy", name);
 }
 
-std::string utm_zone_of(double latitude, double longitude) {
+std::string utm_zone_of(double latitude, double longitude, const std::string& system) {
   const double latitude_deg = degrees_from_radians(latitude);
   require_between("latitude", latitude_deg, -80, 84, "degrees, where UTM is used");
   require_finite("longitude", longitude, "rad");
   const double longitude_deg = degrees_from_radians(wrap_to_pi(longitude));
   const int zone = 1 + static_cast<int>(std::floor((longitude_deg + 180) / 6)) % 60;
-  return fmt::format("EPSG:{}", (latitude >= 0 ? 32600 : 32700) + zone);
+  std::string code = fmt::format("EPSG:{}", (latitude >= 0 ? 32600 : 32700) + zone);
+  if (system == "WGS 84") return code;
+  const Context context(proj_context_create());
+  const std::string name =
+      fmt::format("{} / UTM zone {}{}", system, zone, latitude >= 0 ? 'N' : 'S');
+  PJ_OBJ_LIST* found =
+      proj_create_from_name(context.get(), "EPSG", name.c_str(), nullptr, 0, 0, 1, nullptr);
+  const Object first(found != nullptr && proj_list_get_count(found) > 0
+                         ? proj_list_get(context.get(), found, 0)
+                         : nullptr);
+  proj_list_destroy(found);
+  const char* of_system = first ? proj_get_id_code(first.get(), 0) : nullptr;
+  return of_system == nullptr ? code : fmt::format("EPSG:{}", of_system);
 }
 
 }  // namespace risley::cloud

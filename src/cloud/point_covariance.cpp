@@ -19,7 +19,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Lever = Eigen::Matrix<double, 3, 6>;
 
-/// What the six errors of the trajectory do to one point, each times its sigma, and without.
+/// Effect of the six errors of the trajectory on one point, each times its sigma, and without.
 struct MovedPoint {
   std::int64_t time_ns = 0, sample = 0;
   Lever faded, white;
@@ -31,7 +31,7 @@ MovedPoint moved_point(const Points& points, const TrajectoryErrors& errors, std
   const auto& times = errors.time_ns;
   if (result.time_ns < times.front() || result.time_ns > times.back()) {
     throw InvalidArgument(fmt::format(
-        "time_ns of point {} = {}, allowed {} to {}, the times of the trajectory's places", row,
+        "time_ns of point {} = {}, allowed {} to {}, the times of the trajectory's poses", row,
         result.time_ns, times.front(), times.back()));
   }
   const auto later = std::ranges::upper_bound(times, result.time_ns);

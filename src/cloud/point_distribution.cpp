@@ -31,8 +31,8 @@ constexpr double kPlaceStripe = 0.02, kProfileStripe = 0.02, kProfileReach = 1.4
 constexpr double kRim = 0.05;  // of the field of view
 constexpr double kVariationWithin = 0.9, kCirclesWithin = 0.97, kSpacingWithin = 0.95;
 constexpr std::array<double, 2> kThirds{0.3, 0.7};  // of R
-/// Radius of the empty circle in pixels. As many pixels have their centre within it as its area
-/// has, but for 0.6 %: 253 of 254.5.
+/// Radius of the empty circle in pixels. The number of pixels with their centre within it equals
+/// its area to 0.6 %: 253 of 254.5.
 constexpr std::int32_t kRadiusPixels = 9;
 constexpr std::int32_t kBlockPixels = 1024, kHaloPixels = 16 * kRadiusPixels;
 
@@ -93,7 +93,7 @@ void for_each_square(const Stretch& stretch, double edge, Visit visit) {
   }
 }
 
-/// Counts across a strip, fine enough that stripes may begin anywhere.
+/// Counts across a strip, fine enough for stripes to begin anywhere.
 class AcrossHistogram {
  public:
   void add(double across) {
@@ -120,7 +120,7 @@ class AcrossHistogram {
   std::vector<std::uint32_t> left_, right_;
 };
 
-/// What circles without a point were found in a piece of ground.
+/// Empty circles found in a piece of ground.
 struct EmptyCircles {
   std::uint64_t places = 0, empty = 0;
   std::array<std::int32_t, 3> largest{};  // squared radius, pixels
@@ -295,7 +295,7 @@ class PointDistribution::Counts {
     const std::uint16_t last = std::max(current_, last_done_);
     if (strip <= last) {
       throw InvalidArgument(fmt::format(
-          "points of strip {} come behind those of strip {}: strips must ascend", strip, last));
+          "points of strip {} come after those of strip {}: strips must ascend", strip, last));
     }
     end_strip();
     current_ = strip;
@@ -356,12 +356,12 @@ class PointDistribution::Counts {
     farthest_ = -nearest_;
   }
 
-  /// A recording may begin or end within a strip: where the first and the last field of view were.
+  /// A recording may begin or end within a strip: the first and the last field of view.
   void keep_to_points(double height) {
     const double first = std::max(line_.first, nearest_ + height * reach_.behind);
     const double last = std::min(line_.last, farthest_ - height * reach_.ahead);
-    if (!(last > first)) return;  // the field of view was never seen in full
-    // Its rim is seen seldom: less than that says nothing.
+    if (!(last > first)) return;  // the field of view was never covered in full
+    // Its rim is rarely covered: less than that is not significant.
     const double rim = kRim * height * (reach_.ahead + reach_.behind);
     if (first > line_.first + rim) line_.first = first;
     if (last < line_.last - rim) line_.last = last;
@@ -443,7 +443,7 @@ class PointDistribution::Counts {
 
   void fill_spacing_cells(StripDistribution& own, const Stretch& ground) const {
     const double edge = 2 * own.spacing;
-    if (!(edge > 2 * pixel_)) return;  // too fine for what is kept of the points
+    if (!(edge > 2 * pixel_)) return;  // too fine for the stored points
     TileMap<PixelTile> seen;
     const std::size_t all = std::numeric_limits<std::size_t>::max();
     pixels_.for_each([&](std::int32_t i, std::int32_t j, const PixelTile& tile) {
@@ -534,7 +534,7 @@ class PointDistribution::Counts {
     ground_.for_each([&](std::int32_t, std::int32_t, const CellTile<GroundCell>& tile) {
       known += static_cast<std::size_t>(std::ranges::count_if(tile, counts));
     });
-    // Squares at the rim are not full, so that there may be a few more than were asked for.
+    // Squares at the rim are not full, so that there may be a few more than requested.
     for (std::int32_t merged = std::max(
              1, static_cast<std::int32_t>(std::ceil(
                     std::sqrt(static_cast<double>(known) / static_cast<double>(most_squares)))));
@@ -583,7 +583,7 @@ class PointDistribution::Counts {
   std::uint64_t others_ = 0;
   std::uint16_t last_done_ = 0;
 
-  // Of the strip that is open.
+  // Of the current strip.
   std::uint16_t current_ = 0;  // 0: none
   Stretch line_;
   std::uint64_t points_ = 0;
@@ -593,7 +593,7 @@ class PointDistribution::Counts {
   AcrossHistogram across_;
   TileMap<CellTile<std::uint32_t>> cells_;
   TileMap<PixelTile> pixels_;
-  /// Along the line, where there was no room for a point for the first time, m.
+  /// Along the line: the first place without room for a point, m.
   double known_until_ = std::numeric_limits<double>::infinity();
 };
 

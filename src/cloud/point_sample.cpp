@@ -76,34 +76,47 @@ void PointSampler::add(const Points& points) {
   const bool has_covariance = !points.covariance[kXX].empty();
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double lot = lots.uniform(sample_.points++);
-    if (!(lot < share_)) continue;
+    if (!(lot <= highest_)) continue;
+    const auto keep = [](std::vector<float>& column, double value) {
+      column.push_back(static_cast<float>(value));
+    };
     lot_.push_back(lot);
-    sample_.x.push_back(points.x[i] - offset[0]);
-    sample_.y.push_back(points.y[i] - offset[1]);
-    sample_.z.push_back(points.z[i] - offset[2]);
-    sample_.range.push_back(points.range[i]);
-    sample_.incidence.push_back(points.incidence[i]);
+    keep(sample_.x, points.x[i] - offset[0]);
+    keep(sample_.y, points.y[i] - offset[1]);
+    keep(sample_.z, points.z[i] - offset[2]);
+    keep(sample_.range, points.range[i]);
+    keep(sample_.incidence, points.incidence[i]);
     sample_.intensity.push_back(points.intensity[i]);
     if (has_covariance) {
-      sample_.total_sigma.push_back(std::sqrt(
-          points.covariance[kXX][i] + points.covariance[kYY][i] + points.covariance[kZZ][i]));
+      keep(sample_.total_sigma, std::sqrt(points.covariance[kXX][i] + points.covariance[kYY][i] +
+                                          points.covariance[kZZ][i]));
     }
-    if (lot_.size() > most_) thin();
+    if (lot_.size() > most_ + most_ / 4) thin();  // not for every point
   }
 }
 
+PointSample PointSampler::take() {
+  if (lot_.size() > most_) thin();
+  return std::move(sample_);
+}
+
+/// Keeps the lowest lots.
 void PointSampler::thin() {
-  share_ /= 2;
+  std::vector<double> lots = lot_;
+  const auto last = lots.begin() + static_cast<std::ptrdiff_t>(most_ - 1);
+  std::ranges::nth_element(lots, last);
+  highest_ = *last;
   std::vector<std::size_t> kept;
+  kept.reserve(most_);
   for (std::size_t i = 0; i < lot_.size(); ++i) {
-    if (lot_[i] < share_) kept.push_back(i);
+    if (lot_[i] <= highest_) kept.push_back(i);
   }
-  for (auto* column :
-       {&lot_, &sample_.x, &sample_.y, &sample_.z, &sample_.range, &sample_.incidence}) {
+  keep_rows(lot_, kept);
+  for (auto* column : {&sample_.x, &sample_.y, &sample_.z, &sample_.range, &sample_.incidence,
+                       &sample_.total_sigma}) {
     keep_rows(*column, kept);
   }
   keep_rows(sample_.intensity, kept);
-  if (!sample_.total_sigma.empty()) keep_rows(sample_.total_sigma, kept);
 }
 
 }  // namespace risley::cloud

@@ -84,7 +84,7 @@ void require_shots(const PointingModel& model, const CloudHeader& header,
   check_beams(model.train, shots.beam, n);
 }
 
-/// Face positions and their derivatives as the kernel wants them.
+/// Face positions and their derivatives for the kernel.
 struct Faces {
   std::vector<double> position, over_size;
 
@@ -97,7 +97,7 @@ struct Faces {
   }
 };
 
-/// Those numbers of rows that are not zero.
+/// The nonzero ones of those numbers of rows.
 struct SparseRows {
   std::vector<int> begin{0}, column;
   std::vector<double> weight;
@@ -175,12 +175,12 @@ class ColumnPointers {
   std::vector<double*> loading_;
 };
 
-/// Of fewer shots than a group has: filled up.
+/// Of fewer shots than a group: padded.
 void compute_few_points(const PointingModel& model, const CloudHeader& header, PointedShots shots,
                         Points& points, SensorPoses poses, InstructionSet set) {
   const std::size_t count = shots.size();
   shots.resize(model.train.prisms(), kPointPadding);
-  if (model.moves) poses.resize(kPointPadding);
+  if (model.has_pose) poses.resize(kPointPadding);
   header.resize(points, kPointPadding);
   compute_points(model, header, shots, points, poses, set);
   header.resize(points, count);
@@ -208,7 +208,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
                     InstructionSet set) {
   require_model(model);
   require_shots(model, header, shots);
-  require_poses(poses, model.moves ? shots.size() : 0);
+  require_poses(poses, model.has_pose ? shots.size() : 0);
   require_columns(points, header, shots.size());
   if (shots.size() > 0 && shots.size() < kPointPadding) {
     compute_few_points(model, header, shots, points, poses, set);
@@ -265,7 +265,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   a.factor_row = of_sensor.column.data();
   a.factor_weight = of_sensor.weight.data();
   a.range_factor = range_factor.data();
-  if (model.moves) {
+  if (model.has_pose) {
     a.mount_begin = of_mount.begin.data();
     a.mount_row = of_mount.column.data();
     a.mount_weight = of_mount.weight.data();
@@ -278,7 +278,7 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
     kernel(a);
   };
   compute(0, whole);
-  // The last group takes some rows once more.
+  // The last group repeats some rows.
   if (whole < shots.size()) compute(shots.size() - kPointPadding, kPointPadding);
   for (std::size_t k = 0; k < points.rotation_angle.size(); ++k) {
     for (std::size_t i = 0; i < shots.size(); ++i) {

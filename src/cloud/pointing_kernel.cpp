@@ -27,8 +27,8 @@ constexpr double kPi = 3.14159265358979323846;
 
 Batch load(const double* column, std::size_t at) { return Batch::load_unaligned(column + at); }
 
-/// Two unit vectors that are perpendicular to a direction and to each other, smooth everywhere but
-/// for the sign where the beam points backwards.
+/// Two unit vectors perpendicular to a direction and to each other, smooth everywhere except for
+/// the sign where the beam points backwards.
 std::array<Vector3<Batch>, 2> vectors_across(const Vector3<Batch>& d) {
   const Batch one(1.0);
   const Batch sign = xsimd::select(d.x >= Batch(0.0), one, Batch(-1.0));
@@ -43,14 +43,14 @@ struct BeamCovariance {
   Batch uu, uv, vv, ud, vd, dd;
 };
 
-/// What no prism has a part in.
+/// The part without the prisms.
 class Points {
  public:
   explicit Points(const PointArguments& a) : a_(a) {}
 
-  /// Shots [at, at + kLanes) of which no rotation angles are known: directions as reported, beams
-  /// from the frame's origin, a footprint along azimuth and zenith. Of the common factors those of
-  /// the range remain.
+  /// Shots [at, at + kLanes) without known rotation angles: directions as reported, beams from the
+  /// frame's origin, a footprint along azimuth and zenith. Of the common factors those of the range
+  /// remain.
   [[gnu::flatten]] void compute_reported(std::size_t at) const {
     const Sines azimuth = sines(a_.azimuth, at), zenith = sines(a_.zenith, at);
     const Batch zero(0.0);
@@ -96,7 +96,7 @@ class Points {
         Vector3<Batch>{zenith.cosine * azimuth.cosine, zenith.cosine * azimuth.sine, -zenith.sine}};
   }
 
-  /// What a unit of each range error adds to a range, see RangeShare.
+  /// Effect of a unit of each range error on a range, see RangeShare.
   using RangeShares = std::array<Batch, kEmitterShares + kMaxEmitters>;
 
   Vector3<Batch> surface_normal(std::size_t at) const {
@@ -104,14 +104,14 @@ class Points {
             load(a_.surface_normal[2], at)};
   }
 
-  /// True range by the reported one. @param shares  filled where there are range errors
+  /// True range from the reported one. @param shares  filled if there are range errors
   Batch corrected_range(std::size_t at, const Ray& ray, RangeShares& shares) const {
     const Batch without_offset = load(a_.range, at) - Batch(a_.range_offset);
     if (!a_.range_errors) return without_offset;
     return without_range_errors(at, ray, without_offset, shares);
   }
 
-  /// Not inlined: it would cost the ranges that have no such errors registers.
+  /// Not inlined: it would cost registers in the path without such errors.
   [[gnu::noinline]] Batch without_range_errors(std::size_t at, const Ray& ray,
                                                const Batch& without_offset,
                                                RangeShares& shares) const {
@@ -160,7 +160,7 @@ class Points {
     return xsimd::select(known, Batch(0.5) * xsimd::sqrt(h * h + v * v), zero);
   }
 
-  /// @return cosine of the angle of incidence, NaN where no surface is known
+  /// @return cosine of the angle of incidence, NaN if no surface is known
   Batch store_point(std::size_t at, const Ray& ray, const Batch& range) const {
     const Vector3<Batch> point = ray.origin + range * ray.direction;
     point.x.store_unaligned(a_.point[0] + at);
@@ -169,15 +169,15 @@ class Points {
     range.store_unaligned(a_.corrected_range + at);
     const Vector3<Batch> normal = surface_normal(at);
     const Batch nan(__builtin_nan(""));
-    const Lanes known = normal.x == normal.x;  // min and acos need not hand NaN on
+    const Lanes known = normal.x == normal.x;  // min and acos need not propagate NaN
     const Batch cosine =
         xsimd::select(known, xsimd::min(xsimd::abs(dot(normal, ray.direction)), Batch(1.0)), nan);
     xsimd::select(known, xsimd::acos(cosine), nan).store_unaligned(a_.incidence + at);
     return cosine;
   }
 
-  /// What errors of the mount do to points of a moving sensor: to each unit of its seven
-  /// quantities belongs a shift across the beam, in both directions, and along it.
+  /// Effect of mount errors on points of a moving sensor: each unit of its seven quantities gives a
+  /// shift across the beam, in both directions, and along it.
   using MountEffects = std::array<Vector3<Batch>, kMountEffects>;
 
   MountEffects mount_effects(std::size_t at, const Ray& ray, const Batch& range) const {
@@ -205,13 +205,14 @@ class Points {
     return effects;
   }
 
-  /// Adds what one common factor does, beam and mount together, and stores its loading.
-  /// @param fu, fv  what it does across the beam, m
+  /// Adds the effect of one common factor, beam and mount together, and stores its loading.
+  /// @param fu, fv  its effect across the beam, m
   void add_factor(std::size_t at, int factor, const Batch& fu, const Batch& fv,
                   const MountEffects& effects, const RangeShares& shares, const Ray& ray,
                   BeamCovariance& c) const {
     const Vector3<Batch>&u = ray.across[0], &v = ray.across[1], &d = ray.direction;
-    Vector3<Batch> f{fu, fv, Batch(-a_.range_factor[factor])};  // the offset is taken off the range
+    Vector3<Batch> f{fu, fv, Batch(-a_.range_factor[factor])};  // the offset is subtracted from the
+                                                                // range
     if (a_.range_errors) {
       for (int entry = a_.range_begin[factor]; entry < a_.range_begin[factor + 1]; ++entry) {
         f.z = f.z -
@@ -282,7 +283,7 @@ class Points {
   const PointArguments& a_;
 };
 
-/// Everything of a call that is the same for all shots, but for the emitters of a group.
+/// Everything of a call that is the same for all shots, except for the emitters of a group.
 template <TrainLayout N>
 class Kernel : public Points {
  public:
@@ -313,7 +314,7 @@ class Kernel : public Points {
     for (std::size_t g = 0; g < groups; ++g) {
       turn_to(at + g * kLanes);
       trace_[g].beam[0] = train_.incident;
-      believed_beam_[g] = believed_.incident;
+      believed_trace_[g].beam[0] = believed_.incident;
     }
     for (std::size_t k = 0; k < N; ++k) {
       for (std::size_t g = 0; g < groups; ++g) {
@@ -380,8 +381,8 @@ class Kernel : public Points {
     cosine_[g] = store_point(at, ray, range_[g]);
   }
 
-  /// How the components of a group's points across the beam depend on the faces and on the
-  /// direction: what the way back begins with.
+  /// Derivatives of a group's point components across the beam by the faces and the direction: the
+  /// start of the reverse pass.
   void turn_back(std::size_t g) {
     const std::array<Vector3<Batch>, 2>& across = ray_[g].across;
     for (std::size_t r = 0; r < 2; ++r) {
@@ -406,14 +407,14 @@ class Kernel : public Points {
   /// exact to 1e-8 of them up to 0.1 rad; larger ones only have to be large.
   void store_residuals(std::size_t at, std::size_t g) const {
     const Sines &azimuth = azimuth_[g], &zenith = zenith_[g];
-    const Vector3<Batch>& d = same_ ? trace_[g].direction() : believed_beam_[g];
+    const Vector3<Batch> d = (same_ ? trace_ : believed_trace_)[g].direction();
     const Batch horizontal = xsimd::sqrt(d.x * d.x + d.y * d.y);
     const Batch across = azimuth.sine * d.x - azimuth.cosine * d.y;
     const Batch along = azimuth.cosine * d.x + azimuth.sine * d.y;
     const Batch t = across / along, t2 = t * t;
     const Batch atan =
         t * (Batch(1.0) + t2 * (Batch(-1.0 / 3.0) + t2 * (Batch(0.2) + t2 * Batch(-1.0 / 7.0))));
-    // Neither near nor far where the beam is NaN.
+    // Neither near nor far if the beam is NaN.
     const Lanes far = t2 >= Batch(0.25) || along <= Batch(0.0);
     xsimd::select(far, Batch(kPi / 2), atan).store_unaligned(a_.azimuth_residual + at);
     const Batch s = zenith.sine * d.z - zenith.cosine * horizontal, s2 = s * s;
@@ -425,18 +426,17 @@ class Kernel : public Points {
 
   /// The same rotation angles through the believed train.
   void trace_again(std::size_t groups) {
-#pragma GCC unroll 8
-    for (std::size_t i = 0; i < kFaces; ++i) {
-      const auto& face = believed_.faces[i];
-      for (std::size_t g = 0; g < groups; ++g) {
-        const Vector3<Batch> normal =
-            face.normal.at(trace_[g].sine[i / 2], trace_[g].cosine[i / 2]);
-        believed_beam_[g] = refract(believed_beam_[g], normal, face.index_ratio);
-      }
+    for (std::size_t g = 0; g < groups; ++g) {
+      believed_trace_[g].sine = trace_[g].sine;
+      believed_trace_[g].cosine = trace_[g].cosine;
+    }
+#pragma GCC unroll 4
+    for (std::size_t k = 0; k < kElements<N>; ++k) {
+      for (std::size_t g = 0; g < groups; ++g) pass_prism(believed_, k, believed_trace_[g]);
     }
   }
 
-  /// What is independent from shot to shot, the range's noise aside.
+  /// Errors that are independent from shot to shot, except for the range's noise.
   BeamCovariance own_covariance(std::size_t at, std::size_t g) const {
     const Batch zero(0.0);
     BeamCovariance c{zero, zero, zero, zero, zero, zero};
@@ -458,7 +458,7 @@ class Kernel : public Points {
         }
       }
     }
-    // The footprint is what the beam's spread before the prisms becomes behind them.
+    // The footprint is the beam's spread before the prisms, transformed to that after them.
     const Batch h(a_.divergence_variance_horizontal), w(a_.divergence_variance_vertical);
     const Batch uh = u.parameters[place::incident_beam_horizontal()];
     const Batch uw = u.parameters[place::incident_beam_vertical()];
@@ -517,8 +517,7 @@ class Kernel : public Points {
   bool same_ = true;
 
   // Of the groups of a block.
-  Trace<Batch, N> trace_[kGroups];
-  Vector3<Batch> believed_beam_[kGroups];
+  Trace<Batch, N> trace_[kGroups], believed_trace_[kGroups];
   BeamPath<Batch, N> path_[kGroups];
   Sines azimuth_[kGroups], zenith_[kGroups];
   Ray ray_[kGroups];

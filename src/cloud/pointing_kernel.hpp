@@ -12,17 +12,18 @@ namespace risley::cloud {
 
 /// Most common factors that a call can take.
 inline constexpr int kMostFactors = 96;
-/// Most sizes of prisms that a call can take: those that all share, and the thickness of every
-/// prism and the spacing behind every one but the last.
+/// Most sizes of prisms that a call can take: the common ones, and the thickness of every prism and
+/// the spacing after every one but the last.
 inline constexpr int kMostSizes = 2 + 2 * kMaxPrisms - 1;
 
-/// Quantities of a mount: trajectories::kMountQuantities, whose header is not for kernels.
+/// Quantities of a mount: trajectories::kMountQuantities, whose header must not be included in
+/// kernels.
 inline constexpr int kMountEffects = 7;
 
 /// Errors of ranges that depend on the shot: near range, incidence, intensity, then the emitters'.
 enum RangeShare { kNearShare, kIncidenceShare, kDecadeShare, kEmitterShares };
-/// Cosine of the angle of incidence (80 degrees) from which on the depth of a footprint grows no
-/// further: the plane of a surface is not known well enough.
+/// Cosine of the angle of incidence (80 degrees) from which on the depth of a footprint does not
+/// grow further: the plane of a surface is not known well enough.
 inline constexpr double kLeastCosine = 0.17364817766693033;
 
 /// Plain arguments of one call, see optics/batch_kernel.hpp for why they are plain. Every column
@@ -33,12 +34,13 @@ struct PointArguments {
   TrainLayout prisms;
   int emitters = 1;
   const FaceOrder* face_order = nullptr;        ///< [prisms]
-  const double* parameters = nullptr;           ///< whole flat vector: where the beam truly goes
-  const double* believed_parameters = nullptr;  ///< what directions are reported with; may be equal
+  const double* parameters = nullptr;           ///< whole flat vector: the true optics
+  const double* believed_parameters = nullptr;  ///< the optics of the reported directions; may be
+                                                ///< equal
   const double* face_position = nullptr;        ///< [2 prisms], m
   int sizes = 0;                                ///< of prisms that may have a factor
   const double* face_over_size = nullptr;       ///< d face position / d size [sizes][2 prisms]
-  bool reported_directions = false;  ///< points go where the sensor says, not where the model does
+  bool reported_directions = false;  ///< points use the reported directions, not the model's
 
   double angle_noise_variance = 0;  ///< of reported angles before rounding, rad^2
   double range_offset = 0;          ///< m
@@ -54,9 +56,9 @@ struct PointArguments {
   /// Of the beam's direction before the prisms, rad^2.
   double divergence_variance_horizontal = 0, divergence_variance_vertical = 0;
 
-  /// Common factors: what one standard deviation of each does to the flat vector's places, to the
-  /// rotation angles and to the sizes, in rows of that order [place_count + prisms + sizes], and to
-  /// the range offset. Entries [factor_begin[k], factor_begin[k + 1]) are factor k's.
+  /// Common factors: the effect of one standard deviation of each on the flat vector's places, on
+  /// the rotation angles and on the sizes, in rows of that order [place_count + prisms + sizes],
+  /// and on the range offset. Entries [factor_begin[k], factor_begin[k + 1]) are factor k's.
   const int* places = nullptr;
   int place_count = 0;
   int factors = 0;
@@ -64,11 +66,11 @@ struct PointArguments {
   const int* factor_row = nullptr;
   const double* factor_weight = nullptr;
   const double* range_factor = nullptr;  ///< [factors], m
-  /// The same of range_errors: rows are numbered as RangeShare says.
+  /// The same for range_errors: rows are numbered as in RangeShare.
   const int* range_begin = nullptr;  ///< [factors + 1]
   const int* range_row = nullptr;
   const double* range_weight = nullptr;
-  /// Of a moving sensor, or nullptr, what one standard deviation does to the mount, in the same
+  /// Of a moving sensor, or nullptr, the effect of one standard deviation on the mount, in the same
   /// way: rows are rotations about the sensor's axes, rad, shifts along them, m, and clock, s.
   const int* mount_begin = nullptr;
   const int* mount_row = nullptr;
@@ -88,12 +90,12 @@ struct PointArguments {
   const double* range = nullptr;              ///< [shots], as reported, m
   const double* rounding_variance = nullptr;  ///< [shots], of the range, m^2
   const double* intensity = nullptr;          ///< [shots]; negative: not known
-  /// Unit normal of the surface that a shot met, NaN where it is not known [3][shots].
+  /// Unit normal of the surface hit by a shot, NaN if it is not known [3][shots].
   const double* const* surface_normal = nullptr;
 
-  double* point[3] = {};       ///< [shots], m; NaN where the beam does not get through
+  double* point[3] = {};       ///< [shots], m; NaN if the beam does not get through
   double* covariance[6] = {};  ///< upper triangle [shots], m^2, or nullptr
-  /// The same without the common factors; nullptr as a whole if not wanted.
+  /// The same without the common factors; nullptr as a whole if not needed.
   double* own_covariance[6] = {};
   double* corrected_range = nullptr;
   double* incidence = nullptr;  ///< [shots], rad

@@ -3,6 +3,8 @@
 #include "risley/cloud/pointing_model.hpp"
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -22,8 +24,8 @@ namespace {
 using algebra::NamedCovariance;
 using Eigen::Index;
 
-/// Those of a calibration that a point depends on: not its speeds and rotation angles, and sizes of
-/// the prisms only where beams start at the last one.
+/// Those of a calibration that affect a point: not its speeds and rotation angles, and sizes of the
+/// prisms only if beams start at the last one.
 NamedCovariance calibrated(const sensors::Sensor& sensor, const PointingOptions& options) {
   NamedCovariance result;
   std::vector<Index> rows;
@@ -49,7 +51,7 @@ NamedCovariance believed(const SensorBelief& belief) {
   return result;
 }
 
-/// What a sensor that was not calibrated says of some parameters.
+/// Uncertainty of some parameters of an uncalibrated sensor.
 NamedCovariance assumed(const sensors::Sensor& sensor,
                         const std::vector<estimation::FreeParameter>& parameters) {
   NamedCovariance result;
@@ -63,7 +65,7 @@ NamedCovariance assumed(const sensors::Sensor& sensor,
   return result;
 }
 
-/// All that a sensor that was not calibrated says of its parameters.
+/// Uncertainty of all parameters of an uncalibrated sensor.
 NamedCovariance assumed(const sensors::Sensor& sensor, const SensorBelief& belief) {
   std::vector<estimation::FreeParameter> all = belief.free;
   for (estimation::FreeParameter& held : estimation::uncertain_held(sensor, belief.free)) {
@@ -86,9 +88,9 @@ void require_belief(const SensorBelief& belief) {
   require_not_below("angle noise", belief.angle_noise, 0, "rad");
 }
 
-/// What a calibration's parameters mean. Those of a sensor that was not calibrated are as good as
-/// their sigmas: where the reported directions agree with them these are the better knowledge,
-/// otherwise the sensor reports directions that it does not have.
+/// What a calibration's parameters mean. Those of an uncalibrated sensor are as good as their
+/// sigmas: if the reported directions agree with them these are the better knowledge, otherwise the
+/// sensor reports wrong directions.
 sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
                                          const SensorBelief& belief) {
   using sensors::CalibrationReference;
@@ -105,12 +107,19 @@ sensors::CalibrationReference meaning_of(const sensors::Sensor& calibration,
                                                                  : CalibrationReference::planes;
 }
 
-/// Whether a mount was found together with parameters of its sensor.
+/// Whether a mount was adjusted together with parameters of its sensor.
 bool is_of_a_calibration(const trajectories::Mount& mount) {
   const auto& own = trajectories::mount_names();
   return std::ranges::any_of(mount.covariance.names, [&](const std::string& name) {
     return std::ranges::find(own, name) == own.end();
   });
+}
+
+void require_few(const PointingModel& model) {
+  if (model.factors.size() > static_cast<std::size_t>(kMostFactors)) {
+    throw InvalidArgument(fmt::format("the calibration's covariance has {} quantities, allowed {}",
+                                      model.factors.size(), kMostFactors));
+  }
 }
 
 }  // namespace
@@ -152,23 +161,55 @@ PointingModel pointing_model(const sensors::Sensor& calibration, const SensorBel
     model.mount_of_another = is_of_a_calibration(*mount) && !found_together(*mount, uncertain);
     uncertain = trajectories::joint_covariance(uncertain, *mount);
   }
-  factors.add(uncertain, planes || smoothed, !planes && smoothed);
+  factors.add(uncertain, planes || smoothed, !planes && smoothed, type && !planes);
   if (planes) factors.add_angles(believed(belief));
   factors.add_geometry(calibration);
   factors.finish();
   if (mount) {
     const Eigen::Matrix3d sensor_from_body = trajectories::body_from_sensor(*mount).transpose();
-    model.moves = true;
+    model.has_pose = true;
     for (CommonFactor& factor : model.factors) {
       Eigen::Map<Eigen::Vector3d> shift(factor.mount.data() + 3);
       shift = sensor_from_body * Eigen::Vector3d(shift);
     }
   }
-  if (model.factors.size() > static_cast<std::size_t>(kMostFactors)) {
-    throw InvalidArgument(fmt::format("the calibration's covariance has {} quantities, allowed {}",
-                                      model.factors.size(), kMostFactors));
-  }
+  require_few(model);
   return model;
+}
+
+std::size_t stand(PointingModel& model, const StandingPose& pose) {
+  if (pose.response.size() > 0) {
+    require_length("response of the pose", pose.response.cols(), model.factors.size());
+    for (std::size_t k = 0; k < model.factors.size(); ++k) {
+      for (Index i = 0; i < 6; ++i) {
+        model.factors[k].mount[static_cast<std::size_t>(i)] +=
+            pose.response(i, static_cast<Index>(k));
+      }
+    }
+  }
+  constexpr std::array<const char*, 6> kQuantities{
+      "rotation_x_deg", "rotation_y_deg", "rotation_z_deg", "shift_x_m", "shift_y_m", "shift_z_m"};
+  const Index weights = std::ssize(model.places) + model.train.prisms() + std::ssize(model.sizes);
+  const auto add = [&](const char* of, Index number, const auto& moved) -> CommonFactor& {
+    CommonFactor& common = model.factors.emplace_back(
+        CommonFactor{fmt::format("{}_{}", of, kQuantities[static_cast<std::size_t>(number)]),
+                     Eigen::VectorXd::Zero(weights)});
+    for (Index i = 0; i < 6; ++i) common.mount[static_cast<std::size_t>(i)] = moved(i, number);
+    return common;
+  };
+  for (Index j = 0; j < pose.of_survey.cols(); ++j) add(kTargets, j, pose.of_survey);
+  const auto of_recording =
+      std::stable_partition(model.factors.begin(), model.factors.end(),
+                            [](const CommonFactor& factor) { return !factor.of_recording; });
+  auto own = static_cast<std::size_t>(model.factors.end() - of_recording);
+  const Eigen::MatrixXd factor = lower_factor(pose.covariance);
+  for (Index j = 0; j < 6; ++j) {
+    add("station", j, factor).of_recording = true;
+    ++own;
+  }
+  model.has_pose = true;
+  require_few(model);
+  return own;
 }
 
 bool needs_rotation_angles(const sensors::Sensor& calibration, const PointingOptions& options) {
@@ -182,8 +223,8 @@ PointingModel reported_pointing_model(const sensors::Sensor& calibration,
                                       const std::optional<trajectories::Mount>& mount) {
   if (needs_rotation_angles(calibration, options)) {
     throw InvalidArgument(
-        "points of reported directions need rotation angles for the beam's origin "
-        "and for a calibration against planes");
+        "points of reported directions need rotation angles for the beam's origin and for a "
+        "calibration against planes");
   }
   SensorBelief belief;
   belief.sensor = calibration;

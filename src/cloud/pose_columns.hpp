@@ -10,7 +10,7 @@
 
 namespace risley::cloud {
 
-/// Poses as the kernels read them.
+/// Poses in the form for the kernels.
 inline PoseColumns pose_columns(const SensorPoses& poses) {
   PoseColumns columns;
   for (std::size_t k = 0; k < 9; ++k) columns.turn[k] = poses.turn[k].data();

@@ -27,8 +27,8 @@ using estimation::kStatesPerRotor;
 using sensors::CalibrationReference;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-/// How far a rotor may leave the parabola of a knot until the next, 1 sigma, rad: a hundredth of
-/// what angles are known to, see kTrackingRate.
+/// Largest departure of a rotor from the parabola of a knot until the next, 1 sigma, rad: a
+/// hundredth of the angles' uncertainty, see kTrackingRate.
 constexpr double kParabola = radians_from_degrees(2e-5);
 
 /// Fewer knots are faster: the longest interval over which these rotors move along parabolas.
@@ -44,8 +44,8 @@ double knot_interval(const std::vector<estimation::RotorProcess>& process) {
   return longest;
 }
 
-/// What the belief leaves free: the parameters whose covariance the calibration has, where it is
-/// one against directions, otherwise the default ones.
+/// Free parameters of the belief: those with a covariance in the calibration, if it is one against
+/// directions, otherwise the default ones.
 void choose_parameters(const sensors::Sensor& calibration, estimation::EstimateOptions& options) {
   if (calibration.reference != CalibrationReference::directions) return;
   const auto defaults =
@@ -83,9 +83,8 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
   if (apart.same_sensor()) return;
   const ParameterInfo& info = find_parameter(estimate.free[apart.worst].name, calibration.shape());
   throw EstimationError(fmt::format(
-      "a calibration of another sensor: by the recording's directions {} is {:.4g} {} "
-      "away from the "
-      "calibration's, {:.3g} sigma",
+      "the calibration is of another sensor: according to the recording's directions, {} is {:.4g} "
+      "{} away from the calibration's, {:.3g} sigma",
       info.name, off[apart.worst] / info.si_per_unit, info.unit, apart.worst_over_sigma));
 }
 
@@ -94,9 +93,8 @@ void check_same_sensor(const estimation::Estimate& estimate, const sensors::Sens
   const estimation::FrameTurn& turn = estimate.frame_turn->turn;
   throw EstimationError(fmt::format(
       "the recording's frame is not the sensor's: shots lie outside the field of view, and its "
-      "axis is found turned by {:.3f} deg in {} and {:.3f} deg in {} (a turn about it cannot be "
-      "found){}; "
-      "points need the whole turn to be stated: say it with {} YAW,PITCH,ROLL",
+      "axis is turned by {:.3f} deg in {} and {:.3f} deg in {} (a turn about it cannot be "
+      "found){}; points need the complete rotation: state it with {} YAW,PITCH,ROLL",
       degrees_from_radians(turn.yaw), turn.axis_up ? "pitch" : "yaw",
       degrees_from_radians(turn.pitch), turn.axis_up ? "roll" : "pitch",
       estimate.converged ? "" : ", though the estimate failed: " + estimate.reason,
@@ -160,7 +158,7 @@ estimation::Start RotorTracker::start_of(const estimation::AngleSeries& series,
       belief_.start.time_ns <= series.time_ns.back()) {
     return belief_.start;
   }
-  // The piece before ends where this one begins: go on from there.
+  // The previous piece ends where this one begins: continue from there.
   for (std::size_t knot = knots.size(); knot-- > 0;) {
     const double seconds = 1e-9 * static_cast<double>(time - knots.time_ns[knot]);
     if (std::abs(seconds) > reach()) continue;

@@ -16,8 +16,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// A polynomial repeats the interpolation over so long a time: a turn of 10 rad/s is left by
-/// (0.05)^6 / 6!.
+/// Duration over which a polynomial replaces the interpolation: for a rotation of 10 rad/s the
+/// error is (0.05)^6 / 6!.
 constexpr std::int64_t kCell_ns = 5'000'000;
 constexpr int kDegree = static_cast<int>(kPathPowers) - 1;
 
@@ -32,7 +32,7 @@ class SensorPath::Cell {
   /// Becomes the cell of a time. @return whether the trajectory has a pose there
   bool set(std::int64_t time_ns);
   bool contains(std::int64_t time_ns) const { return time_ns >= begin_ns_ && time_ns <= end_ns_; }
-  /// Since the beginning, in parts of a whole cell.
+  /// Since the beginning, as a share of a whole cell.
   double part(std::int64_t time_ns) const {
     return static_cast<double>(time_ns - begin_ns_) / static_cast<double>(kCell_ns);
   }
@@ -44,7 +44,7 @@ class SensorPath::Cell {
   const SensorPath& path_;
   trajectories::Interpolation::Cursor cursor_;
   std::int64_t begin_ns_ = 1, end_ns_ = 0;  // both included
-  /// Of each power of time: reference point less its place in the beginning, and rotation.
+  /// Of each power of time: reference point less its initial position, and rotation.
   Eigen::Matrix<double, kPathNumbers, kPathPowers> coefficients_;
   Vector3d origin_, velocity_, rate_;
   std::uint16_t strip_ = 0;

@@ -17,7 +17,7 @@
 
 namespace risley::cloud {
 
-/// Where a sensor on a mount is along a trajectory, at times of the trajectory.
+/// Path of a sensor on a mount along a trajectory, at times of the trajectory.
 class SensorPath {
  public:
   /// @param trajectory     must outlive this

@@ -16,18 +16,18 @@ namespace {
 
 using recordings::Observations;
 
-/// Surfaces are taken to stand still for so long: docs/theory/cloud.md
+/// Time for which surfaces are assumed to stand still: docs/theory/cloud.md
 constexpr std::int64_t kSurfaceNs = 1'000'000'000;
-/// The same for a moving sensor, whose shots are put together as if it stood still.
+/// The same for a moving sensor, whose shots are combined as if it stood still.
 constexpr std::int64_t kMovingSurfaceNs = 200'000'000;
 constexpr std::size_t kMovingSurfaceShots = 4000;
-/// Shots of it that determine a surface: on the 1160 cells of a Mid-40's field of view, a circle
-/// of 38.4 degrees, 14 each and 120 in a block of nine.
+/// Number of shots that determine a surface: on the 1160 cells of a Mid-40's field of view, a
+/// circle of 38.4 degrees, 14 each and 120 in a block of nine.
 constexpr std::size_t kSurfaceShots = 16000;
-/// For telling surfaces: the step in which these sensors give ranges, m.
+/// Range step of these sensors, for distinguishing surfaces, m.
 constexpr double kLeastRangeNoise = 1e-3;
 
-/// Steps that find a true range by a reported one: each leaves some hundredths of what is wrong.
+/// Iterations that find a true range from a reported one: each leaves some hundredths of the error.
 constexpr int kRangeSteps = 4;
 
 }  // namespace
@@ -58,7 +58,7 @@ void ShotSurfaces::expect_distortion(double distortion) {
       std::make_unique<SurfaceNormals>(std::max(range, kLeastRangeNoise), std::sqrt(direction));
 }
 
-/// A range without the range errors that need no surface to be known, but with the offset.
+/// A range corrected for the range errors that need no known surface, but with the offset.
 double ShotSurfaces::range_with_offset(const Observations& piece, std::size_t row) const {
   const double reported = piece.range[row];
   if (plain_ranges_) return reported;
@@ -97,7 +97,7 @@ std::size_t ShotSurfaces::find(const Observations& piece, std::size_t begin, std
   return end;
 }
 
-/// Adds rows to the surfaces as if the sensor stood where it was at a time, if it is known.
+/// Adds rows to the surfaces as if the sensor stayed at its pose at a time, if it is known.
 void ShotSurfaces::add_moving(const Observations& piece, std::int64_t middle_ns,
                               const std::vector<std::size_t>& rows) {
   std::vector<std::size_t> known;
@@ -117,8 +117,8 @@ void ShotSurfaces::add_moving(const Observations& piece, std::int64_t middle_ns,
   }
 }
 
-/// Shots of a moving sensor as they would have been from where the sensor is in the middle of a
-/// surface's time. @param range  as range_with_offset() says
+/// Transforms shots of a moving sensor to its pose in the middle of a surface's time. @param range
+/// as returned by range_with_offset()
 void ShotSurfaces::stand_still(const SensorPoses& poses, const std::vector<double>& azimuth,
                                const std::vector<double>& zenith, const std::vector<double>& range,
                                PolarShots& stood) const {

@@ -12,13 +12,13 @@
 #include "risley/cloud/surface_normals.hpp"
 #include "risley/recordings/observations.hpp"
 
+#include "cloud/square.hpp"
+
 namespace risley::cloud {
 
 inline bool has_return(const recordings::Observations& piece, std::size_t row) {
   return piece.valid[row] != 0 && piece.range[row] > 0;
 }
-
-inline double square(double x) { return x * x; }
 
 std::vector<std::int64_t> times_of(const recordings::Observations& piece,
                                    const std::vector<std::size_t>& rows);
@@ -32,8 +32,8 @@ struct PolarShots {
   }
 };
 
-/// The surfaces that the shots of a recording meet, from as many of them as a sensor takes while
-/// surfaces stand still, or nearly so.
+/// The surfaces in a recording, found from the shots that a sensor fires while surfaces stand
+/// still, or nearly so.
 class ShotSurfaces {
  public:
   /// @param angle_noise   of the sensor, rad
@@ -41,11 +41,11 @@ class ShotSurfaces {
   ShotSurfaces(const sensors::Sensor& calibration, double angle_noise, bool has_intensity,
                const Georeference* georeference);
 
-  /// Surfaces are found from directions as the sensor reports them.
+  /// Surfaces are found from the reported directions.
   /// @param distortion  of these against each other, rms, rad
   void expect_distortion(double distortion);
 
-  /// Finds the surfaces of the rows from `begin` on. @return where those of the next ones begin
+  /// Finds the surfaces of the rows from `begin` on. @return start of the next ones
   std::size_t find(const recordings::Observations& piece, std::size_t begin, std::size_t end);
 
   /// The normals of the surfaces that some shots met, sensor frame.
@@ -65,10 +65,10 @@ class ShotSurfaces {
   const sensors::Sensor& calibration_;
   double angle_noise_;
   bool has_intensity_;
-  bool plain_ranges_;  ///< they have no errors but the offset
+  bool plain_ranges_;  ///< they have no errors except the offset
   const Georeference* georeference_;
   std::unique_ptr<SurfaceNormals> normals_;
-  SensorPoses surface_pose_;  ///< in the middle of a surface's time, where it is known
+  SensorPoses surface_pose_;  ///< in the middle of a surface's time, if it is known
 };
 
 }  // namespace risley::cloud

@@ -12,17 +12,17 @@
 namespace risley::cloud {
 namespace {
 
-/// Of a fit: nine degrees of freedom give its roughness to a quarter, 1 / sqrt(2 * 9).
+/// Of a fit: nine degrees of freedom determine its roughness to a quarter, 1 / sqrt(2 * 9).
 constexpr double kLeastShots = 12;
-/// X of the directions that are looked at: sine of the six degrees that SurfaceNormals documents.
+/// Least X of the directions used: sine of the six degrees documented in SurfaceNormals.
 constexpr double kLeastForward = 0.1;
-/// Part of the squared spread across that shots along one line lack: 1 - correlation^2.
+/// Share of the squared spread across that shots along one line lack: 1 - correlation^2.
 /// SurfaceNormals.ShotsAlongALineHaveNone
 constexpr double kLeastSpread = 1e-3;
-/// Cells between a cell without a fit and those that it looks at: an edge in one cell spoils the
+/// Distance of the neighbours searched for a cell without a fit: an edge in one cell spoils the
 /// fits of all eight around it.
 constexpr int kReach = 2;
-/// A shot is on a surface nearby that predicts its range within this many sigmas.
+/// A shot is on a nearby surface that predicts its range within this many sigmas.
 constexpr double kNearEnough = 3;
 /// Surfaces that differ by less, in sigmas and as the cosine between normals, are one: 3 degrees.
 constexpr double kSameRange = 1, kSameNormal = 0.9986;

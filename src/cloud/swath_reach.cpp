@@ -18,7 +18,8 @@
 namespace risley::cloud {
 namespace {
 
-/// Seconds after which a scan has reached its whole field of view, and shots that show this.
+/// Time after which a scan has covered its whole field of view, s, and number of shots that show
+/// this.
 constexpr double kFieldAfter = 30, kFieldShots = 300'000;
 constexpr double kLowestBeam = 0.17364817766693033;  // sine of 10 degrees
 
@@ -45,10 +46,10 @@ SwathReach swath_reach(const sensors::Sensor& sensor, const trajectories::Mount&
         direction_from_angles(SphericalAngles<double>{pattern.azimuth[i], pattern.zenith[i]});
     const Eigen::Vector3d beam = turn * Eigen::Vector3d(d.x, d.y, d.z);
     if (beam.z() < kLowestBeam) {
-      throw InvalidArgument(fmt::format(
-          "a beam of the sensor points {:.1f} degrees below the horizon of a level platform, at "
-          "least 10 are needed: do the sensor's axes in the mount say which way it looks?",
-          degrees_from_radians(std::asin(std::clamp(beam.z(), -1.0, 1.0)))));
+      throw InvalidArgument(
+          fmt::format("a beam of the sensor points {:.1f} degrees below the horizon of a level "
+                      "platform, at least 10 are needed: are the sensor's axes in the mount right?",
+                      degrees_from_radians(std::asin(std::clamp(beam.z(), -1.0, 1.0)))));
     }
     const double ahead = beam.x() / beam.z(), right = beam.y() / beam.z();
     reach.ahead = std::max(reach.ahead, ahead);

@@ -73,11 +73,10 @@ const std::vector<InstructionSet>& available_instruction_sets() {
 
 InstructionSet best_instruction_set() {
   if (available_instruction_sets().empty()) {
-    throw Error(
-        fmt::format("instruction sets of this binary = {}, of which this processor runs none: "
-                    "build risley on this machine, or for all processors with "
-                    "cmake -DRISLEY_INSTRUCTION_SETS=all",
-                    names(held_instruction_sets())));
+    throw Error(fmt::format(
+        "instruction sets of this binary = {}, of which this processor supports none: build risley "
+        "on this machine, or for all processors with cmake -DRISLEY_INSTRUCTION_SETS=all",
+        names(held_instruction_sets())));
   }
   return available_instruction_sets().back();
 }

@@ -23,7 +23,7 @@ std::string length_text(double length) {
   const auto in = [&](double unit, const char* name) {
     return fmt::format("{} {}", number_text(length / unit, length / unit).value, name);
   };
-  // A unit ends where two digits round to the next one.
+  // A unit ends where two digits round up to the next one.
   if (length < 0.0995) return in(0.001, "mm");
   return length < 0.995 ? in(0.01, "cm") : in(1, "m");
 }

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The only place that asks the processor what it runs. CMake asks too:
+// The only place that queries the processor's capabilities. CMake queries them too:
 // cmake/best_instruction_set.cpp.
 #pragma once
 

@@ -48,7 +48,7 @@ const FlagUnit& unit_of(Setting setting) {
 std::atomic<SettingStyle> written_as{
     SettingStyle::option};  // NOLINT(*-avoid-non-const-global-variables): of the process
 
-/// A value as the front end writes it.
+/// A value as spelled by the front end.
 std::string in_its_unit(Setting setting, double value) {
   const double per_unit = written_as == SettingStyle::flag ? unit_of(setting).si_per_unit : 1;
   return fmt::format("{:.12g}", value / per_unit);

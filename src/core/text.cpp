@@ -15,14 +15,14 @@ namespace {
 
 bool is_mark(char c) { return c == '-' || c == '_' || c == ' '; }
 
-/// In lower case and without what joins words.
+/// In lower case and without joining characters.
 std::string letters_of(std::string_view text) {
   std::string letters = lower_case(std::string(text));
   std::erase_if(letters, is_mark);
   return letters;
 }
 
-/// Changed, missing, added and swapped letters, counted as few as possible.
+/// The least number of changed, missing, added and swapped letters.
 std::size_t distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> before, last(b.size() + 1), row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) last[j] = j;

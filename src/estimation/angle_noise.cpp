@@ -19,7 +19,7 @@
 namespace risley::estimation {
 namespace {
 
-/// Half of the squares of a standard normal number are below this.
+/// The median of the square of a standard normal number.
 constexpr double kMedianSquare = 0.454936423119572;
 
 /// Median of squared residuals over their variances; NaN counts as infinite.
@@ -58,8 +58,7 @@ struct Component {
 Component component(const SquaredResiduals& residuals, double used_share, double square_factor) {
   const double scale = 1.0 / (1.0 - used_share);
   double variance = 0;
-  // Weights that are right for a first guess of nothing but the scatter itself, then Fisher
-  // scoring.
+  // Weights for a first guess based only on the scatter, then Fisher scoring.
   double count = 0;
   for (const SquaredResiduals::Group& group : residuals.groups()) {
     variance += group.squares;
@@ -138,7 +137,7 @@ void SquaredResiduals::add(std::span<const double> residual, std::span<const flo
   require_length("rounding", rounding.size(), residual.size());
   require_length("outlier", outlier.size(), residual.size());
   for (std::size_t i = 0; i < residual.size();) {
-    // Rounding is mostly the same from shot to shot.
+    // Rounding is usually the same from shot to shot.
     Group run;
     const float own = rounding[i];
     do {

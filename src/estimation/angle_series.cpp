@@ -82,7 +82,7 @@ TickSampler::TickSampler(double rate) : rate_(rate) { require_above("rate", rate
 bool TickSampler::take_at_tick(std::int64_t time_ns, std::uint8_t beam) {
   if (had_turn_ == seen_) had_turn_.reset();
   if (had_turn_[beam]) {
-    // A beam that stays away holds the others up for one round only.
+    // A missing beam delays the others for one round only.
     if (++waited_ < seen_.count()) return false;
     had_turn_.reset();
   }
@@ -130,7 +130,7 @@ ShotSelector::ShotSelector(const SelectionOptions& options)
     : options_(options), ticks_(options.rate.value_or(1.0)) {}
 
 void ShotSelector::add(const recordings::Observations& o) {
-  // Rows that stand together are taken together, column by column.
+  // Adjacent rows are copied together, column by column.
   ShotRange head_run, series_run;
   std::optional<std::int64_t> first_time_ns;
   if (head_.size() > 0) first_time_ns = head_.time_ns.front();
@@ -150,7 +150,7 @@ void ShotSelector::add(const recordings::Observations& o) {
     const bool first = !first_time_ns;
     const std::int64_t step = first ? 1 : o.time_ns[i] - last_time_ns_;
     if (step <= 0 && step >= -kResetNs) {
-      // What stood before the first row of a piece is not known any more.
+      // The rows before the first one of a piece are no longer known.
       const bool further = i == 0 ? o.return_number[i] > 1 : recordings::is_further_return(o, i);
       ++(step < 0 ? counts_.out_of_order : further ? counts_.further_returns : counts_.equal_times);
       continue;

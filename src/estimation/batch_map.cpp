@@ -30,23 +30,23 @@ namespace risley::estimation {
 namespace {
 
 constexpr double kCoarseRate = 1000.0;  // Hz
-/// Short recordings are thinned less: the coarse pass has to know the parameters too.
+/// Short recordings are thinned less: the coarse pass must know the parameters too.
 constexpr double kFewestCoarseShots = 10000.0;
-/// A step is small when it moves no parameter by more than this share of its sigma: what is left
+/// A step is small when it moves no parameter by more than this share of its sigma: the remainder
 /// is of second order.
 constexpr double kSmallStep = 0.1;
 constexpr int kMostFullPasses = 8;
-/// Where there are more than this many shots to one of the coarse pass, a step with this share of
-/// them comes between: near the optical axis angles are far from linear in what the coarse pass
-/// does not show, and a further pass over all shots would cost more.
+/// If there are more than this many shots to one of the coarse pass, a step with this share of them
+/// is inserted: near the optical axis angles are far from linear in quantities that the coarse pass
+/// does not determine, and a further pass over all shots would cost more.
 constexpr double kStrongThinning = 16.0, kSomeShots = 0.25;
-/// Residuals are correlated where that multiplies variances by more than the second; rotors that
-/// were let free to follow explain it where they leave at most the first of the factor.
+/// Residuals are correlated if that multiplies variances by more than the second; rotors that are
+/// free to follow explain it if they leave at most the first of the factor.
 constexpr double kWhitened = 0.75, kNearlyWhite = 1.2;
 /// Residual scatter above the stated one by this share enlarges the covariance.
 constexpr double kSignificantExcess = 1.02;
 
-/// The constants of an estimation: the free parameters, then the frame's turn where that is free.
+/// The constants of an estimation: the free parameters, then the frame's turn if that is free.
 struct Constants {
   std::vector<FreeParameter> parameters, all;
 
@@ -60,7 +60,7 @@ struct Constants {
   Eigen::Index count() const { return static_cast<Eigen::Index>(parameters.size()); }
 };
 
-/// Residuals of some shots of a series: NaN, and outliers, until they are taken.
+/// Residuals of some shots of a series: NaN, and outliers, until they are set.
 class ResidualSample {
  public:
   /// @param ranges  rows of the series, ascending
@@ -77,7 +77,7 @@ class ResidualSample {
     outlier.assign(shots.size(), 1);
   }
 
-  /// Takes those of its shots that were evaluated; different ones from several threads.
+  /// Copies those of its shots that were evaluated; different ones from several threads.
   void take(const EvaluatedShots& all) {
     const std::size_t end = all.first + all.shots.size();
     auto range = std::partition_point(ranges_.begin(), ranges_.end(),
@@ -112,7 +112,7 @@ std::vector<ShotRange> every_nth_row(std::size_t rows, std::size_t stride) {
   return ranges;
 }
 
-/// Parameters and motion, and what one evaluation of them gave.
+/// Parameters and motion, and the result of one evaluation.
 class Iteration {
  public:
   Iteration(const PackedSeries& series, const BatchMapOptions& options, const Constants& constants,
@@ -140,7 +140,7 @@ class Iteration {
   NormalEquations& equations() { return equations_; }
   std::vector<unsigned char>& outlier() { return outlier_; }
   const SquaredAngles& squares() const { return squares_; }
-  /// From here on evaluations leave an autocorrelation, too.
+  /// From here on evaluations also compute an autocorrelation.
   void watch_autocorrelation() {
     windows_.emplace(series_, autocorrelation_windows(series_.size()));
   }
@@ -149,7 +149,7 @@ class Iteration {
                                        windows_->outlier);
   }
 
-  /// Normal equations at the present state, and statistics of the residuals there.
+  /// Normal equations at the current state, and statistics of the residuals there.
   void evaluate() {
     squares_ = {};
     ShotLooks looks;
@@ -168,8 +168,8 @@ class Iteration {
     accumulate(series_, knots_, train_, constants_.all, weights_, equations_, looks);
   }
 
-  /// Residual scale over noise and rounding; outliers do not count. Noise that is held is not below
-  /// what it was said to be, noise that is found is what the residuals say, and the scale then 1.
+  /// Residual scale over noise and rounding; outliers are excluded. Held noise is not below its
+  /// stated value; otherwise noise follows from the residuals, and the scale is then 1.
   double level() {
     if (!noise_is_held_) {
       weights_.angle_noise = robust_noise(spread_.shots, spread_.azimuth, spread_.zenith);
@@ -198,7 +198,7 @@ class Iteration {
   }
 
   /// Takes a step. @return its largest share of a constant's sigma, or root mean square share of
-  /// the angles' sigmas (of the noise of a shot where those were not computed)
+  /// the angles' sigmas (of the noise of a shot if those were not computed)
   double move(const SmootherSolution& solution) {
     const Eigen::VectorXd step = solution.parameter_step.head(constants_.count());
     train_ = with_free_values(train_, constants_.parameters,
@@ -244,7 +244,7 @@ class Iteration {
   SquaredAngles squares_;
 };
 
-/// Starts of all stretches of a thinned series; an empty one where none was found.
+/// Starts of all stretches of a thinned series; an empty one if none was found.
 struct StretchStart {
   ShotRange shots;
   std::optional<Start> start;
@@ -279,7 +279,7 @@ std::vector<StretchStart> find_stretch_starts(const AngleSeries& series,
   return result;
 }
 
-/// How many of the observed angles the estimate itself used up: the trace of curvature times
+/// Number of observed angles used up by the estimate itself: the trace of curvature times
 /// covariance, states and constants together.
 double used_observations(const NormalEquations& equations, const SmootherSolution& solution) {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -304,7 +304,7 @@ double used_observations(const NormalEquations& equations, const SmootherSolutio
   return used + 2.0 * shared.cwiseProduct(solution.parameter_covariance).sum();
 }
 
-/// 1 + 2 (rho_1^2 + ...): how far squares of correlated residuals hang together.
+/// 1 + 2 (rho_1^2 + ...): correlation factor of squared residuals.
 double square_factor(const Autocorrelation& autocorrelation) {
   double factor = 1.0;
   for (const double rho : autocorrelation.rho) factor += 2.0 * rho * rho;
@@ -349,8 +349,8 @@ Eigen::MatrixXd mean_angle_sensitivity(const SmootherSolution& solution,
   return mean / static_cast<double>(knots.size());
 }
 
-/// Robust steps from tracked phases, until neither scale nor constants move any more.
-/// @param process  of the rotors, chosen on the way where it is not given
+/// Robust steps from tracked phases, until neither scale nor constants change any more.
+/// @param process  of the rotors, chosen on the way if it is not given
 /// @return level of the residuals
 double settle(Iteration& coarse, const BatchMapOptions& options, std::vector<RotorProcess>& process,
               std::size_t& iterations, const Progress& progress) {
@@ -381,7 +381,7 @@ double settle(Iteration& coarse, const BatchMapOptions& options, std::vector<Rot
   return level;
 }
 
-/// Passes over all shots until they settle, with noise and covariances.
+/// Passes over all shots until convergence, with noise and covariances.
 /// @param level  of the residuals so far
 void refine(Iteration& full, const BatchMapOptions& options, const Constants& constants,
             double level, std::vector<RotorProcess>& process, Solution& result,
@@ -390,12 +390,12 @@ void refine(Iteration& full, const BatchMapOptions& options, const Constants& co
   full.watch_autocorrelation();
   const bool noise_is_held = options.angle_noise.has_value();
   double used_share = 0, first_factor = 1;
-  std::vector<RotorProcess> stiff_process;  // of rotors whose noise is taken to be correlated
+  std::vector<RotorProcess> stiff_process;  // of rotors whose noise is assumed correlated
   for (int pass = 0; pass < kMostFullPasses; ++pass) {
     full.evaluate();
     if (noise_is_held) level = full.level();
     full.weights().cut = options.outlier_chi2 * level * level;
-    // The rotors' noise shows more sharply in all shots than in the thinned ones.
+    // The rotors' noise shows more clearly in all shots than in the thinned ones.
     result.autocorrelation = full.autocorrelation();
     const AngleNoise assumed = full.weights().angle_noise;
     bool noise_is_found = true;
@@ -414,9 +414,8 @@ void refine(Iteration& full, const BatchMapOptions& options, const Constants& co
     full.equations().scale(1.0 / excess);
     if (choose && pass == 0) process = likeliest_process(full.equations(), full.knots());
     full.equations().scale(1.0 / factor);
-    // Neighbouring residuals hang together because rotors wander faster than was thought, or
-    // because the noise itself does: rotors that follow leave white residuals in the first case
-    // alone.
+    // Neighbouring residuals are correlated because rotors wander faster than assumed, or because
+    // the noise itself is: only in the first case do rotors that follow leave white residuals.
     if (choose && pass == 0 && factor > kNearlyWhite) {
       stiff_process = likeliest_process(full.equations(), full.knots());
       first_factor = factor;
@@ -435,8 +434,8 @@ void refine(Iteration& full, const BatchMapOptions& options, const Constants& co
     const double moved = full.move(solution);
     ++result.iterations;
     progress.report(0.4 + 0.6 * (pass + 1) / kMostFullPasses);
-    // The noise was found with what the pass before used up; where that was another share, a third
-    // pass is needed.
+    // The noise was found with the degrees of freedom of the previous pass; if they differed, a
+    // third pass is needed.
     const bool goes_on =
         noise_is_coloured || moved > kSmallStep || !noise_is_found ||
         (pass < 2 && !noise_is_held && std::abs(used_share - counted_share) > 1e-3);
@@ -495,8 +494,8 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
       result.unused_shots += all_stretches[s].size();
     }
   }
-  if (used.empty()) throw EstimationError("no stretch of the recording has a start");
-  // The shots of the pass between the coarse one and that of all are picked out during the coarse
+  if (used.empty()) throw EstimationError("no start was found for any stretch of the recording");
+  // The shots of the pass between the coarse one and that of all are selected during the coarse
   // one.
   const double thinning =
       static_cast<double>(series.size()) / static_cast<double>(coarse_series.size());
@@ -522,8 +521,8 @@ Solution run_batch_map(const PackedSeries& series, const Start& start,
   double level = settle(coarse, options, process, result.iterations, progress);
   progress.report(0.4);
 
-  // Some of the shots, and then all: the same stretches, starting where the pass before ended. What
-  // that one had in memory is as much as the next one needs.
+  // First some of the shots, then all: the same stretches, starting from the result of the previous
+  // pass. That one's memory is as much as the next one needs.
   const auto go_on = [&](Iteration from, const PackedSeries& shots,
                          const std::vector<ShotRange>& ranges) {
     Iteration next(shots, options, constants, sensor.train, from.train(),

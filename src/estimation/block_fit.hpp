@@ -20,7 +20,7 @@
 
 namespace risley::estimation {
 
-/// Sigma, rad/s and rad/s^2, of speeds and accelerations that are not looked for.
+/// Sigma, rad/s and rad/s^2, of speeds and accelerations that are not estimated.
 inline constexpr double kStraightSigma = 1e-3;
 
 /// Angle, speed and acceleration of every rotor at a time.
@@ -30,7 +30,7 @@ struct RotorState {
   KnotSquare<Eigen::Dynamic> covariance;
 };
 
-/// A start as a state with these sigmas, rad and, of speeds, what a function says, rad/s.
+/// A start as a state with these sigmas, rad, and those of the speeds from a function, rad/s.
 template <class SpeedSigma>
 RotorState state_of(const Start& start, double angle_sigma, const SpeedSigma& speed_sigma) {
   const auto prisms = static_cast<Eigen::Index>(start.rotation_angle.size());
@@ -68,7 +68,7 @@ inline void predict(RotorState& state, std::int64_t time_ns,
 
 /// One Gauss-Newton step from a state to some shots and a prior together.
 /// @param equations  of one knot with these shots, at the state
-/// @return false, and the state as it was, where there is none
+/// @return false, with the state unchanged, if there is none
 inline bool step_towards(const NormalEquations& equations, const RotorState& prior,
                          RotorState& state) {
   const KnotSquare<Eigen::Dynamic> curvature = knot_curvature<Eigen::Dynamic>(equations, 0);
@@ -95,8 +95,7 @@ inline void set_rotors(Start& start, const RotorState& state) {
   }
 }
 
-/// How far one shot is from the next, typically, rad: the beam's leaning times what the fastest
-/// rotor turns.
+/// Typical distance of one shot from the next, rad: the beam's lean times the fastest rotor's step.
 inline double usual_step(const Start& start, double rate) {
   double step = 0;
   for (std::size_t k = 0; k < start.angular_velocity.size(); ++k) {
@@ -108,7 +107,7 @@ inline double usual_step(const Start& start, double rate) {
   return step;
 }
 
-/// A block of shots so short that the rotors move along one parabola in it, and what it says of
+/// A block of shots so short that the rotors move along one parabola in it, and its information on
 /// them.
 class BlockFit {
  protected:

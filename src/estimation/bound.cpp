@@ -11,10 +11,10 @@
 namespace risley::estimation {
 namespace {
 
-/// Below this share of the largest, an eigenvalue of the scaled information is its rounding.
+/// Below this share of the largest, an eigenvalue of the scaled information is due to rounding.
 constexpr double kNoInformation = 1e-12;
 /// A combination lies across all axes without information when less of its squared length than this
-/// is along them: so far rounding turns them.
+/// is along them: rounding turns them that much.
 constexpr double kAcross = 1e-6;
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace risley::estimation {
 
 namespace {
 
-/// Fewer shots in a row do not show their correlation.
+/// Fewer shots in a row do not reveal their correlation.
 constexpr std::size_t kFewestInARow = 100;
 
 /// Moments about the mean.
@@ -133,8 +133,8 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   Autocorrelation result;
   if (time_ns.size() < kFewestInARow) return result;
   const std::int64_t step = median_step_ns(time_ns);
-  if (step <= 0) return result;  // a clock that stands still has no lags
-  // Blocks spread over the recording, left-out shots as zeros with weight zero.
+  if (step <= 0) return result;  // a stopped clock has no lags
+  // Blocks spread over the recording, skipped shots as zeros with weight zero.
   struct EvenRun {
     std::vector<double> azimuth, zenith, weight;
   };
@@ -143,7 +143,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   for (const auto& [begin, end] : autocorrelation_windows(time_ns.size())) {
     EvenRun run;
     for (std::size_t i = begin; i < end; ++i) {
-      if (i > begin) {  // missing shots take their places; behind a long gap a new run begins
+      if (i > begin) {  // missing shots keep their places; after a long gap a new run begins
         const std::int64_t missing = (time_ns[i] - time_ns[i - 1] + step / 2) / step - 1;
         if (missing < 0 || missing > 1000) {
           runs.push_back(std::exchange(run, {}));
@@ -167,7 +167,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
   if (!(used > 0) || !(variance > 0)) return result;
   variance /= used;
   double scatter = 1.0, all_pairs = 0;
-  // Lags are judged in groups of 1, 1, 2, 4, 8, ...: a weak correlation over many lags is worth as
+  // Lags are judged in groups of 1, 1, 2, 4, 8, ...: a weak correlation over many lags matters as
   // much as a strong one over few, and shows only in their mean.
   for (std::size_t first = 1, group = 1; first + group <= kMostLags + 1; first += group) {
     if (first > 2) group *= 2;
@@ -200,7 +200,7 @@ Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
     result.rho.insert(result.rho.end(), rho.begin(), rho.end());
     all_pairs = fewest_pairs;
   }
-  // Few shots do not determine the factor well; its own standard deviation goes on top.
+  // Few shots do not determine the factor well; its own standard deviation is added.
   if (!result.rho.empty()) {
     const double lags = static_cast<double>(result.rho.size());
     result.factor += 2.0 * result.factor * std::sqrt(lags / (2.0 * all_pairs));
@@ -216,7 +216,7 @@ void AngleProfiler::add(double angle, double azimuth_residual, double zenith_res
   if (!std::isfinite(angle + azimuth_residual + zenith_residual)) return;
   const double turns = angle * (1.0 / kTwoPi);
   const double bins = static_cast<double>(bins_.size());
-  // Rounded down by hand where that is exact: it is done for every shot, and a call costs more.
+  // Rounded down manually if that is exact: it is done for every shot, and a call costs more.
   double whole = static_cast<double>(static_cast<std::int64_t>(std::clamp(turns, -1e15, 1e15)));
   if (whole > turns) whole -= 1.0;
   if (std::abs(turns) > 1e15) whole = std::floor(turns);

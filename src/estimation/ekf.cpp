@@ -26,7 +26,7 @@ namespace {
 constexpr double kOpenGate = 400.0;
 /// Filtered states kept at a time for the combination.
 constexpr std::size_t kBlock = 1024;
-/// Shots that the search for the process noise looks at.
+/// Number of shots used in the search for the process noise.
 constexpr std::size_t kLikelihoodShots = 10000;
 
 /// White accelerations from decimal logarithms of (deg/s) / sqrt(s).
@@ -47,8 +47,8 @@ Eigen::Vector2d residual_of(const AngleSeries& series, std::size_t shot, const P
           series.zenith[shot] - modelled.zenith};
 }
 
-/// Shots that no filter may take although its prior is still wide enough to swallow them: those
-/// among the first that lie far from what the start, or the pass before, expects.
+/// Shots to exclude although the filter's prior is still wide enough to accept them: those among
+/// the first that lie far from the expectation of the start, or of the previous pass.
 std::vector<unsigned char> screen(const AngleSeries& series, const Start& start,
                                   const EkfOptions& options, const FilterReference* reference) {
   std::vector<unsigned char> outlier(series.size(), 0);
@@ -164,7 +164,7 @@ class Combination {
     share_ = covariance = Matrix(forward + size, size, size);
     root_ = covariance + Matrix(backward + size, size, size);
     for (Eigen::Index k = 0; k < size; ++k) {
-      if (root_(k, k) <= 0) continue;  // nothing is known in this direction
+      if (root_(k, k) <= 0) continue;  // no information in this direction
       const double scale = 1.0 / std::sqrt(root_(k, k));
       const Eigen::Index below = size - k - 1;
       root_.col(k).tail(below) *= scale;
@@ -245,7 +245,7 @@ Solution run_pass(const AngleSeries& series, const FilterState& first, const Pri
       static_cast<std::size_t>(std::count(result.outlier.begin(), result.outlier.end(), 1));
 
   // Backward, block by block: the forward filter runs again through the block and is combined with
-  // what the backward filter knows of the shots behind it.
+  // the backward filter's information on the shots after it.
   FilterState backward{state.mean, filter.wide_covariance(), state.time_ns};
   Eigen::VectorXd mean_parameters = Eigen::VectorXd::Zero(statics);
   Eigen::MatrixXd mean_covariance = Eigen::MatrixXd::Zero(statics, statics);

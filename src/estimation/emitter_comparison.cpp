@@ -19,7 +19,7 @@
 namespace risley::estimation {
 namespace {
 
-/// Ratio of two sigmas from which it is reported.
+/// Ratio of two sigmas that is worth reporting.
 constexpr double kNotable = 2.0;
 
 bool is_beam(int place, int prisms) { return place::emitter(place, prisms) >= 0; }
@@ -51,7 +51,7 @@ void keep_emitter(AngleSeries& series, RotorTrajectory& knots, std::uint8_t beam
   series = std::move(own);
 }
 
-/// What data say of single parameters, rotors eliminated.
+/// Information of the data on single parameters, rotors eliminated.
 class SingleInformation {
  public:
   SingleInformation(const AngleSeries& series, const RotorTrajectory& knots,
@@ -85,7 +85,7 @@ class SingleInformation {
                        columns.row(static_cast<Eigen::Index>(parameter)));
   }
 
-  /// What stays untold of a set of free parameters.
+  /// Undetermined combinations of a set of free parameters.
   std::vector<WeakDirection> untold(const std::vector<FreeParameter>& free) const {
     return weak_directions(algebra::pulled_back(jacobian(free), information_), free, 1.0);
   }

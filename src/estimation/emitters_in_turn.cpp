@@ -44,7 +44,7 @@ int emitters_in_turn(const CountedShots& shots) {
 double rows_between_jumps(const CountedShots& shots, int emitters) {
   constexpr std::size_t kFewest = 500, kMost = 100'000;
   // Changes of the step from shot to shot: share of the usual step, and multiples of the usual
-  // change and of what rounding leaves. Beams that turn smoothly change it by some per cent.
+  // change and of the rounding error. Beams that turn smoothly change it by some per cent.
   constexpr double kChange = 0.5, kUsualChanges = 6.0, kRounding = 5.0;
   const auto turn = static_cast<std::size_t>(std::max(emitters, 1));
   const AngleSeries& s = shots.series;

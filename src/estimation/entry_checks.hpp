@@ -17,7 +17,7 @@
 
 namespace risley::estimation {
 
-/// Columns of one length; beams and ranges may be left out.
+/// Columns of one length; beams and ranges may be omitted.
 inline void require_columns(const AngleSeries& series) {
   for_each_entry<kSeriesColumns>(
       [&series](const SeriesColumn& entry, const auto& column) {
@@ -39,7 +39,7 @@ inline void require_start(const Start& start, int prisms) {
   }
 }
 
-/// Process noise for every rotor, or none at all where it is found from the data.
+/// Process noise for every rotor, or none at all if it is found from the data.
 inline void require_process(std::span<const RotorProcess> process, int prisms) {
   if (!process.empty() && process.size() != static_cast<std::size_t>(prisms)) {
     throw InvalidArgument(

@@ -73,7 +73,7 @@ std::vector<EstimatedValue> named_values(const Estimate& estimate) {
   return values;
 }
 
-/// The factor that the speeds of all rotors have in common, where it is not 1.
+/// The common factor of all rotors' speeds, if it is not 1.
 std::optional<SpeedFactor> speed_factor(const sensors::Sensor& sensor, const Estimate& estimate) {
   // Controllers of real rotors hold their speeds to 1e-4; the paper's unit turns 5e-4 faster than
   // the type.
@@ -101,7 +101,7 @@ std::optional<SpeedFactor> speed_factor(const sensors::Sensor& sensor, const Est
   return common;
 }
 
-/// The sensor preset that the estimate amounts to.
+/// The sensor preset equivalent to the estimate.
 sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const PrismTrain& train,
                                   const Estimate& estimate) {
   sensors::Sensor sensor = nominal;
@@ -126,15 +126,15 @@ sensors::Sensor calibrated_sensor(const sensors::Sensor& nominal, const PrismTra
   return sensor;
 }
 
-/// Root mean square that noise and rounding together should leave, rad.
+/// Expected root mean square of noise and rounding together, rad.
 /// @param rounding  mean variance of the rounding of both angles, rad^2
 double expected_residual(const AngleNoise& noise, double rounding) {
   return std::sqrt(noise.rms() * noise.rms() + rounding);
 }
 
-/// A parameter that ended where no sensor of the kind can be, as words; empty when there is none.
-/// A tilt of a whole wedge angle, for one, turns a prism into one with its faces exchanged: such a
-/// fit is as good as the right one, and its numbers mean nothing.
+/// A parameter that ended at an impossible value, as words; empty when there is none. A tilt of a
+/// whole wedge angle, for example, turns a prism into one with its faces exchanged: such a fit is
+/// as good as the right one, but its numbers are meaningless.
 std::string implausible_parameter(const Estimate& estimate, const PrismTrain& nominal) {
   constexpr double kLargest = 5.0;  // prior sigmas
   for (std::size_t i = 0; i < estimate.free.size(); ++i) {
@@ -144,17 +144,17 @@ std::string implausible_parameter(const Estimate& estimate, const PrismTrain& no
     if (std::abs(change) <= kLargest * parameter.prior_sigma) continue;
     const ParameterInfo& info = find_parameter(parameter.name, nominal.shape());
     return fmt::format(
-        "{} came out {:.4g}{} away from the sensor's value, more than any such sensor can be: "
+        "{} came out {:.4g}{} away from the sensor's value, more than is possible for this type: "
         "wrong face order, wrong wedge angles or another sensor",
         parameter.name, change / info.si_per_unit, info.unit == "1" ? "" : " " + info.unit);
   }
   return {};
 }
 
-/// Residuals above the stated noise, or parts of them that hang together above that of a healthy
-/// unit, by more than this factor say that the model does not describe the recording.
+/// Residuals above the stated noise, or correlated parts of them above that of a healthy unit, by
+/// more than this factor mean that the model does not describe the recording.
 constexpr double kFarAbove = 3.0;
-/// Noise that was found above the preset's by this factor is worth a word.
+/// Noise estimated above the preset's by this factor gives a warning.
 constexpr double kNoisy = 2.0;
 /// A parameter combination that keeps more of its prior sigma than this was not measured.
 constexpr double kUnmeasured = 0.3;
@@ -162,9 +162,9 @@ constexpr double kUnmeasured = 0.3;
 /// Squared means over a prism's angle, per bin: 1 with a scatter of 0.12 (72 bins, two axes) when
 /// nothing depends on the angle.
 constexpr double kUneven = 1.6;
-/// Residual variances above the stated one by more than this are worth a word.
+/// Residual variances above the stated one by more than this give a warning.
 constexpr double kEnlarged = 1.1;
-/// As are residuals above their stated sigma by this factor, where no variance was enlarged.
+/// So do residuals above their stated sigma by this factor, if no variance was enlarged.
 constexpr double kNoticed = 1.3;
 
 /// Parameters and speeds further from the preset's than this, in its sigmas, are unusual.
@@ -174,7 +174,7 @@ bool is_calibrated(const sensors::Sensor& sensor) {
   return sensor.reference == sensors::CalibrationReference::planes;
 }
 
-/// What lies far from the preset or the calibration, as words; empty when nothing does.
+/// Values far from the preset or the calibration, as words; empty if there are none.
 std::string unusual_values(const Estimate& estimate, const sensors::Sensor& nominal) {
   std::string words;
   const auto add = [&](const std::string& name, double sigmas) {
@@ -206,7 +206,7 @@ std::string unusual_values(const Estimate& estimate, const sensors::Sensor& nomi
   return words;
 }
 
-/// Says how the recording's frame is turned.
+/// Describes the turn of the recording's frame.
 std::string frame_words(const Estimate& estimate) {
   const FrameEstimate& frame = *estimate.frame_turn;
   const bool has_sigma = frame.covariance(0, 0) > 0;
@@ -222,20 +222,19 @@ std::string frame_words(const Estimate& estimate) {
       "and was taken as 0",
       angle(frame.turn.yaw, frame.covariance(0, 0)), first,
       angle(frame.turn.pitch, frame.covariance(1, 1)), second,
-      has_sigma ? "" : " (held at what the start found)");
+      has_sigma ? "" : " (held at the value found at the start)");
 }
 
-/// Completes the verdict: its code where the estimate converged, and its words.
-/// @param values  what lies far from the preset or the calibration, one more oddity
+/// Completes the verdict: its code if the estimate converged, and its words.
+/// @param values  those far from the preset or the calibration, a further anomaly
 void say_verdict(Estimate& estimate, const sensors::Sensor& nominal,
                  std::vector<std::string> oddities, const std::string& values) {
   const bool calibrated = is_calibrated(nominal), only_values = oddities.empty();
   if (!values.empty()) {
-    oddities.push_back(
-        calibrated ? "what the sensor believes of its optics is not what its calibration says of "
-                     "where beams truly go: " +
-                         values
-                   : values);
+    oddities.push_back(calibrated ? "the sensor's own optical parameters differ from its "
+                                    "calibration to true directions: " +
+                                        values
+                                  : values);
   }
   EstimateVerdict& verdict = estimate.verdict;
   if (estimate.converged) {
@@ -249,7 +248,7 @@ void say_verdict(Estimate& estimate, const sensors::Sensor& nominal,
           "degree ({}){}",
           degrees_from_radians(larger_rms), offset_text(larger_rms),
           calibrated ? ", and so is its calibration"
-                     : "; whether that belief is true only walls tell");
+                     : "; only walls can show whether the sensor's own parameters are right");
       verdict.to_do =
           calibrated ? "nothing" : "to find out, record walls and calibrate the unit on them";
       break;
@@ -259,24 +258,26 @@ void say_verdict(Estimate& estimate, const sensors::Sensor& nominal,
       verdict.to_do = calibrated && only_values
                           ? "use the calibration and not this estimate for the unit's clouds"
                           : "compare it with an earlier recording of the unit, and calibrate it on "
-                            "walls before its points are relied on";
+                            "walls before relying on its points";
       break;
     case EstimateCode::inconsistent:
       verdict.words = estimate.reason;
       verdict.to_do = fmt::format(
-          "see whether sensor, times, frame and elevation are those of the recording ({}, {}, {}, "
-          "{}), and whether the sensor stood still",
+          "check that sensor, times, frame and elevation are those of the recording ({}, {}, {}, "
+          "{}), and that the sensor stood still",
           name_of(kSetting.sensor), name_of(kSetting.shot_rate), name_of(kSetting.extrinsics),
           name_of(kSetting.mirror));
       break;
     case EstimateCode::undecided:
       verdict.words = estimate.reason;
-      verdict.to_do = "record longer or with more of the field of view, or hold what is not told";
+      verdict.to_do =
+          "record longer or with more of the field of view, or hold the parameters that the data "
+          "do not determine";
       break;
   }
 }
 
-/// Says whether the result can be believed.
+/// Whether the result can be trusted.
 void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   const double rms = std::sqrt(0.5 * (estimate.azimuth_moments.rms * estimate.azimuth_moments.rms +
                                       estimate.zenith_moments.rms * estimate.zenith_moments.rms));
@@ -284,7 +285,7 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   const double ratio = std::sqrt(estimate.unit_variance);
   const auto shots = static_cast<double>(estimate.series.size());
   const double outlier_share = static_cast<double>(estimate.outliers) / shots;
-  // What chance does not make: neighbouring residuals share it.
+  // The part that chance does not produce: neighbouring residuals share it.
   const double misfit = estimate.autocorrelation.rho.empty()
                             ? 0.0
                             : rms * std::sqrt(estimate.autocorrelation.rho.front());
@@ -304,7 +305,7 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   } else if (outlier_share > 0.3) {
     fail(
         fmt::format("{:.0f} % of the shots do not fit the model: wrong sensor, speed combination "
-                    "or mirror image, or a start that did not pull in",
+                    "or mirror image, or a start too far from the solution",
                     100 * outlier_share));
   } else if (ratio > kFarAbove) {
     fail(residuals + ": the model does not describe these data, or their noise is larger");
@@ -342,8 +343,8 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   }
   if (!estimate.noise_held && estimate.noise.value.rms() > kNoisy * estimate.usual_noise) {
     warn(estimate.warnings, kWarning.unusual_noise,
-         "the directions are {:.3g} times as noisy ({:.3g} deg, {}) as the preset says of a "
-         "healthy unit ({:.3g} deg)",
+         "the directions are {:.3g} times as noisy ({:.3g} deg, {}) as those of a healthy unit in "
+         "the preset ({:.3g} deg)",
          estimate.noise.value.rms() / estimate.usual_noise,
          degrees_from_radians(estimate.noise.value.rms()), offset_text(estimate.noise.value.rms()),
          degrees_from_radians(estimate.usual_noise));
@@ -358,9 +359,9 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   }
   if (unevenness > kUneven * estimate.autocorrelation.factor) {
     warn(estimate.warnings, kWarning.model_incomplete,
-         "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would make "
-         "of them): the model lacks something that this sensor has, or a parameter is held at a "
-         "wrong value; the sigmas do not cover that",
+         "residuals depend on the rotation angle of prism {} ({:.3g} times what chance would "
+         "give): the model lacks an effect of this sensor, or a parameter is held at a wrong "
+         "value; the sigmas do not cover that",
          prism_letter(static_cast<int>(uneven)), unevenness);
     oddities.push_back(estimate.warnings.back().message);
   }
@@ -378,16 +379,16 @@ void judge(Estimate& estimate, const sensors::Sensor& nominal) {
   }
   if (estimate.converged && outlier_share > 0.02) {
     warn(estimate.warnings, kWarning.many_outliers,
-         "{:.1f} % of the shots were left out as outliers", 100 * outlier_share);
+         "{:.1f} % of the shots were rejected as outliers", 100 * outlier_share);
     oddities.push_back(estimate.warnings.back().message);
   }
   say_verdict(estimate, nominal, std::move(oddities), unusual_values(estimate, nominal));
 }
 
-/// What all residuals of an estimate look like.
+/// Statistics of all residuals of an estimate.
 struct Statistics {
   Moments azimuth, zenith;
-  std::vector<AngleProfiler> over_angle;  ///< [prisms], of the shots that were used
+  std::vector<AngleProfiler> over_angle;  ///< [prisms], of the used shots
   double rounding = 0;                    ///< sum of the rounding variances of both angles, rad^2
 };
 
@@ -428,7 +429,7 @@ void add_statistics(Estimate& estimate) {
   estimate.usual_residual = expected_residual(equal_noise(estimate.usual_noise), rounding);
 }
 
-/// Turns the shots on by what the solution found of their frame, and states the whole turn.
+/// Turns the shots by the estimated frame, and states the complete rotation.
 void take_frame(Estimate& estimate) {
   estimate.series.change([&](AngleSeries& rows) { turn(rows, estimate.frame.transpose()); });
   FrameEstimate& whole = *estimate.frame_turn;
@@ -440,7 +441,7 @@ void take_frame(Estimate& estimate) {
   whole.covariance = scale * estimate.frame_covariance * scale;
 }
 
-/// Holds the directions of emitters of which the series has no shot: it cannot tell them.
+/// Holds the directions of emitters that fired no shot in the series: it cannot determine them.
 void hold_mute_emitters(const PrismTrain& train, Estimate& estimate) {
   if (train.emitters() < 2) return;
   if (estimate.series.largest_beam() >= train.emitters()) {
@@ -454,7 +455,7 @@ void hold_mute_emitters(const PrismTrain& train, Estimate& estimate) {
       return place::emitter(parameter.places.front(), train.prisms()) == emitter;
     });
     warn(estimate.warnings, kWarning.not_seen,
-         "no shot is of emitter {}: its direction was held at the preset's", emitter + 1);
+         "emitter {} has no shot: its direction was held at the preset's", emitter + 1);
   }
 }
 
@@ -467,9 +468,8 @@ BatchMapOptions map_options(const Estimate& estimate, const EstimateOptions& opt
   return settings;
 }
 
-/// Logarithm of the likelihood of residuals under the noise that was found in them, over the shots
-/// that neither of two results leaves out; correlated residuals count for as many as they are
-/// worth.
+/// Logarithm of the likelihood of residuals under their estimated noise, over the shots that
+/// neither of two results rejects; correlated residuals have a reduced weight.
 /// @param series  as it was estimated
 double log_likelihood(const Solution& result, AngleSeries series,
                       const std::vector<unsigned char>& also_out) {
@@ -489,8 +489,8 @@ double log_likelihood(const Solution& result, AngleSeries series,
   return sum / result.autocorrelation.factor;
 }
 
-/// Whether the coordinates of a Cartesian recording were rounded or cut off: its beginning is
-/// estimated both ways, and the likelier one counts where it is likelier beyond doubt.
+/// Whether the coordinates of a Cartesian recording were rounded or truncated: its beginning is
+/// estimated both ways, and the likelier one is used if the decision is clear.
 CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& options,
                                const Progress& progress) {
   constexpr std::size_t kEnoughShots = 50000;
@@ -516,7 +516,7 @@ CoordinateRounding rounding_of(const Estimate& estimate, const EstimateOptions& 
   }
 }
 
-/// Widens the sigmas by what held parameters may be off by.
+/// Enlarges the sigmas by the possible errors of held parameters.
 void count_held_parameters(Estimate& estimate, const sensors::Sensor& nominal) {
   estimate.held_changes = changes_by_held_parameters(estimate, nominal);
   const auto count = static_cast<Eigen::Index>(estimate.values.size());
@@ -542,8 +542,8 @@ Solution solve(const Estimate& estimate, const EstimateOptions& options, const P
   return run_ekf(estimate.series.rows(), estimate.start, settings, progress);
 }
 
-/// A start from the first second, or, where that holds too little, from the first place in the
-/// series that has enough.
+/// A start from the first second, or, if that holds too little, from the first place in the series
+/// that has enough.
 Start start_anywhere(const PackedSeries& series, const AngleSeries& head,
                      const EstimateOptions& options, const Estimate& estimate, StartFindings found,
                      const Progress& progress) {
@@ -571,7 +571,7 @@ Start start_anywhere(const PackedSeries& series, const AngleSeries& head,
       try {
         return start_of(series.rows({begin, end}));
       } catch (const WrongClock& other) {
-        if (wrong_clock) throw *wrong_clock;  // two places that agree are enough
+        if (wrong_clock) throw *wrong_clock;  // two consistent places are enough
         wrong_clock = other;
       } catch (const EstimationError&) {  // nor here
       }
@@ -602,7 +602,7 @@ std::vector<FreeParameter> chosen_parameters(const EstimateOptions& options) {
   const TrainShape shape = options.sensor.shape();
   std::vector<std::string> names = default_free_names(shape, one_glass(options.sensor.train));
   for (const std::string& name : options.fixed) {
-    find_parameter(name, shape);  // an unknown name is an error; one that is not free is no harm
+    find_parameter(name, shape);  // an unknown name is an error; one that is not free is ignored
     std::erase(names, name);
   }
   for (const std::string& name : options.additional) {
@@ -659,13 +659,13 @@ Estimate estimate(Method method, PackedSeries series, const AngleSeries& head,
         add_half_steps(rows, recording_from_sensor(estimate.start.frame.value_or(FrameTurn{})));
       });
       warn(estimate.warnings, kWarning.coordinates_cut,
-           "the coordinates were cut off to whole steps and not rounded: half a step was added to "
+           "the coordinates were truncated to whole steps, not rounded: half a step was added to "
            "each");
     }
   }
   if (estimate.mirrored) {
     warn(estimate.warnings, kWarning.mirrored,
-         "the recording is a mirror image (its elevation has the other sign) and was turned");
+         "the recording is a mirror image (its elevation has the opposite sign) and was flipped");
   }
   static_cast<Solution&>(estimate) = solve(estimate, options, progress);
   if (estimate.frame_turn) {

@@ -15,7 +15,7 @@
 namespace risley::estimation {
 namespace {
 
-/// Columns of the estimate that are read here.
+/// Columns of the estimate used here.
 void require_estimate(const Estimate& estimate) {
   const RotorStates& states = estimate.states;
   const auto prisms = static_cast<std::size_t>(estimate.sensor.prisms());
@@ -62,7 +62,7 @@ std::vector<std::size_t> matching_rows(const std::vector<std::int64_t>& shots,
   return rows;
 }
 
-/// What held parameters that are off in the truth add to the covariance of the free ones.
+/// Contribution of held parameters that are off in the truth to the covariance of the free ones.
 Eigen::MatrixXd covariance_of_held_errors(const Estimate& estimate, const PrismTrain& truth) {
   const auto count = static_cast<Eigen::Index>(estimate.free.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(count, count);
@@ -105,7 +105,7 @@ Evaluation evaluate(const Estimate& estimate, const sensors::Sensor& truth_senso
       const double true_value = truth_sensor.train[info.places.front()];
       compare(value, true_value, value.value - true_value);
     } else if (info.kind == ParameterKind::angular_velocity) {
-      // What counts is the speed the rotor really had, not the nominal one.
+      // The rotor's actual speed is the reference, not the nominal one.
       const auto& angle = truth.rotation_angle[rotor];
       const double true_value = duration > 0 ? (angle[rows.back()] - angle[rows.front()]) / duration
                                              : truth.angular_velocity[rotor][rows.front()];

@@ -20,12 +20,12 @@ using recordings::kNoPlace;
 
 /// Shots of a run that are examined on either side of a border, and the fewest that are enough.
 constexpr std::size_t kArm = 8, kFewestOfArm = 5;
-/// A curve goes on smoothly when it leaves less than this share of the step from shot to shot, and
-/// no more than half of what one missing shot would leave.
+/// A curve continues smoothly if it leaves less than this share of the step from shot to shot, and
+/// no more than half of the residual of one missing shot.
 constexpr double kSmooth = 0.25, kFarRougher = 2.0;
-/// The next shot of a run lies within this share of a step of where the curve leads.
+/// The next shot of a run lies within this share of a step of the curve's prediction.
 constexpr double kNextShot = 0.4;
-/// Packets follow each other when their times do to this share of a period.
+/// Packets are consecutive if their times are, to this share of a period.
 constexpr double kNearPeriod = 0.02;
 
 /// Powers 0 to `degree` of places along a run, one row each.
@@ -54,7 +54,7 @@ class RunFinder {
     }
   }
 
-  /// Gives the shots of runs across borders their places.
+  /// Assigns places to the shots of runs across borders.
   void find(std::vector<std::uint8_t>& place) const {
     const std::size_t count = shots_.series.size();
     for (std::size_t next = 1; next < count; ++next) {
@@ -76,7 +76,7 @@ class RunFinder {
            shots_.precedent[i] == shots_.precedent[i - 1] + 1;
   }
 
-  /// Shots from one on, itself included, that the file has one after another, up to kArm.
+  /// Consecutive shots in the file from a given one on, itself included, up to kArm.
   std::size_t arm(std::size_t shot, int direction) const {
     std::size_t size = 1;
     while (size < kArm) {
@@ -109,7 +109,7 @@ class RunFinder {
     return std::sqrt((shots - powers * curve).squaredNorm() / freedom);
   }
 
-  /// Whether a shot that ends a packet is followed at once by the one that begins the next.
+  /// Whether a shot that ends a packet is directly followed by the first of the next.
   bool goes_on(std::size_t last, std::size_t next) const {
     const PacketShots::OnePacket& one = shots_.packets[shots_.packet[last]];
     const PacketShots::OnePacket& other = shots_.packets[shots_.packet[next]];
@@ -123,12 +123,12 @@ class RunFinder {
     return left < kSmooth * usual && kFarRougher * left < roughness(last, before, after, 1);
   }
 
-  /// The farthest shot that a curve leads to without a gap, from one at a border on inwards.
+  /// The farthest shot on a curve without a gap, from one at a border inwards.
   std::size_t end_of_run(std::size_t shot, int direction) const {
     const std::size_t first = arm(shot, direction);
     std::size_t reached = shot + static_cast<std::size_t>(direction * static_cast<long>(first - 1));
     if (first < kArm) return reached;
-    // The weights by which the next value of a parabola follows from the last kArm.
+    // The weights that predict the next value of a parabola from the last kArm.
     static const Eigen::RowVectorXd weights = [] {
       std::vector<double> places;
       for (std::size_t i = 0; i < kArm; ++i) places.push_back(static_cast<double>(i) / kArm);

@@ -9,9 +9,9 @@
 
 namespace risley::estimation {
 
-/// Places that need no model of the sensor: all of whole packets and, of a single emitter, those of
-/// runs of shots that go on smoothly from the end of a packet to the beginning of the next. All
-/// others are recordings::kNoPlace.
+/// Places that need no model of the sensor: all of complete packets and, for a single emitter,
+/// those of runs of shots that continue smoothly from the end of a packet to the beginning of the
+/// next. All others are recordings::kNoPlace.
 /// @param shot_rate  within packets, Hz
 std::vector<std::uint8_t> evident_places(const PacketShots& shots, double shot_rate, int emitters);
 

@@ -11,8 +11,8 @@
 
 namespace risley::estimation {
 
-/// How far outside the sensor's field of view a shot is noise or a unit's own error, rad, and how
-/// many shots may lie there.
+/// Distance outside the sensor's field of view that counts as noise or a unit's own error, rad, and
+/// the number of shots that may lie there.
 inline constexpr double kFieldMargin = radians_from_degrees(1.5);
 inline constexpr double kFewOutside = 0.03;
 

@@ -8,7 +8,7 @@
 namespace risley::estimation {
 namespace {
 
-/// How loose the rotors are before the first observation of either direction.
+/// Initial uncertainty of the rotors before the first observation in either direction.
 constexpr double kLooseAngle = radians_from_degrees(5.0);
 constexpr double kLooseSpeed = radians_from_degrees(100.0);
 

@@ -27,8 +27,8 @@ struct FilterState {
   std::int64_t time_ns = 0;
 };
 
-/// Where the model is linearised when not at the filter's own state: the smoothed answer of the
-/// pass before. With it a forward-backward pass is one Gauss-Newton step of the whole trajectory.
+/// Linearisation point of the model other than the filter's own state: the smoothed result of the
+/// previous pass. With it a forward-backward pass is one Gauss-Newton step of the whole trajectory.
 struct FilterReference {
   explicit FilterReference(const Solution& solution);
 
@@ -43,8 +43,8 @@ struct FilterReference {
   std::vector<double> angle;  ///< [shots][prisms]
 };
 
-/// The paper's filter: prediction and update, shot by shot, docs/theory/ekf.md. All arguments have
-/// to stay where they are.                                                   [B21 section 2.4]
+/// The paper's filter: prediction and update, shot by shot, docs/theory/ekf.md. All arguments must
+/// stay at their addresses. [B21 section 2.4]
 class Filter {
  public:
   Filter(const Filter&) = delete;
@@ -61,8 +61,8 @@ class Filter {
   /// The covariance before any observation.
   Eigen::MatrixXd wide_covariance() const;
 
-  /// Takes a state through some shots, of which each is predicted first.
-  /// @return as run_filter(): fewer than the run's where the filter diverged at the next one
+  /// Processes some shots with a state, each predicted first.
+  /// @return as run_filter(): fewer than the run's if the filter diverged at the next one
   std::size_t run(FilterState& state, const FilterRun& run,
                   InstructionSet set = best_instruction_set()) const;
 

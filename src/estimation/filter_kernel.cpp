@@ -2,10 +2,10 @@
 // SPDX-License-Identifier: MIT
 // Compiled once per instruction set under the rules of risley/core/simd.hpp.
 //
-// A step of the filter waits for the step before, so its shots cannot share a batch. The lanes of a
-// batch are rows of the covariance, angles whose sine is wanted, or azimuth and zenith of the one
-// shot on the way back through the prisms. Percentages are those of the whole step with the usual
-// twelve states and AVX2 (Zen 4).
+// A step of the filter depends on the previous one, so its shots cannot share a batch. The lanes of
+// a batch are rows of the covariance, angles whose sine is needed, or azimuth and zenith of the
+// single shot on the way back through the prisms. Percentages are those of the whole step with the
+// usual twelve states and AVX2 (Zen 4).
 #include "estimation/filter_kernel.hpp"
 
 #include <array>
@@ -25,19 +25,19 @@ constexpr std::size_t kLanes = Batch::size;
 /// of two and of four.
 constexpr std::size_t kRows = 12;
 constexpr std::size_t kRowBatches = kRows / kLanes;
-static_assert(kRows % kLanes == 0, "AVX-512 runs the copy for AVX2: RISLEY_NARROW_KERNEL_COPIES");
+static_assert(kRows % kLanes == 0, "AVX-512 uses the AVX2 version: RISLEY_NARROW_KERNEL_COPIES");
 
 constexpr std::size_t whole_rows(std::size_t states) {
   return (states + kRows - 1) / kRows * kRows;
 }
 
-/// Free parameters at most: one per place.
+/// Most free parameters: one per place.
 template <TrainLayout N>
 constexpr auto kMostFree = static_cast<std::size_t>(parameter_count(TrainShape{N, kMaxEmitters}));
 
 /// The paper's choice of free parameters for one emitter and one glass, default_free_names(). A
-/// number of states that the compiler knows, and derivatives that it knows are not needed
-/// them, take 12 % off a step, the latter 7 % of these.
+/// number of states known to the compiler, and derivatives known to be unneeded, reduce a step by
+/// 12 %, the latter by 7 %.
 template <TrainLayout N>
 struct UsualParameters {
   static constexpr int kCount = 3 * N + 2;
@@ -47,7 +47,7 @@ struct UsualParameters {
 
 /// Mean and covariance. Angle and speed of each rotor come first, so that they are neighbours in a
 /// batch, then the free parameters, then zeros up to whole rows.
-/// @tparam Free  number of free parameters, or -1: known when it runs
+/// @tparam Free  number of free parameters, or -1: known at run time
 template <TrainLayout N, int Free>
 class FilterStates {
  public:
@@ -99,7 +99,7 @@ Batch exchanged_pairs(const Batch& value, std::index_sequence<Lane...>) {
   return Batch(__builtin_shufflevector(lanes, lanes, (Lane ^ 1)...));
 }
 
-/// What the rotors do between two shots.
+/// Motion of the rotors between two shots.
 template <TrainLayout N>
 class RotorStep {
  public:
@@ -126,7 +126,7 @@ class RotorStep {
     return xsimd::fma(Batch::load_aligned(angle_by_speed_ + v * kLanes),
                       exchanged_pairs(states, std::make_index_sequence<kLanes>()), states);
   }
-  /// Batch v of a rotor's column of what the step adds to the covariance.
+  /// Batch v of a rotor's column of the step's contribution to the covariance.
   Batch noise(std::size_t state, std::size_t v) const {
     return Batch::load_aligned(noise_[state] + v * kLanes);
   }
@@ -138,7 +138,7 @@ class RotorStep {
   alignas(64) double noise_[2 * N][kBatches * kLanes] = {};
 };
 
-/// Where the derivatives by the free parameters are among those by places, for one emitter.
+/// Location of the derivatives by the free parameters among those by places, for one emitter.
 template <TrainLayout N>
 struct FreeDerivatives {
   static constexpr std::size_t kNone = parameter_count(N);  ///< holds 0
@@ -168,7 +168,7 @@ struct FreeDerivatives {
   }
 };
 
-/// Numbers of which each is wanted in all lanes.
+/// Numbers needed in all lanes.
 struct InAllLanes {
   const double* value;
   Batch operator[](std::size_t i) const { return Batch(value[i]); }
@@ -235,7 +235,7 @@ class FilterPass {
     double* const mean = a_.run.kept + n * (size + size * size);
     states_.store(mean, mean + size);
   }
-  /// Does what is still to be done to the covariance.
+  /// Completes the pending update of the covariance.
   [[gnu::noinline]] void settle() {
     step_.set(0);
     advance_covariance();
@@ -250,7 +250,7 @@ class FilterPass {
     }
   }
 
-  /// P = F (P - u u^T - w w^T) F^T + Q, with u and w of the shot before: see take().
+  /// P = F (P - u u^T - w w^T) F^T + Q, with u and w of the previous shot: see take().
   void advance_covariance() {
     const std::size_t rows = states_.rows();
     for (std::size_t block = 0; block < rows; block += kRows) {
@@ -287,7 +287,7 @@ class FilterPass {
         }
         by_angle.store_aligned(angle + i);
       }
-      // Row and column were added in another order: this keeps P symmetric to the bit.
+      // Row and column were summed in different order: this keeps P symmetric to the bit.
       for (std::size_t l = 0; l < k; ++l) angle[2 * l] = states_.column(2 * l)[2 * k];
     }
     if (a_.walk_variance > 0) {
@@ -300,7 +300,7 @@ class FilterPass {
     }
   }
 
-  /// Goes to a shot and takes its observation, unless the gate refuses it. With i the innovations,
+  /// Moves to a shot and uses its observation, unless the gate rejects it. With i the innovations,
   /// H their derivatives, R their noise, f and g the columns of P H^T, S = H P H^T + R and
   ///   c = S01 / S00,  d = S11 - c S01,  i1' = i1 - c i0,  g' = g - c f:
   ///   mean += f i0 / S00 + g' i1' / d,  P -= f f^T / S00 + g' g'^T / d,
@@ -389,7 +389,7 @@ class FilterPass {
     }
   }
 
-  /// What is azimuth's in lane 0, and zenith's in the others.
+  /// The azimuth's part in lane 0, and the zenith's in the others.
   static Batch in_lanes(const Batch& azimuth, const Batch& zenith) {
     alignas(64) static constexpr double kNumber[8] = {0, 1, 1, 1, 1, 1, 1, 1};
     return xsimd::select(Batch::load_aligned(kNumber) == Batch(0.0), azimuth, zenith);
@@ -410,7 +410,7 @@ class FilterPass {
       gradient.rotation_angles[k].store_aligned(by_angle_[k]);
   }
 
-  /// Calls take(state, derivative) for every state on which the angles depend, so not for speeds.
+  /// Calls take(state, derivative) for every state that the angles depend on, so not for speeds.
   template <class Take>
   void with_derivatives(int beam, const Take& take) const {
     const FreeDerivatives<N>& free = free_derivatives_[beam];
@@ -421,7 +421,7 @@ class FilterPass {
     for (std::size_t k = 0; k < kElements<N>; ++k) take(2 * k, by_angle_[k]);
   }
 
-  /// How far the state is from the reference, in azimuth and zenith.
+  /// Distance of the state from the reference, in azimuth and zenith.
   Batch beyond_reference(std::size_t shot, int beam) const {
     Batch sum(0.0);
     with_derivatives(beam, [&](std::size_t state, const double* by) {

@@ -16,19 +16,19 @@ namespace risley::estimation {
 struct FilterRun {
   std::size_t first = 0, count = 0;
   bool backwards = false;  ///< from the first shot to the one before it, and so on
-  /// Observations of a larger chi-square are refused, as are those whose modelled beam does not get
-  /// through.
+  /// Observations of a larger chi-square are rejected, as are those whose modelled beam does not
+  /// get through.
   double gate = 0;
-  const unsigned char* outlier = nullptr;  ///< [shots of the series], whose observation is left out
-  unsigned char* refused = nullptr;        ///< [shots of the series], set where one is; or nullptr
+  const unsigned char* outlier = nullptr;  ///< [shots of the series], excluded observations
+  unsigned char* refused = nullptr;        ///< [shots of the series], set for outliers; or nullptr
 
   /// Of the innovations, [count] or nullptr: chi-square and determinant of the covariance, rad^4.
-  /// Where no observation is taken they are 0 and 1.
+  /// For unused observations they are 0 and 1.
   double* chi_square = nullptr;
   double* determinant = nullptr;
   /// Mean and covariance at every shot [count][states (1 + states)], or nullptr.
   double* kept = nullptr;
-  bool keep_predicted = false;  ///< as they are before the shot's own observation
+  bool keep_predicted = false;  ///< before the shot's own observation
 };
 
 /// Plain arguments of one call. States are the free parameters, then angle and speed of each rotor.
@@ -37,17 +37,17 @@ struct FilterArguments : TrainArguments, ShotArguments {
   double noise_variance = 0;              ///< of both angles without rounding, rad^2
   double walk_variance = 0;               ///< of every free parameter, per second
 
-  /// Where the model is linearised; nullptr: at the filter's own state.
+  /// Linearisation point of the model; nullptr: the filter's own state.
   const double* reference_parameters = nullptr;  ///< [free]
   const double* reference_angle = nullptr;       ///< [shots][prisms]
 
   FilterRun run;
   double* mean = nullptr;                 ///< [states], changed
   double* covariance = nullptr;           ///< [states][states], changed
-  std::int64_t* state_time_ns = nullptr;  ///< when the state is so, changed
+  std::int64_t* state_time_ns = nullptr;  ///< if the state is stored, changed
 };
 
-/// @return how many shots it went through: all, unless the mean ceased to be finite
+/// @return number of processed shots: all, unless the mean ceased to be finite
 RISLEY_DECLARE_KERNEL(std::size_t run_filter(const FilterArguments& arguments))
 
 }  // namespace risley::estimation

@@ -6,8 +6,8 @@
 
 namespace risley::estimation {
 
-/// 1 sigma of the frame's turn about where the lines of the start see the optical axis, rad: as
-/// wide as the priors of the parameters.
+/// 1 sigma of the frame's turn about the optical axis found by the start's lines, rad: as wide as
+/// the priors of the parameters.
 inline constexpr double kFrameSigma = radians_from_degrees(1.0);
 
 }  // namespace risley::estimation

@@ -18,15 +18,16 @@ namespace {
 
 using Eigen::Index;
 
-/// Shots that show how answers depend on held parameters: shares of them do, not sigmas.
+/// Number of shots used for the dependence of results on held parameters: shares matter, not
+/// sigmas.
 constexpr double kSampleShots = 20000;
 
-/// What was estimated: the free parameters, and the frame's turn where that was free.
+/// The estimated constants: the free parameters, and the frame's turn if that was free.
 const std::vector<FreeParameter>& constants_of(const Estimate& estimate) {
   return estimate.constants.empty() ? estimate.free : estimate.constants;
 }
 
-/// Held parameters that some answer depends on.
+/// Held parameters that affect some result.
 std::vector<FreeParameter> telling_held(const Estimate& estimate, const sensors::Sensor& sensor) {
   std::vector<FreeParameter> held = uncertain_held(sensor, constants_of(estimate));
   const std::vector<std::size_t> shots = estimate.series.shots_of_beams();
@@ -38,7 +39,7 @@ std::vector<FreeParameter> telling_held(const Estimate& estimate, const sensors:
   return held;
 }
 
-/// Some of the shots that an estimate used, with knots of their own on its trajectory.
+/// Some of the shots used in an estimate, with separate knots on its trajectory.
 struct Sample {
   PackedSeries series;
   RotorTrajectory knots;
@@ -64,8 +65,8 @@ struct Sample {
   }
 };
 
-/// One Gauss-Newton step of a sample of the shots, as certain as all of them are together. The
-/// prior of the constants pulls towards where they are.
+/// One Gauss-Newton step of a sample of the shots, weighted as all of them together. The prior of
+/// the constants pulls towards their current values.
 SmootherSolution step_of(const Estimate& estimate, const Sample& sample,
                          const RotorTrajectory& knots, const PrismTrain& train,
                          const std::vector<FreeParameter>& constants) {
@@ -81,8 +82,8 @@ SmootherSolution step_of(const Estimate& estimate, const Sample& sample,
   return smooth(equations, knots, estimate.rotor_process, prior, true);
 }
 
-/// Derivatives of the constants and of the held parameters themselves by these, where the data
-/// decide on the constants, times one sigma of each [free + held, held].
+/// Derivatives of the constants and of the held parameters themselves by these, as far as the data
+/// determine the constants, times one sigma of each [free + held, held].
 /// @param solution  of free and held parameters together
 Eigen::MatrixXd changes_of_constants(const SmootherSolution& solution,
                                      const std::vector<FreeParameter>& all, Index free) {
@@ -103,10 +104,10 @@ Eigen::MatrixXd changes_of_constants(const SmootherSolution& solution,
   return changes;
 }
 
-/// The second order of what one sigma of a held parameter does: how far the mean of both signs is
-/// from no change, by one step from either end of the first order.
-/// @param solution  of free and held parameters together, from which the rotors follow
-/// @param centre    step of the constants [free] from no change
+/// The second-order effect of one sigma of a held parameter: the mean of both signs relative to no
+/// change, by one step from either end of the first order.
+/// @param solution  of free and held parameters together, which the rotors follow
+/// @param centre  step of the constants [free] from no change
 /// @param change    of the constants [free + held]
 /// @return of the constants [free] and of the states of the knots
 std::pair<Eigen::VectorXd, std::vector<double>> second_order(const Estimate& estimate,
@@ -135,7 +136,7 @@ std::pair<Eigen::VectorXd, std::vector<double>> second_order(const Estimate& est
   return {std::move(curve), std::move(states)};
 }
 
-/// What becomes of the answers: the free parameters, mean speeds and first angles of the rotors.
+/// Effect on the results: the free parameters, mean speeds and first angles of the rotors.
 /// @param angles_of  changes of the rotation angles at a knot [prisms, columns]
 template <class Angles>
 Eigen::MatrixXd changes_of_values(const Eigen::MatrixXd& parameters, const RotorTrajectory& knots,
@@ -191,7 +192,7 @@ HeldChanges changes_by_held_parameters(const Estimate& estimate, const sensors::
   for (std::size_t knot = 0; knot < knots.size(); ++knot) result.mean_angles += angles_of(knot);
   result.mean_angles /= static_cast<double>(knots.size());
 
-  // Only behind a reflection do the others follow a held parameter along a visible curve.
+  // Only behind a reflection is the dependence on a held parameter visibly curved.
   if (!sensor.shape().prisms.reflects()) return result;
   const SmootherSolution centre =
       step_of(estimate, sample, knots, estimate.train, constants_of(estimate));

@@ -30,24 +30,24 @@
 namespace risley::estimation {
 namespace {
 
-/// Slowest change of a speed that a fit over the first shots leaves to the rotors, rad/s^2.
+/// Slowest change of a speed allowed by a fit over the first shots, rad/s^2.
 constexpr double kAccelerationSigma = radians_from_degrees(200.0);
-/// Shots that a start is fitted to, at first and where answers have to be distinguished.
+/// Number of shots fitted by a start, at first and when solutions must be distinguished.
 constexpr std::size_t kEnoughShots = 1000, kManyShots = 20000;
-/// Speeds of a sensor whose clock or rotors are further off than is usual are found among all
-/// pairs, within this share of the sensor's.
+/// Speeds of a sensor whose clock or rotors are further off than usual are found among all pairs,
+/// within this share of the sensor's.
 constexpr double kFarthestShare = 0.2;
-/// A pair of lines that leaves so many times as much as the best need not be tried, unless it
-/// leaves no more than what two lines cannot describe anyway, as a mean square.
+/// A pair of lines that leaves this many times as much as the best need not be tried, unless its
+/// remainder is within the error of two lines as a model, as a mean square.
 constexpr double kHopeless = 4.0, kSecondOrder = 3e-5;
-/// Residual of a fit that no other pair of speeds needs to compete with, rad: rotors that wander
-/// and noise of any usual size leave less, a wrong pair more.
+/// Residual of a fit below which no other pair of speeds is tried, rad: wandering rotors and noise
+/// of any usual size leave less, a wrong pair more.
 constexpr double kGoodResidual = radians_from_degrees(0.08);
-/// Two answers are distinct if their chi2 differ by this.
+/// Two solutions are distinct if their chi2 differ by this.
 constexpr double kDecisive = 25.0;
-/// A turn that leaves all shots in the field of view is believed from this angle on, rad, where it
-/// takes this share of the residuals away. Where the last axis may lean, it explains a turn as
-/// well: then a turn is one that no unit leans by, and may add the second share.
+/// A turn that leaves all shots in the field of view is accepted from this angle on, rad, if it
+/// removes this share of the residuals. If the last axis may lean, that explains a turn as well:
+/// then only a turn larger than any unit's lean is accepted, which may remove the second share.
 constexpr double kLeastTurn = radians_from_degrees(0.3), kMostLean = radians_from_degrees(0.6);
 constexpr double kTurnGain = 0.1, kTurnLoss = 0.02;
 
@@ -57,7 +57,7 @@ struct WindowFit {
   RotorTrajectory knot;                                 // a single one
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  // of the shots, from the sensor's
   double rms = std::numeric_limits<double>::infinity();
-  double prior_chi2 = 0;  // of the parameters: how unusual a sensor it would be
+  double prior_chi2 = 0;  // of the parameters: how unusual the sensor would be
 };
 
 /// The greatest acceleration of a swing, rad/s^2.
@@ -72,7 +72,7 @@ double swing_acceleration(const sensors::Sensor& sensor) {
   return greatest;
 }
 
-/// A swing bends little within an eighth of its period.
+/// A swing is nearly a parabola within an eighth of its period.
 FirstMotion first_motion(const sensors::Sensor& sensor) {
   FirstMotion motion;
   const double acceleration = swing_acceleration(sensor);
@@ -86,7 +86,7 @@ FirstMotion first_motion(const sensors::Sensor& sensor) {
 /// Robust least squares with Levenberg's damping: first the motion, then the parameters too.
 class WindowFitter {
  public:
-  /// @param frame  the frame's parameters where its turn is free
+  /// @param frame  the frame's parameters if its turn is free
   WindowFitter(const AngleSeries& shots, const PrismTrain& nominal,
                const std::vector<FreeParameter>& free, const std::vector<FreeParameter>& frame,
                double noise, double acceleration_sigma)
@@ -101,7 +101,7 @@ class WindowFitter {
   }
 
   /// Moves the rotation angles to the best of a grid over whole turns, with the fit's speeds and
-  /// parameters: where shots in a corner of the field said little about the lines' phases.
+  /// parameters: for shots in a corner of the field, which hardly determine the lines' phases.
   void look_around(WindowFit& fit) {
     constexpr int kSteps = 24;
     constexpr double kMiss = radians_from_degrees(2.0);  // of a grid's angles
@@ -240,7 +240,7 @@ class WindowFitter {
   std::vector<double> azimuth_, zenith_;
 };
 
-/// One hypothesis of how the recording was made.
+/// One hypothesis on how the recording was made.
 struct Hypothesis {
   bool mirrored = false;
   sensors::Sensor sensor;  // in one of its speed combinations
@@ -271,20 +271,20 @@ std::vector<Hypothesis> hypotheses_of(const sensors::Sensor& sensor, std::option
   return all;
 }
 
-/// Lines that may be a hypothesis's rotors: in beam order, as recorded.
+/// Lines that may belong to a hypothesis's rotors: in beam order, as recorded.
 struct Trial {
   const Hypothesis* hypothesis = nullptr;
   RotorLines lines;
 };
 
-/// A trial and what came of it.
+/// A trial and its result.
 struct Answer {
   Trial trial;
   WindowFit fit;
   bool frame_is_free = false;
 };
 
-/// The shots of a window, ready to be fitted under any hypothesis.
+/// The shots of a window, prepared for a fit under any hypothesis.
 class StartWindow {
  public:
   /// @param frame  of the recording, from the sensor's, roughly
@@ -302,7 +302,7 @@ class StartWindow {
         noise_(least_noise(options)),
         frame_parameters_(frame_parameters(sensor.train.layout(), kFrameSigma)) {
     if (!frame.isIdentity()) turn(turned_, frame.transpose());
-    if (axis_up_) {  // lines are of what turns about X
+    if (axis_up_) {  // lines are those of rotation about X
       AngleSeries about_x = series_;
       turn(about_x, sensor_from_train(true).transpose());
       search_ = std::make_shared<const LineSearch>(about_x);
@@ -347,8 +347,8 @@ class StartWindow {
     const double acceleration = std::max(kAccelerationSigma, swing_acceleration(h.sensor));
     WindowFitter fitter(shots, h.sensor.train, options_.free, frame, noise_, acceleration);
     fitter.run(fit);
-    // Where the lines explain next to nothing more than others would, or leave much, their phases
-    // mean little.
+    // If the lines explain hardly more than others would, or leave much, their phases are
+    // meaningless.
     if (!(fit.rms < kGoodResidual) &&
         (axis_up_ || trial.lines.unexplained < kSecondOrder || !std::isfinite(fit.rms))) {
       constexpr std::size_t kGridShots = 150;
@@ -383,7 +383,8 @@ class StartWindow {
       start.angular_velocity.push_back(answer.fit.knot.state[3 * k + 1]);
     }
     if (!answer.frame_is_free) return start;
-    // The mirror of the mirrored recording: its frame turns the other way in what is mirrored.
+    // The mirror image of the mirrored recording: its frame turns the other way in the mirror
+    // image.
     Eigen::Matrix3d total = frame_;
     if (h.mirrored) {
       const Eigen::DiagonalMatrix<double, 3> mirror(1.0, axis_up_ ? -1.0 : 1.0,
@@ -399,7 +400,7 @@ class StartWindow {
     return std::max(options.angle_noise, radians_from_degrees(1e-4));
   }
 
-  /// The shots of the lines; where speeds swing, those about their middle that a parabola follows.
+  /// The shots of the lines; if speeds swing, those about their middle that a parabola fits.
   ShotRange fitted_rows() const {
     ShotRange rows = search_->shots();
     if (!swings_) return rows;
@@ -441,8 +442,7 @@ bool speeds_fit(const Hypothesis& hypothesis, const RotorLines& lines, double sh
   return true;
 }
 
-/// The lines whose speeds were looked for as `from`, in the order of `to`; none where these are not
-/// the same speeds.
+/// The lines found for speeds `from`, in the order of `to`; none if these are not the same speeds.
 std::optional<RotorLines> reordered(const RotorLines& lines, const std::vector<double>& from,
                                     const std::vector<double>& to) {
   RotorLines result = lines;
@@ -466,8 +466,8 @@ std::string speeds_text(const std::vector<double>& speeds) {
   return text;
 }
 
-/// Twice the logarithm of how much likelier an answer is than a rival: residuals of unknown noise,
-/// two per shot, and parameters about the sensor's.
+/// Twice the log likelihood ratio of a solution and a rival: residuals of unknown noise, two per
+/// shot, and parameters about the sensor's.
 double chi2_lead(const Answer& answer, const Answer& rival, std::size_t shots) {
   return 4.0 * static_cast<double>(shots) * std::log(rival.fit.rms / answer.fit.rms) +
          rival.fit.prior_chi2 - answer.fit.prior_chi2;
@@ -480,7 +480,7 @@ void sort_by_likelihood(std::vector<Answer>& answers, std::size_t shots) {
   });
 }
 
-/// Best answers of all trials, best first; answers that differ in nothing but the last digits once.
+/// Best solutions of all trials, best first; solutions that differ only in the last digits once.
 std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Trial>& trials,
                                bool frame_is_free) {
   double least = std::numeric_limits<double>::infinity();
@@ -497,7 +497,7 @@ std::vector<Answer> answers_of(const StartWindow& window, const std::vector<Tria
   return answers;
 }
 
-/// Whether two answers say the same of rotors and image.
+/// Whether two solutions agree in rotors and image.
 bool same_answer(const Answer& a, const Answer& b, double resolved) {
   if (a.trial.hypothesis != b.trial.hypothesis) return false;
   for (std::size_t k = 0; k < a.trial.hypothesis->sensor.angular_velocity.size(); ++k) {
@@ -514,7 +514,7 @@ int turning_rotors(const sensors::Sensor& sensor) {
                                         [](double speed) { return speed != 0; }));
 }
 
-/// Says of lines that they are no combination of the sensor's speeds.
+/// States that lines are not a combination of the sensor's speeds.
 [[noreturn]] void refuse_speeds(const RotorLines& found, const sensors::Sensor& sensor,
                                 const std::vector<Hypothesis>& hypotheses) {
   std::vector<double> speeds;
@@ -545,7 +545,7 @@ int turning_rotors(const sensors::Sensor& sensor) {
                         ": the sensor is another one, or it moved, or the recording is mirrored");
 }
 
-/// Looks for the best answer in one window.
+/// Searches the best solution in one window.
 Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
                       const std::vector<Hypothesis>& hypotheses, bool frame_is_free) {
   const LineSearch& search = window.search();
@@ -599,7 +599,7 @@ Answer find_in_window(const StartWindow& window, const sensors::Sensor& sensor,
                       turning_rotors(sensor), sensor.name, speeds_text(sensor.angular_velocity)));
     }
   }
-  // The best answer against the best one that says something else; more shots where it is close.
+  // The best solution against the best different one; more shots if it is close.
   const double resolved = kTwoPi / (2.0 * std::max(1e-3, window.start_of(answers.front()).reach));
   const auto rival = std::find_if(answers.begin() + 1, answers.end(), [&](const Answer& other) {
     return !same_answer(answers.front(), other, resolved);
@@ -632,8 +632,8 @@ Eigen::Vector3d mean_direction(const AngleSeries& series) {
   return sum.norm() > 0 ? sum.normalized() : Eigen::Vector3d::UnitX();
 }
 
-/// The frame about whose X axis the lines turn, to a degree or so: the constant of the fit says by
-/// how much the axis was missed.
+/// The frame whose X axis the lines turn about, to a degree or so: the constant of the fit gives
+/// the offset from the axis.
 Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sensor,
                              const StartOptions& options, StartFindings& found) {
   const Eigen::Vector3d middle = mean_direction(head);
@@ -655,7 +655,7 @@ Eigen::Matrix3d turned_frame(const AngleSeries& head, const sensors::Sensor& sen
     if (!best) break;
     const Complex c = best->constant;
     const double size = std::abs(c);
-    if (size > 0.5) break;  // no axis: the shots say nothing of it
+    if (size > 0.5) break;  // no axis: the shots do not determine it
     const Eigen::Vector3d axis =
         frame * Eigen::Vector3d(std::sqrt(1.0 - size * size), c.real(), c.imag());
     frame = recording_from_sensor(
@@ -701,7 +701,7 @@ Start new_start(const AngleSeries& head, const sensors::Sensor& sensor, const St
   const Answer answer = find_in_window(window, sensor, hypotheses, turned);
   Start start = window.start_of(answer);
   if (turned || options.turned || options.free.empty()) return start;
-  // A small turn leaves the shots in the field of view and shows in the residuals alone.
+  // A small turn leaves the shots in the field of view and shows only in the residuals.
   Start free = window.start_of(window.answer(answer.trial, kEnoughShots, true));
   const TrainLayout layout = sensor.train.layout();
   const bool leans = layout.has_bearing(static_cast<std::size_t>(layout.elements) - 1);

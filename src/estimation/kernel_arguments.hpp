@@ -8,7 +8,7 @@
 
 namespace risley::estimation {
 
-// What the kernels over the shots of a series have in common. Plain, see optics/batch_kernel.hpp
+// Arguments common to the kernels over the shots of a series. Plain, see optics/batch_kernel.hpp
 // for why; kernel_call.hpp fills it in.
 
 /// A train and its free parameters.

@@ -12,7 +12,7 @@
 
 namespace risley::estimation {
 
-/// Places of the free parameters one behind the other, as kernels take them.
+/// Places of the free parameters one after the other, for kernels.
 struct FreePlaces {
   std::vector<int> begin{0}, places;
 
@@ -24,7 +24,7 @@ struct FreePlaces {
   }
 };
 
-/// Points into both, which have to stay where they are.
+/// Points into both, which must stay at their addresses.
 inline TrainArguments arguments_of(const PrismTrain& train, const FreePlaces& free) {
   return {train.parameters().data(),
           train.face_order().data(),

@@ -15,12 +15,12 @@
 
 namespace risley::estimation {
 
-/// How loose a rotor is at the first knot of a stretch, about the linearisation point: so wide that
-/// it weighs nothing against the first milliseconds of data.
+/// Uncertainty of a rotor at the first knot of a stretch, about the linearisation point: so wide
+/// that it has negligible weight against the first milliseconds of data.
 inline constexpr double kFirstAngleSigma = 0.5;
 inline constexpr double kFirstSpeedSigma = radians_from_degrees(100.0);
 inline constexpr double kFirstAccelerationSigma = radians_from_degrees(1000.0);
-/// Of a rotor without jerk, whose acceleration is zero: only there to keep covariances definite.
+/// Of a rotor without jerk, whose acceleration is zero: only needed to keep covariances definite.
 inline constexpr double kNoAccelerationSigma = 1e-9;
 
 inline double first_acceleration_sigma(const RotorProcess& process) {
@@ -37,8 +37,8 @@ inline Eigen::Matrix3d rotor_curvature(const double* powers) {
   return h;
 }
 
-/// Of the states of N rotors at a knot; N = Eigen::Dynamic stands for any number up to kMaxPrisms
-/// that is only known when running, still without memory from the heap.
+/// Of the states of N rotors at a knot; N = Eigen::Dynamic represents any number up to kMaxPrisms
+/// that is only known at run time, still without heap memory.
 template <int N>
 inline constexpr int kKnotStates = N == Eigen::Dynamic ? Eigen::Dynamic : 3 * N;
 template <int N>
@@ -65,7 +65,7 @@ KnotSquare<N> knot_curvature(const NormalEquations& equations, std::size_t knot)
   return h;
 }
 
-/// One rotor's three rows, from `first` on, moved on by dt: rows := F rows.
+/// One rotor's three rows, from `first` on, advanced by dt: rows := F rows.
 template <class Matrix>
 void advance_rows(Matrix& m, Eigen::Index first, double dt) {
   for (Eigen::Index j = 0; j < m.cols(); ++j) {
@@ -73,9 +73,9 @@ void advance_rows(Matrix& m, Eigen::Index first, double dt) {
     m(first + 1, j) += dt * m(first + 2, j);
   }
 }
-/// By how much states that move on by dt miss others: F from - to. Angles count the turns of hours,
-/// so they are subtracted before anything is added: what is rounded at a million radians and summed
-/// over a million knots would be as large as the sigma of a rotor that runs evenly.
+/// Difference between states advanced by dt and others: F from - to. Angles count the turns of
+/// hours, so they are subtracted before anything is added: what is rounded at a million radians and
+/// summed over a million knots would be as large as the sigma of a rotor that runs evenly.
 template <class Vector>
 Vector motion_offset(const Vector& from, const Vector& to, double dt) {
   Vector offset = from - to;
@@ -116,7 +116,7 @@ inline Eigen::Matrix3d step_noise(const RotorProcess& process, double dt) {
   return noise;
 }
 
-/// The covariance of the states of all rotors, moved on by dt.
+/// The covariance of the states of all rotors, advanced by dt.
 /// @param process_of  of a rotor
 template <class Square, class ProcessOf>
 void predict_covariance(Square& p, double dt, const ProcessOf& process_of) {
@@ -128,7 +128,7 @@ void predict_covariance(Square& p, double dt, const ProcessOf& process_of) {
 }
 
 /// A column of a matrix that stays in registers while products are added to it, instead of going to
-/// memory and back for each; where the number of rows has no bound, the matrix's own.
+/// memory and back for each; if the number of rows has no bound, the matrix's own.
 template <class Matrix>
 using HeldColumn =
     std::conditional_t<Matrix::MaxRowsAtCompileTime == Eigen::Dynamic, typename Matrix::ColXpr,
@@ -151,7 +151,7 @@ void subtract_product(const A& a, const B& b, Out& out) {
   add_product(a, -b, out);
 }
 
-/// Lower Cholesky factor, in place. Whole columns are worked on: what stands above the diagonal is
+/// Lower Cholesky factor, in place. Whole columns are processed: the part above the diagonal is
 /// never used and becomes 0.
 /// @return false when the matrix is not positive definite
 template <class Square>
@@ -168,8 +168,8 @@ bool cholesky(Square& a) {
   return true;
 }
 
-/// Moves the covariance of a prior past information H without inverting either:
-/// (P^-1 + H)^-1 = W W^T with P = L L^T, I + L^T H L = R R^T, W^T = R^-1 L^T.
+/// Updates the covariance of a prior with information H without inverting either: (P^-1 + H)^-1 = W
+/// W^T with P = L L^T, I + L^T H L = R R^T, W^T = R^-1 L^T.
 /// @param[out] log_determinant  of I + P H, when wanted
 /// @return false when P is not positive definite
 template <class Square>

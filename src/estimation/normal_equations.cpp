@@ -19,8 +19,8 @@ namespace {
 
 static_assert(kRotorStates == kStatesPerRotor);
 
-/// Knots that one task sums up: fixed, so that sums do not depend on the number of threads. Their
-/// shots, some ten thousand, stay in the processor's own memory.
+/// Knots summed by one task: fixed, so that sums do not depend on the number of threads. Their
+/// shots, some ten thousand, stay in the processor's cache.
 constexpr std::size_t kBlockKnots = 125;
 
 void require_knots(std::size_t shots, const RotorTrajectory& knots) {
@@ -41,8 +41,8 @@ void require_shots(const AngleSeries& series, const ShotColumns& columns) {
   require_length_or_none("outlier", columns.outlier.size(), series.size());
 }
 
-/// Whether some knot has a beam that the train does not have. Others are not looked at: a rotor is
-/// tracked through a recording a knot at a time.
+/// Whether some knot has a beam that the train does not have. Others are not checked: a rotor is
+/// tracked through a recording knot by knot.
 bool has_unknown_beam(const AngleSeries& series, const RotorTrajectory& knots,
                       const PrismTrain& train) {
   if (series.beam.empty()) return false;
@@ -131,7 +131,7 @@ class BlockSums {
     counts_[block] = kernel_(mine);
   }
 
-  /// Adds the blocks' sums up, once all are there.
+  /// Sums the blocks, once all are complete.
   void finish() {
     const int n = equations_.free;
     const auto free = static_cast<std::size_t>(n);
@@ -225,7 +225,7 @@ void accumulate(const PackedSeries& series, const RotorTrajectory& knots, const 
         own.azimuth_residual.resize(shots.size());
         own.zenith_residual.resize(shots.size());
         own.outlier.resize(shots.size());
-        std::size_t row = 0;  // behind those of the knots so far
+        std::size_t row = 0;  // after those of the knots so far
         for (std::size_t knot = served.begin; knot < served.end; ++knot) {
           for (; row < knots.first_shot[knot] - shots.begin; ++row) {
             own.azimuth_residual[row] = own.zenith_residual[row] =

@@ -40,7 +40,8 @@ struct Group {
     alignas(64) double lanes[5][kLanes];
     const std::int64_t origin = a.knot_time_ns[knot];
     const std::size_t first = shots.first;
-    if (shots.places == nullptr && shots.count == kLanes) {  // loops that the compiler can widen
+    if (shots.places == nullptr && shots.count == kLanes) {  // loops that the compiler can
+                                                             // vectorise
       for (std::size_t i = 0; i < kLanes; ++i) {
         lanes[0][i] = 1e-9 * static_cast<double>(a.time_ns[first + i] - origin);
       }
@@ -68,15 +69,15 @@ struct Group {
   }
 };
 
-/// The shots of a knot, emitter by emitter: what one emitter's shots do not depend on need not be
-/// summed for them.
+/// The shots of a knot, emitter by emitter: derivatives that are zero for an emitter's shots need
+/// not be summed for them.
 class ShotOrder {
  public:
-  static constexpr std::size_t kMost = 1024;  ///< shots that are put in order together
+  static constexpr std::size_t kMost = 1024;  ///< number of shots sorted together
 
   ShotOrder(const std::uint8_t* beam, int emitters) : beam_(beam), emitters_(emitters) {}
 
-  /// @param end  at most kMost behind begin
+  /// @param end  at most kMost after begin
   void take(std::size_t begin, std::size_t end) {
     first_ = begin;
     if (beam_ == nullptr || emitters_ == 1) {
@@ -95,7 +96,7 @@ class ShotOrder {
     }
   }
 
-  /// One behind the last place of an emitter; its first is behind those of the one before.
+  /// End of the places of an emitter; its first one follows those of the previous emitter.
   std::size_t end(std::size_t emitter) const { return ends_[emitter]; }
   Shots group(std::size_t place, std::size_t end) const {
     const std::size_t count = end - place < kLanes ? end - place : kLanes;
@@ -110,8 +111,8 @@ class ShotOrder {
   std::uint32_t places_[kMost] = {};
 };
 
-/// Weights of a group's angles. Rounding is mostly the same from shot to shot, and division and
-/// root are slow, so they are only done anew when it changes.
+/// Weights of a group's angles. Rounding is usually the same from shot to shot, and division and
+/// root are slow, so they are only repeated when it changes.
 class Weights {
  public:
   Weights(double azimuth_noise_variance, double zenith_noise_variance)
@@ -142,7 +143,7 @@ class Weights {
 /// Groups that take each step of the model together: see AngleLinearisations.
 constexpr std::size_t kGroups = 8;
 
-/// Columns of a row at most: a free parameter per place, and the residual.
+/// Most columns of a row: a free parameter per place, and the residual.
 template <TrainLayout N>
 constexpr std::size_t kMostColumns = EmitterLanes<Batch, N>::kPlaces + 1;
 
@@ -151,8 +152,8 @@ constexpr std::size_t kMostColumns = EmitterLanes<Batch, N>::kPlaces + 1;
 template <TrainLayout N>
 using Products = ColumnProducts<Batch, kMostColumns<N>, 3>;
 
-/// The columns that the shots of one emitter have: the free parameters that they depend on, then
-/// the residual, which counts as one parameter more.
+/// The columns for the shots of one emitter: the free parameters that they depend on, then the
+/// residual, which counts as one parameter more.
 template <TrainLayout N>
 struct OwnColumns {
   std::size_t count = 0;                       ///< residual included
@@ -238,7 +239,7 @@ struct Rows {
     first[stride + own.count - 1] = zenith;
   }
 
-  /// Lanes that are not to count become zero in everything that is summed.
+  /// Lanes to ignore become zero in everything that is summed.
   void clear_lanes(std::size_t row, std::size_t count, const Lanes& good) {
     const Batch zero(0.0);
     for (Batch& angle : angles[row]) angle = xsimd::select(good, angle, zero);
@@ -365,7 +366,7 @@ class Accumulation {
         shots_by_emitter_(a.beam, a.emitters),
         firing_(a.beam == nullptr ? 1 : static_cast<std::size_t>(a.emitters)),
         weights_(a.azimuth_noise_variance, a.zenith_noise_variance),
-        // A shot that is out costs as much as one can.
+        // A rejected shot costs as much as the maximum.
         lost_(a.softening * a.cut > 1.0 ? 1.0 / a.softening : a.cut),
         cost_(0.0),
         products_(0) {
@@ -480,8 +481,8 @@ class Accumulation {
     products_.add(rows_.columns, rows_.stride, 2 * groups);
   }
 
-  /// Residuals, weights and losses of a group, and the beginning of its way back, from seeds over
-  /// sigma: so all derivatives come out divided by it, which saves a product for each.
+  /// Residuals, weights and losses of a group, and the start of its reverse pass, from seeds over
+  /// sigma: so all derivatives are divided by it, which saves a product for each.
   void compare(std::size_t g) {
     const Batch one(1.0);
     const Group& group = observed_[g];
@@ -502,7 +503,7 @@ class Accumulation {
     rows_.set_residuals(g, own_[emitter_], share * normalised_azimuth, share * normalised_zenith);
     const AngleSeeds<Batch> seeds = angle_seeds(direction);
     model_.begin(g, {azimuth_scale * seeds.azimuth, zenith_scale * seeds.zenith});
-    // Comparison with NaN is false: a beam that does not get through counts as an outlier.
+    // Comparison with NaN is false: a blocked beam counts as an outlier.
     Lanes good = chi2 <= Batch(a_.cut);
     Batch loss = xsimd::select(good, chi2 * share, lost_);
     all_good_[g] = shots.count == kLanes && xsimd::all(good);
@@ -540,7 +541,7 @@ class Accumulation {
     }
   }
 
-  /// What a turn of the whole frame does to both angles, divided by sigma as the rest.
+  /// Effect of a turn of the whole frame on both angles, divided by sigma like the rest.
   void add_turn(std::size_t g) {
     constexpr auto kYaw = static_cast<std::size_t>(place::frame_yaw(N));
     constexpr auto kPitch = static_cast<std::size_t>(place::frame_pitch(N));

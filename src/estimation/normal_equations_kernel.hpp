@@ -29,7 +29,7 @@ struct NormalEquationArguments : TrainArguments, ShotArguments {
   double azimuth_noise_variance = 0, zenith_noise_variance = 0;
   bool turned = false;   ///< some place is one of the frame's turn
   double softening = 0;  ///< shots weigh 1 / (1 + softening chi2)^2
-  double cut = 0;        ///< shots with a larger chi2 weigh nothing
+  double cut = 0;        ///< shots with a larger chi2 have no weight
 
   double* curvature = nullptr;         ///< [knots][prisms (prisms+1)/2][kTimePowers]
   double* coupling = nullptr;          ///< [knots][prisms][3][free]

@@ -26,17 +26,17 @@ namespace risley::estimation {
 
 namespace {
 
-/// Of the work, that the shots' equations and the smoother take.
+/// Share of the work due to the shots' equations and the smoother.
 constexpr double kShotsShare = 0.5;
 constexpr std::size_t kMostPlannedShots = 600000;
 constexpr double kMostDuration = 2000.0;
-/// Correlations from here on make two quantities hard to separate.
+/// From this correlation on two quantities are hard to separate.
 constexpr double kStrong = 0.9;
-/// From here on one is as good as the other.
+/// From this correlation on they are equivalent.
 constexpr double kTwin = 0.98;
 
-/// Every parameter of the prisms that exists. Those of all prisms together stand for each prism's
-/// own where the prisms share a value and none of them is free alone.
+/// Every parameter of the prisms that exists. Those of all prisms together represent each prism's
+/// own if the prisms share a value and none of them is free alone.
 std::vector<FreeParameter> all_parameters(const PrismTrain& train,
                                           const std::vector<FreeParameter>& free) {
   const TrainShape shape = train.shape();
@@ -63,7 +63,7 @@ std::vector<FreeParameter> all_parameters(const PrismTrain& train,
   return free_parameters(names, shape);
 }
 
-/// The parameter of a list that a free one is; -1: none.
+/// The parameter of a list that corresponds to a free one; -1: none.
 Eigen::Index row_of(const FreeParameter& parameter, const std::vector<FreeParameter>& all) {
   const auto found = std::find_if(all.begin(), all.end(), [&](const FreeParameter& one) {
     return one.places == parameter.places;
@@ -183,7 +183,7 @@ Observability analyse(const NormalEquations& equations, const RotorTrajectory& k
         bound_covariance(information(rows, rows), scale(rows));
     if (!covariance) {
       found.sigma = std::numeric_limits<double>::infinity();
-      // What it cannot be separated from shows under the wide priors.
+      // Its inseparable partners show under the wide priors.
       for (Eigen::Index j = 0; j < result.correlation.rows(); ++j) {
         if (j == quantity) continue;
         found.twins.emplace_back(result.correlation_names[static_cast<std::size_t>(j)],
@@ -276,7 +276,7 @@ Observability observability_of_plan(const ObservabilityPlan& plan, const Progres
   if (process.empty()) process.assign(angles.size(), kTypicalRotor);
   const std::vector<FreeParameter> all = all_parameters(train, plan.free);
   NormalEquations equations;
-  // Fewer shots count for all of them.
+  // Fewer shots represent all of them.
   const double share = shots / static_cast<double>(count);
   const ShotWeights weights{equal_noise(std::sqrt(variance / share)), 0.0};
   accumulate(series, knots, train, all, weights, equations);
@@ -325,12 +325,11 @@ std::vector<std::string> observability_words(const Observability& observability,
     }
     const std::string twin = fmt::format("{} cannot be separated from {}", quantity.name, twins);
     if (!std::isfinite(sigma)) {
-      words.push_back(twin +
-                      ", however long a sensor with these parameters records: keep it fixed");
+      words.push_back(twin + ", however long a sensor with these parameters records: keep it held");
       continue;
     }
     if (quantity.free || std::abs(quantity.twins.front().second) < kStrong) continue;
-    // What would be worth freeing it: a hundredth of a degree, or 1e-5 of an index.
+    // Worth freeing it: a hundredth of a degree, or 1e-5 of an index.
     const double target = info.unit == "1" ? 1e-5 : 0.01;
     const double needed = observability.duration * std::pow(sigma / target, 2);
     const std::string seconds =

@@ -18,7 +18,7 @@ using Eigen::Index;
 /// A combination that keeps more of its prior variance than this was not measured.
 constexpr double kMostPriorVariance = 0.3 * 0.3;
 
-/// Orthonormal columns: the combinations that a covariance says were measured.
+/// Orthonormal columns: the measured combinations according to a covariance.
 Eigen::MatrixXd measured_combinations(const Eigen::MatrixXd& covariance) {
   const algebra::PrincipalAxes axes = algebra::principal_axes(covariance);
   const auto count = std::count_if(axes.values.begin(), axes.values.end(),
@@ -26,11 +26,11 @@ Eigen::MatrixXd measured_combinations(const Eigen::MatrixXd& covariance) {
   return axes.vectors.leftCols(count);
 }
 
-/// Shorter parts of a constant in what was measured are rounding.
+/// Shorter parts of a constant in the measured space are rounding.
 constexpr double kLeastMeasured = 1e-3;
 
-/// Probability that chi-squared, over a variance factor that the scatter of pieces gave, exceeds a
-/// value: then F's distribution.
+/// Probability that chi-squared, over a variance factor estimated from the scatter of pieces,
+/// exceeds a value: then F's distribution.
 double tail(double chi2, double combinations, const PieceScatter& scatter) {
   if (scatter.variance_factor > 1 && scatter.degrees_of_freedom > 0) {
     return Eigen::numext::betainc(0.5 * scatter.degrees_of_freedom, 0.5 * combinations,
@@ -89,8 +89,7 @@ ConstantsDifference difference_of(const ConstantsEstimate& a, const ConstantsEst
   result.chi2 = off.dot(weighted);
   result.combinations = static_cast<int>(measured.cols());
   result.joint_p_value = tail(result.chi2, result.combinations, scatter);
-  // About constant i alone, the measured combinations say u = row i of them: off = change u +
-  // noise.
+  // On constant i alone, the measured combinations give u = row i of them: off = change u + noise.
   result.change = result.change_sigma =
       Eigen::VectorXd::Constant(measured.rows(), std::numeric_limits<double>::quiet_NaN());
   double best = 0;

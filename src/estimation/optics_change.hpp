@@ -13,17 +13,17 @@
 
 namespace risley::estimation {
 
-/// Constants as shots determine them: a posterior mean and its covariance, the prior counted once.
+/// Constants as determined by shots: a posterior mean and its covariance, the prior counted once.
 struct ConstantsEstimate {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };
 
-/// All pieces together, each of which saw the same constants: information adds up.
+/// All pieces together, which share the same constants: information adds up.
 /// @param pieces  at least one
 ConstantsEstimate pooled(const std::deque<ConstantsEstimate>& pieces, std::size_t newest);
 
-/// By how much the scatter of pieces about their mean exceeds what their covariances say, over the
+/// Factor by which the scatter of pieces about their mean exceeds their covariances, over the
 /// combinations that every piece measures.
 struct PieceScatter {
   double variance_factor = 1;     ///< never below 1
@@ -31,21 +31,22 @@ struct PieceScatter {
 };
 PieceScatter piece_scatter(const std::deque<ConstantsEstimate>& pieces);
 
-/// How surprising a difference is where nothing changed.
+/// How improbable a difference is without a change.
 struct ConstantsDifference {
   double chi2 = 0;       ///< of all combinations
   int combinations = 0;  ///< that both sides measure
   double joint_p_value = 1;
-  /// Of each constant, by how much it changed if no other did; NaN if it was not measured.
+  /// For each constant, its change if no other changed; NaN if it was not measured.
   Eigen::VectorXd change, change_sigma;
-  std::optional<Eigen::Index> constant;  ///< whose change alone explains the difference best
+  std::optional<Eigen::Index> constant;  ///< the one whose change alone best explains the
+                                         ///< difference
   double single_p_value = 1;             ///< of as good an explanation by any constant
-  double p_value = 1;  ///< of either; chance gives a smaller one at most as often as it says
+  double p_value = 1;  ///< of either; an upper bound of the frequency of smaller values by chance
 };
 /// Compares two independent estimates: all combinations of constants together, and each constant as
-/// the only one that changed. Combinations of which the priors say as much as the shots do not
-/// count.
-/// @param also     covariance of the difference beside that of both estimates
+/// the only one that changed. Combinations known from the priors as well as from the shots are
+/// ignored.
+/// @param also  covariance of the difference in addition to that of both estimates
 /// @param scatter  multiplies the covariances of both estimates; chi2 then follows F's distribution
 ConstantsDifference difference_of(const ConstantsEstimate& a, const ConstantsEstimate& b,
                                   const Eigen::MatrixXd& also, const PieceScatter& scatter);

@@ -15,7 +15,7 @@
 namespace risley::estimation {
 namespace {
 
-/// Rotors of a start as a trajectory has them at its time.
+/// Rotors of a start as a trajectory at its time.
 void take_rotors(Start& start, const RotorTrajectory& motion) {
   const auto away = [&](std::size_t knot) {
     return std::abs(motion.time_ns[knot] - start.time_ns);

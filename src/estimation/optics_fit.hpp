@@ -10,14 +10,14 @@
 
 namespace risley::estimation {
 
-/// How well the parameters of a fit are known beforehand.
+/// Prior uncertainty of the parameters of a fit.
 enum class Priors { of_the_type, wide };
 
-/// Fits train and rotors to shots whose rotors turn evenly, so that they cannot follow shots that
-/// are not where they are believed to be.
+/// Fits train and rotors to shots with evenly turning rotors, so that they cannot follow shots with
+/// wrong times.
 /// @param series  in the sensor's frame
-/// @return the start at its own time with what was found, `residual_rms` included; nothing if the
-///         shots do not determine it
+/// @return the start at its own time with the fitted values, `residual_rms` included; nothing if
+/// the shots do not determine it
 std::optional<Start> fit_optics(const AngleSeries& series, const Start& start,
                                 const sensors::Sensor& sensor, Priors priors);
 

@@ -37,7 +37,7 @@ std::vector<ShotRange> blocks_of(ShotRange range) {
   return blocks;
 }
 
-/// Of times that do not decrease: the longest step of which all are multiples.
+/// Of non-decreasing times: the longest step of which all are multiples.
 std::int64_t common_step(const std::vector<std::int64_t>& time_ns) {
   std::int64_t step = 0;
   for (const std::int64_t time : time_ns) {
@@ -88,8 +88,8 @@ PackedSeries::Angles::Angles(const std::vector<double>& all, const Mostly<float>
     value = all;
     return;
   }
-  // What counts is that a number stands for one value; how it came about does not. Added to kWhole,
-  // a number is rounded to the integer in its lowest bits.
+  // Only the correspondence of numbers and values matters, not its origin. Added to kWhole, a
+  // number is rounded to the integer in its lowest bits.
   constexpr double kWhole = 0x1.8p52;
   const double per_step = 1.0 / std::sqrt(12.0 * static_cast<double>(grid.variance));
   number.resize(all.size());
@@ -287,7 +287,7 @@ void PackedSeries::append(const PackedSeries& other, std::span<const std::size_t
   if (size() == 0) has_ranges_ = other.has_ranges_;
   require_length("range", other.has_ranges_ ? rows.size() : 0, has_ranges_ ? rows.size() : 0);
   while (!rows.empty()) {
-    // Those of one block, as many as the tail still takes.
+    // Those of one block, as many as fit the tail.
     const std::size_t block = rows.front() / kBlockRows, before = tail_.size();
     const std::size_t most = std::min(rows.size(), kBlockRows - before);
     std::size_t count = 1;

@@ -30,16 +30,16 @@ namespace {
 
 using recordings::kNoPlace;
 
-/// A shot has a place when every other one is worse by this difference of chi2.
+/// A shot has a place if every other one is worse by this difference of chi2.
 constexpr double kSurePlace = 12.0;
 /// Losses of single shots end at 36.
 constexpr double kPlaceSoftening = softening_at(1.5);
-/// Noise is not taken below this share of the step from shot to shot.
+/// Lower bound of the noise, as a share of the step from shot to shot.
 constexpr double kLeastPlaceNoise = 0.2;
 /// A packet whose noise exceeds the usual one by this factor does not fit.
 constexpr double kPoorPacket = 4.0;
 
-/// What one packet says of the rotors.
+/// Information of one packet on the rotors.
 struct PacketFit {
   RotorState state;
   std::vector<std::uint8_t> place;  // of its shots
@@ -51,7 +51,7 @@ struct PacketFit {
 class PacketFitter : private BlockFit {
  public:
   /// @param series   in the sensor's frame
-  /// @param evident  places that shots are known to have, or kNoPlace
+  /// @param evident  known places of shots, or kNoPlace
   PacketFitter(const PacketShots& shots, const AngleSeries& series,
                const std::vector<std::uint8_t>& evident, double rate, const PrismTrain& train,
                std::vector<std::uint8_t> firing_order)
@@ -68,7 +68,7 @@ class PacketFitter : private BlockFit {
 
   std::size_t begin(std::size_t packet) const { return first_[packet]; }
   std::size_t size(std::size_t packet) const { return first_[packet + 1] - first_[packet]; }
-  /// Whether the place of any of its shots is.
+  /// Whether the place of any of its shots is evident.
   bool is_evident(std::size_t packet) const {
     return std::any_of(evident_.begin() + static_cast<std::ptrdiff_t>(begin(packet)),
                        evident_.begin() + static_cast<std::ptrdiff_t>(begin(packet + 1)),
@@ -111,7 +111,7 @@ class PacketFitter : private BlockFit {
     }
   }
 
-  /// Finds the likeliest places of the loaded shots and gives them their times and emitters.
+  /// Finds the likeliest places of the loaded shots and assigns their times and emitters.
   void place_shots(std::size_t packet, const RotorState& state) {
     const auto places = static_cast<std::size_t>(shots_.places);
     const std::size_t count = block_.size();
@@ -209,15 +209,15 @@ class PacketFitter : private BlockFit {
   std::vector<double> lead_;
 };
 
-/// A packet at which the rotors are known.
+/// A packet with known rotors.
 struct PacketAnchor {
   Start start;  // the series is in its frame; its residuals are those of packets
   std::vector<std::uint8_t> firing_order;
   std::size_t packet = 0;
-  double speed_share = 2e-4;  // of the speeds, by which they may be off
+  double speed_share = 2e-4;  // possible error of the speeds
 };
 
-/// The series with times and beams of places.
+/// The series with times and beams from places.
 AngleSeries placed_series(const PacketShots& shots, const AngleSeries& series,
                           const std::vector<std::uint8_t>& place, double rate,
                           const std::vector<std::uint8_t>& firing_order) {
@@ -239,7 +239,7 @@ AngleSeries head_of(const AngleSeries& series) {
   return rows_of(series, 0, end);
 }
 
-/// Speeds and angles about as good as times in the middle of what is possible allow.
+/// Speeds and angles, about as accurate as times from the middle of the possible places allow.
 std::optional<Start> rough_start(const AngleSeries& head, const sensors::Sensor& sensor,
                                  bool mirrored) {
   StartOptions options;
@@ -268,7 +268,7 @@ std::vector<std::size_t> fullest_packets(const PacketShots& shots, const PacketF
   return result;
 }
 
-/// The order of the emitters and the mirror image that the fullest packets fit.
+/// The order of the emitters and the mirror image that fit the fullest packets.
 std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double rate,
                                                const sensors::Sensor& sensor,
                                                const Progress& progress) {
@@ -300,7 +300,7 @@ std::optional<PacketAnchor> find_packet_anchor(const PacketShots& shots, double 
       if (packets.empty()) break;
       for (const std::size_t packet : packets) {
         progress.check();
-        // Times that are only known roughly leave all rotors late by one time.
+        // Times known only roughly delay all rotors by a common time.
         std::vector<PacketFit> fits;
         for (int delay = -kDelays; delay <= kDelays; ++delay) {
           Start late = *start;
@@ -375,7 +375,7 @@ std::optional<PacketAnchor> find_evident_anchor(const PacketShots& shots,
   usual.sensor = sensor;
   StartOptions options;
   options.free = chosen_parameters(usual);
-  // Free emitters could take over each other's directions.
+  // Free emitters could exchange their directions.
   std::erase_if(options.free, [emitters](const FreeParameter& one) {
     return emitters > 1 && one.name.starts_with("incident_beam");
   });
@@ -420,14 +420,14 @@ std::optional<PacketAnchor> find_evident_anchor(const PacketShots& shots,
   return best;
 }
 
-/// What following the rotors from packet to packet came to.
+/// Result of following the rotors from packet to packet.
 struct FollowedPackets {
   std::vector<std::uint8_t> place;  // of each shot, or kNoPlace
   std::size_t placed = 0;
   RotorState anchor;
   std::size_t evident = 0, contradicting = 0;  // packets
 
-  /// Whether the rotors agreed with what is evident, and placed most of the rest.
+  /// Whether the rotors agreed with the evident places, and placed most of the rest.
   bool is_sound() const {
     constexpr double kMostContradicting = 0.05;
     return 2 * placed > place.size() &&
@@ -440,7 +440,7 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
                                const PacketAnchor& anchor, const Progress& progress) {
   constexpr double kAnchorAngle = radians_from_degrees(1.0);
   constexpr double kLearnedShare = 0.03;
-  // Of a single emitter: chi2 of a place further, and of what is no motion of rotors.
+  // For a single emitter: chi2 of one place further, and of motion that is not the rotors'.
   constexpr double kOtherPlace = 36.0, kOtherMotion = 60.0;
   constexpr std::size_t kFewestAnew = 24, kFewestJudged = 4, kFewestLearned = 24;
   const double step = usual_step(anchor.start, rate);
@@ -451,7 +451,7 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
   }
   PacketFitter fitter(shots, series, evident, rate, anchor.start.train, anchor.firing_order);
   const bool single = anchor.firing_order.size() == 1;
-  // Shots of the same emitter stand so far apart.
+  // Spacing of shots of the same emitter.
   const double spacing = step * static_cast<double>(anchor.firing_order.size());
   FollowedPackets result;
   result.place.assign(series.size(), kNoPlace);
@@ -506,7 +506,7 @@ FollowedPackets follow_packets(const PacketShots& shots, const AngleSeries& seri
   return result;
 }
 
-/// The shots as they were before their coordinates were cut off.
+/// The shots before their coordinates were truncated.
 AngleSeries before_cut(AngleSeries series) {
   for (std::size_t i = 0; i < series.size(); ++i) {
     const double step = std::sqrt(12.0 * static_cast<double>(series.zenith_rounding_variance[i]));
@@ -558,7 +558,7 @@ GuessedPlaces guess_places(const PacketShots& shots, const std::vector<std::uint
   GuessedPlaces result{known, 0};
   if (known.empty()) result.place.assign(count, kNoPlace);
   require_length("known places", result.place.size(), count);
-  // Highest place that each shot may have, from the last one on.
+  // Highest possible place of each shot, from the last one on.
   std::vector<int> highest(count);
   for (std::size_t i = count; i-- > 0;) {
     highest[i] = shots.precedent[i] + shots.places - shots.packets[shots.packet[i]].shots;

@@ -19,7 +19,7 @@ namespace {
 /// Short recordings are cut into enough windows for their rotors' wander to show.
 constexpr double kFewestWindows = 50.0;
 constexpr std::size_t kFewestWindowShots = 8;
-/// How far the other rotors may be from the linearisation within a window, before its data.
+/// Distance of the other rotors from the linearisation within a window, before its data.
 constexpr double kOtherSigma[] = {radians_from_degrees(1.0), radians_from_degrees(300.0),
                                   radians_from_degrees(1e5)};
 /// Searched range of white acceleration, deg/s/sqrt(s), and white jerk, deg/s^2/sqrt(s), decades.
@@ -73,7 +73,7 @@ RotorWindows::RotorWindows(const NormalEquations& equations, const RotorTrajecto
   using Vector = KnotVector<Eigen::Dynamic>;
   const int prisms = at.prisms;
   const Eigen::Index states = at.states();
-  // Own states first, the others behind them.
+  // Own states first, followed by the others.
   std::vector<int> order{rotor};
   for (int k = 0; k < prisms; ++k) {
     if (k != rotor) order.push_back(k);
@@ -198,8 +198,8 @@ std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
       best = process_of(kNone, jerk_alone);
       best_cost = value;
     }
-    // Both together: each is then less than it would have to be alone. They trade places slowly, so
-    // several rounds, as long as that promises to be worth it.
+    // Both together: each is then smaller than it would have to be alone. They trade off slowly, so
+    // several rounds are made, as long as the gain is worth it.
     double walk = walk_alone, jerk = jerk_alone, both = std::numeric_limits<double>::infinity();
     for (int round = 0; round < kRounds; ++round) {
       const double before = both;

@@ -74,7 +74,7 @@ class MapMaker {
   double squares_azimuth_ = 0, squares_zenith_ = 0;
 };
 
-/// Map of all used shots. @param place_of  (solved shots, one of them) where it is counted
+/// Map of all used shots. @param place_of  (solved shots, one of them) its cell
 template <class PlaceOf>
 ResidualMap map_of(const Estimate& estimate, double cell, const PlaceOf& place_of) {
   MapMaker all(cell);

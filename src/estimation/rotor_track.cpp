@@ -21,7 +21,7 @@
 namespace risley::estimation {
 namespace {
 
-/// Of the start about the truth, where only few shots decided it.
+/// Uncertainty of the start if only few shots decided it.
 constexpr double kStartAngleSigma = radians_from_degrees(5.0);
 constexpr double kStartSpeedSigma = radians_from_degrees(100.0);
 /// A prediction this uncertain may lie in a neighbouring minimum: then a grid of angles is tried.
@@ -43,7 +43,7 @@ class Tracker {
     usual_level_ = std::max(1.0, start.residual_rms / noise.rms());
   }
 
-  /// Takes the shots of some rows into a state. @return whether there were any
+  /// Updates a state with the shots of some rows. @return whether there were any
   bool update(RotorState& state, ShotRange rows) {
     if (rows.size() == 0) return false;
     const RotorState predicted = state;
@@ -54,7 +54,7 @@ class Tracker {
     if (uncertain > kLostSigma) look_around(state, rows, 3.0 * uncertain);
     if (!improve(state, predicted, rows)) return false;
     if (!lost(rows)) return true;
-    // Nothing of the prediction is true, such as that of a piece whose times came again.
+    // The prediction is invalid, such as that of a piece whose times repeat.
     RotorState anew = predicted;
     for (int k = 0; k < prisms_; ++k) anew.covariance(3 * k, 3 * k) = kPi * kPi;
     const RotorState loose = anew;
@@ -92,7 +92,7 @@ class Tracker {
     return true;
   }
 
-  /// Residuals that no noise and no wander of the rotors explain.
+  /// Residuals not explained by noise or wandering rotors.
   bool lost(ShotRange rows) const {
     constexpr double kLostResidual = radians_from_degrees(1.0);
     return rows.size() >= kFewestShots && !(scale() < kLostResidual);
@@ -104,7 +104,7 @@ class Tracker {
                         {residuals_.data() + series_.size() + rows_.begin, rows_.size()});
   }
 
-  /// Scale of the residuals over the noise; that of the start where shots are few.
+  /// Scale of the residuals over the noise; that of the start if shots are few.
   double level() const {
     if (rows_.size() < kFewestShots) return usual_level_;
     return std::clamp(scale() / weights_.angle_noise.rms(), 1.0, 1e6);
@@ -167,7 +167,7 @@ void track_rotors(const AngleSeries& series, ShotRange shots, const Start& start
         static_cast<std::size_t>(std::lower_bound(from, to, middle - step_ns / 2) - begin),
         static_cast<std::size_t>(std::lower_bound(from, to, middle + step_ns / 2) - begin)};
   };
-  // Windows do not bend: what a rotor's speed changes within one is noise of the next.
+  // Windows are straight: the change of a rotor's speed within one is noise of the next.
   RotorState at_start = state_of(start, kStartAngleSigma, [](double) { return kStartSpeedSigma; });
   tracker.update(at_start, rows_about(start.time_ns));
   const auto follow = [&](std::int64_t direction) {

@@ -24,25 +24,25 @@ namespace {
 using Eigen::Index;
 
 constexpr std::size_t kFewestRunningShots = 2000;  // of a piece
-/// A shorter part of a piece, before a gap, is left out.
+/// A shorter part of a piece, before a gap, is dropped.
 constexpr double kLeastPieceFilled = 0.5;
-/// Rotors are not followed over more than this, ns: they hunt.
+/// Longest gap over which rotors are followed, ns: they hunt.
 constexpr std::int64_t kLongestRunningGap = 100'000'000;
 /// Pieces that are pooled and compared with the beginning.
 constexpr std::size_t kWindows[] = {1, 2, 4, 8};
 constexpr std::size_t kMostPooled = 8;
-/// Pieces of the longest beginning: half a minute.
+/// Pieces of the longest reference period: half a minute.
 constexpr std::size_t kMostBeginning = 60;
-/// Looks in a row that must agree before there is an alarm.
+/// Consecutive checks that must agree before there is an alarm.
 constexpr int kLooksThatAgree = 2;
-/// A piece that leaves more of its shots out, or more times the usual noise, is not described by
+/// A piece with a larger share of rejected shots, or this many times the usual noise, does not fit
 /// the model.
 constexpr double kMostOutliers = 0.3, kMostNoise = 3;
 constexpr double kSecondsPerHour = 3600;
 
 double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
-/// Mean speeds over a piece: what its ends are apart, which are far apart and so independent.
+/// Mean speeds over a piece: the angle between its ends, which are far apart and so independent.
 std::vector<RunningSpeed> speeds_of(const RotorTrajectory& knots) {
   std::vector<RunningSpeed> result;
   const std::size_t last = knots.size() - 1;
@@ -74,7 +74,7 @@ const char* to_string(RunningState::Phase phase) {
   return "watching";
 }
 
-/// Pieces of a recording on their way.
+/// Pieces of a recording in progress.
 class RunningEstimate::Watcher {
  public:
   explicit Watcher(RunningOptions options)
@@ -111,7 +111,7 @@ class RunningEstimate::Watcher {
   RunningOptions options_;
   TickSampler ticks_;
   RunningState state_;
-  AngleSeries series_;  // of the piece that is coming in
+  AngleSeries series_;  // of the current piece
   std::optional<std::int64_t> last_ns_;
   double looked_at_ = 0;  // s of shots
 
@@ -120,7 +120,8 @@ class RunningEstimate::Watcher {
   std::vector<FreeParameter> free_;
   bool toward_zero_ = false;
   double usual_noise_ = 0;
-  Eigen::VectorXd scale_, held_sigma_;  // [free]: prior sigmas; what held values add, SI units
+  Eigen::VectorXd scale_, held_sigma_;  // [free]: prior sigmas; contribution of held values, SI
+                                        // units
   Eigen::MatrixXd sensor_covariance_;   // of the sensor's own values, as pieces see them, scaled
 
   Solution last_;
@@ -168,7 +169,7 @@ bool RunningEstimate::Watcher::add(const recordings::Observations& rows, const P
   return any;
 }
 
-/// @return whether the piece was looked at
+/// @return whether the piece was used
 bool RunningEstimate::Watcher::end_piece(const Progress& progress) {
   AngleSeries series = std::exchange(series_, {});
   if (series.size() < kFewestRunningShots ||
@@ -182,7 +183,7 @@ bool RunningEstimate::Watcher::end_piece(const Progress& progress) {
     estimate_piece(series, progress);
   } catch (const Cancelled&) {
     throw;
-  } catch (const Error& error) {  // such as no start, or a beam that the sensor has not
+  } catch (const Error& error) {  // such as no start, or a beam that the sensor does not have
     state_.reason = error.what();
   }
   if (state_.reason.empty()) {
@@ -206,7 +207,7 @@ Estimate RunningEstimate::Watcher::estimate_first(const AngleSeries& series,
   return first;
 }
 
-/// Keeps what later pieces have in common with the first.
+/// Keeps the data that later pieces share with the first.
 void RunningEstimate::Watcher::prepare(const Estimate& first) {
   start_ = first.start;
   if (first.frame_turn) start_->frame = first.frame_turn->turn;
@@ -223,9 +224,8 @@ void RunningEstimate::Watcher::prepare(const Estimate& first) {
   }
   const HeldChanges& changes = first.held_changes;
   held_sigma_ = changes.values.topRows(n).rowwise().norm();
-  // A piece that holds the sensor's values h differs from what it would say at the true ones by
-  // G (h - true). Where the sensor's covariance has them, it has their correlation with the
-  // others.
+  // A piece that holds the sensor's values h differs from the result at the true ones by G (h -
+  // true). If the sensor's covariance includes them, it has their correlation with the others.
   const auto held = static_cast<Index>(changes.held.size());
   Eigen::MatrixXd from(n, n + held);
   from.leftCols(n).setIdentity();
@@ -355,7 +355,7 @@ void RunningEstimate::Watcher::take(const Solution& solution) {
     beginning_pieces_ = pieces_.size();
     scatter_ = piece_scatter(pieces_);
     state_.scatter_variance_factor = scatter_.variance_factor;
-    // The newest pieces must be others than those that they are compared with.
+    // The newest pieces must differ from those of the reference.
     pieces_.clear();
     durations_.clear();
     state_.phase = RunningState::Phase::watching;
@@ -365,8 +365,8 @@ void RunningEstimate::Watcher::take(const Solution& solution) {
   describe();
 }
 
-/// The oldest piece is no longer compared: it becomes one of those that others are compared with,
-/// up to a fixed number, so that slow changes are not followed.
+/// The oldest piece is no longer compared: it joins the reference, up to a fixed number, so that
+/// slow changes are not followed.
 void RunningEstimate::Watcher::lengthen_beginning() {
   if (beginning_pieces_ >= kMostBeginning || agreeing_ > 0 || state_.alarm) return;
   beginning_ = pooled({*beginning_, pieces_.front()}, 2);
@@ -403,18 +403,18 @@ void RunningEstimate::Watcher::look() {
   if (alarmed && !state_.alarmed) ++state_.alarms;
   state_.alarmed = alarmed;
   if (!alarmed || state_.alarm) return;
-  // The change may lie within the longer windows; the last piece is behind it.
+  // The change may lie within the longer windows; the last piece is after it.
   const ConstantsEstimate last = pooled(pieces_, 1);
   const ConstantsDifference now = changed ? change_of(last) : unlike_of(last);
   const Index worst = most.constant.value();
-  const ConstantsDifference& told = std::isfinite(now.change[worst]) ? now : most;
+  const ConstantsDifference& shown = std::isfinite(now.change[worst]) ? now : most;
   state_.alarm = {changed ? OpticsAlarmKind::changed : OpticsAlarmKind::unlike,
                   state_.time_ns,
                   looked_at_,
                   most.p_value,
                   free_[static_cast<std::size_t>(worst)].name,
-                  scale_[worst] * told.change[worst],
-                  scale_[worst] * told.change_sigma[worst]};
+                  scale_[worst] * shown.change[worst],
+                  scale_[worst] * shown.change_sigma[worst]};
 }
 
 /// Parameters over the last pieces.

@@ -28,20 +28,19 @@ namespace risley::estimation {
 namespace {
 
 constexpr int kMostFrames = 5;
-/// The axis has been found when it moves by less, and is lost when by more, as a sine.
+/// The axis has converged when it moves by less, and is lost when by more, as a sine.
 constexpr double kAxisFound = 0.01, kAxisLost = 0.5;
-/// What the lines of the right sensor leave at most, rad: lines of higher order, lost shots and
-/// times that are not those of the shots.
+/// Largest remainder of the right sensor's lines, rad: lines of higher order, lost shots and times
+/// that are not those of the shots.
 constexpr double kMostMisfit = radians_from_degrees(4.0);
-/// Lines alone decide when all others leave so many times as much.
+/// Lines alone decide if all others leave this many times as much.
 constexpr double kFarWorse = 3.0;
-/// Optics are tried of sensors whose lines leave up to so many times as much as the best.
+/// The optics of sensors are tried whose lines leave up to this many times as much as the best.
 constexpr double kWorthATrial = 3.0;
-/// Emitters show the roll when what their constants leave is below this share of how far they
-/// stand apart.
+/// Emitters show the roll if the remainder of their constants is below this share of their spacing.
 constexpr double kEmittersFit = 0.25;
 
-/// The lines of a sensor's scan when all of its field is seen.
+/// The lines of a sensor's scan with its full field of view.
 struct NominalLines {
   std::vector<double> amplitude;  ///< [prisms], then that of LineSearch::near()'s image
   std::vector<Complex> constant;  ///< [emitters]
@@ -102,14 +101,14 @@ std::size_t emitter_of(std::uint8_t beam, std::size_t emitters, const FiringOrde
   return static_cast<std::size_t>(((order.first_emitter + steps) % count + count) % count);
 }
 
-/// How the constants of a recording's beams fit the emitters of a sensor.
+/// Fit of the constants of a recording's beams to the emitters of a sensor.
 struct EmitterFit {
   double miss = std::numeric_limits<double>::infinity();  ///< mean square
   FiringOrder order;
   double roll = 0;
 };
 
-/// The fit of one order: the mean is the axis's, and the rest turns with the sensor's roll.
+/// The fit of one order: the mean belongs to the axis, and the rest turns with the sensor's roll.
 EmitterFit fit_of(const RotorLines& found, const std::vector<Complex>& expected,
                   const FiringOrder& order) {
   const auto expected_of = [&](const EmitterConstant& one) {
@@ -132,7 +131,7 @@ EmitterFit fit_of(const RotorLines& found, const std::vector<Complex>& expected,
   return fit;
 }
 
-/// @param expected  [emitters], as the recording has them: mirrored where it is
+/// @param expected  [emitters], as in the recording: mirrored if it is
 EmitterFit emitter_fit(const RotorLines& found, const std::vector<Complex>& expected,
                        BeamSource beams) {
   const std::size_t count = expected.size();
@@ -262,8 +261,7 @@ class LineMatcher {
     NominalLines lines;
     bool axis_up = false;
   };
-  /// By ascending speeds where there is no image, so that all ways to say the same are looked for
-  /// once.
+  /// By ascending speeds if there is no image, so that equivalent orders are searched once.
   struct ExpectedLines {
     std::vector<double> speeds, amplitudes;
   };
@@ -286,7 +284,7 @@ class LineMatcher {
     return expected;
   }
 
-  /// Adds the lines of a recording near the speeds that candidates have.
+  /// Adds the lines of a recording near the candidates' speeds.
   void find_lines_near(const LineSearch& search, std::optional<bool> axis_up,
                        LinesNear& found) const {
     struct Wanted {
@@ -408,13 +406,13 @@ std::optional<double> start_residual(const AngleSeries& head, const sensors::Sen
   options.mirrored.reset();
   try {
     const Start start = find_start(shots, sensor, options, found);
-    // Where times are wrong, parameters bend as far as they can and mean nothing.
+    // If times are wrong, parameters go to their bounds and are meaningless.
     constexpr double kRightTimes = radians_from_degrees(0.1);
     if (start.residual_rms > kRightTimes) return start.residual_rms;
     const double unusual = prior_chi2(options.free, free_values(start.train, options.free) -
                                                         free_values(sensor.train, options.free));
-    // Residuals of unknown noise, two per shot, that are as unlikely as both together. Those of
-    // neighbouring shots hang together, so that few count.
+    // Residuals of unknown noise, two per shot, with the likelihood of both together. Those of
+    // neighbouring shots are correlated, so that few count.
     constexpr double kIndependentShots = 100, kMostExponent = 20;
     return start.residual_rms *
            std::exp(std::min(kMostExponent, unusual / (4.0 * kIndependentShots)));

@@ -22,16 +22,16 @@
 namespace risley::estimation {
 namespace {
 
-/// How often the optics are fitted again to the mended shots.
+/// Number of times the optics are refitted to the corrected shots.
 constexpr int kMostRounds = 4;
-/// Shots around the start that they are fitted to, and those that show what an anchor is worth.
+/// Number of shots around the start for fitting them, and for rating an anchor.
 constexpr std::size_t kFittedShots = 40000, kTriedShots = 12000;
-/// Shots that a slip of shots that are there twice counts for where anchors are compared: optics
-/// that are off at some rotation angles need one in every turn.
+/// Cost of a slip of repeated shots, in shots, when anchors are compared: optics that are off at
+/// some rotation angles need one in every turn.
 constexpr std::size_t kDoubledCost = 1000;
-/// Which emitter fired which shot, from the steps between neighbouring shots: all are equal, but
+/// Which emitter fired which shot, from the steps between neighbouring shots: all are equal, except
 /// for the one from the last emitter back to the first.
-/// @param[out] order  emitter of shots 0, 1, ... @return whether there were shots to find it from
+/// @param[out] order  emitter of shots 0, 1, ... @return whether there were enough shots
 bool find_firing_order(const NumberedShots& shots, ShotRange range, const PrismTrain& train,
                        bool mirrored, std::vector<std::uint8_t>& order) {
   const auto emitters = static_cast<std::size_t>(train.emitters());
@@ -84,7 +84,7 @@ ShotRange shots_within(const NumberedShots& shots, ShotRange range, double begin
   return {at(begin), at(end)};
 }
 
-/// Begins of windows of a length, evenly spread over a span and overlapping by half, s.
+/// Starts of windows of a given length, evenly spread over a span and overlapping by half, s.
 std::vector<double> window_begins(double span, double window, std::size_t most) {
   std::vector<double> begins;
   if (span < window) return begins;
@@ -162,7 +162,7 @@ std::optional<Start> coarse_start(NumberedShots& shots, ShotRange range,
   return best;
 }
 
-/// Missing shots before each valid shot of a stretch, against the one of its start.
+/// Missing shots before each valid shot of a stretch, relative to its start.
 class Lags {
  public:
   Lags(const std::vector<FoundSlip>& slips, std::size_t anchor) : slips_(slips) {
@@ -184,7 +184,7 @@ class Lags {
   std::int64_t first_ = 0;
 };
 
-/// Fits the optics again to the mended shots about an anchor. @return whether that went well
+/// Refits the optics to the corrected shots about an anchor. @return whether that went well
 bool refit(const NumberedShots& shots, Anchor& anchor, const Followed& followed,
            const sensors::Sensor& sensor, Priors priors) {
   const Lags lags(followed.slips, anchor.shot);
@@ -199,7 +199,7 @@ bool refit(const NumberedShots& shots, Anchor& anchor, const Followed& followed,
   return true;
 }
 
-/// A short window that was fitted alone.
+/// A short window that was fitted separately.
 struct Window {
   bool has_gap = false;
   Anchor anchor;
@@ -264,8 +264,8 @@ std::vector<Window> fitted_windows(NumberedShots& shots, ShotRange range, const 
   return windows;
 }
 
-/// Fits of short windows about a start, best first. A slip within it spoils a window: the shorter
-/// they are, the more of them are free of slips, and the less they determine.
+/// Fits of short windows about a start, best first. A slip within it spoils a window: shorter
+/// windows are more often free of slips, but determine less.
 std::vector<Anchor> find_anchors(NumberedShots& shots, ShotRange range, const Start& start,
                                  const sensors::Sensor& sensor, bool in_turn,
                                  const Progress& progress) {
@@ -290,7 +290,7 @@ bool same_slips(const std::vector<FoundSlip>& a, const std::vector<FoundSlip>& b
                     });
 }
 
-/// A stretch that was followed, with what is needed to join it to others.
+/// A stretch that was followed, with the data needed to join it to others.
 struct FollowedPiece {
   Followed followed;
   std::int64_t first_lag = 0;
@@ -299,7 +299,7 @@ struct FollowedPiece {
 
 /// Follows the rotors through a stretch.
 /// @param prepared  whether prepare_shots() was called for the series
-/// @return nothing where they are not found
+/// @return nothing if they are not found
 std::optional<FollowedPiece> follow_piece(NumberedShots& shots, ShotRange range,
                                           const sensors::Sensor& sensor, bool in_turn,
                                           bool prepared, const Progress& progress) {
@@ -311,7 +311,7 @@ std::optional<FollowedPiece> follow_piece(NumberedShots& shots, ShotRange range,
     start->mirrored = false;
     start->frame.reset();
   }
-  // An anchor is as good as what comes of following the rotors from it.
+  // The quality of an anchor is that of following the rotors from it.
   std::optional<Anchor> best;
   constexpr int kMostSound = 4;
   int sound = 0;
@@ -357,7 +357,8 @@ std::optional<FollowedPiece> follow_piece(NumberedShots& shots, ShotRange range,
   return FollowedPiece{std::move(followed), lags.first(), shots.firing_order};
 }
 
-/// Follows the rotors through all shots, and anew where they are lost. @return pieces in time order
+/// Follows the rotors through all shots, and restarts where they are lost. @return pieces in time
+/// order
 std::vector<FollowedPiece> follow_all(NumberedShots& shots, const sensors::Sensor& sensor,
                                       bool in_turn, const Progress& progress) {
   std::vector<FollowedPiece> pieces;
@@ -380,7 +381,8 @@ std::vector<FollowedPiece> follow_all(NumberedShots& shots, const sensors::Senso
   return pieces;
 }
 
-/// By how many shots the order of one piece runs ahead of another's; 0 where they differ otherwise.
+/// Number of shots by which the order of one piece is ahead of another's; 0 if they differ
+/// otherwise.
 std::int64_t order_shift(const std::vector<std::uint8_t>& of, const std::vector<std::uint8_t>& in) {
   for (std::size_t shift = 0; shift < of.size(); ++shift) {
     bool same = true;
@@ -423,7 +425,7 @@ ShotCount find_slips(const CountedShots& counted, const sensors::Sensor& sensor,
     return static_cast<std::uint64_t>(counted.rows[before] + 1 +
                                       (counted.rows[after] - counted.rows[before] - 1) / 2);
   };
-  // The count of the first piece's first shot is kept as it is.
+  // The count of the first piece's first shot is kept unchanged.
   const FollowedPiece& first = pieces.front();
   result.firing_order = shifted(first.firing_order, first.first_lag);
   std::int64_t lag = 0;

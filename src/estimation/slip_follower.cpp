@@ -21,29 +21,28 @@ namespace {
 
 /// Shots that are predicted and tested together.
 constexpr std::size_t kTestedShots = 96;
-/// Blocks after a suspicious one that may be needed to find out what happened there.
+/// Further blocks that may be needed to explain a suspicious one.
 constexpr std::size_t kMostBlocksAhead = 8;
-/// Time over which a prediction is held against shots, s: rotors hardly bend in it.
+/// Time over which a prediction is compared with shots, s: rotors hardly bend in it.
 constexpr double kLongestTest = 0.012;
-/// Numbers of shots that may be there twice, and of missing ones that are tried first, and where
-/// none of those will do.
+/// Numbers of shots that may be repeated, and of missing ones that are tried first, and otherwise.
 constexpr std::int64_t kDoubledShots = 96, kUsualSlip = 120, kNearSlip = 200, kFarSlip = 2000;
-/// A slip, and its size, are believed from this difference of chi2 on.
+/// A slip, and its size, are accepted from this difference of chi2 on.
 constexpr double kSure = 30.0;
-/// Largest factor by which correlated residuals count for less.
+/// Largest factor by which correlated residuals lose weight.
 constexpr double kMostCorrelation = 10.0;
-/// Losses of single shots end at 1 / softening: mean losses near it say that nothing fits.
+/// Losses of single shots saturate at 1 / softening: mean losses near it mean that nothing fits.
 constexpr double kSoftening = softening_at(1.0);
 constexpr double kLostLoss = 0.5 / kSoftening;
-/// Residuals of so many steps from shot to shot, and no number of missing shots that mends them:
+/// With residuals of this many steps from shot to shot that no number of missing shots explains,
 /// the rotors are lost.
 constexpr double kLostSteps = 8.0;
-/// A prediction that is less certain than this is no measure of single shots, in shots.
+/// A prediction less certain than this cannot test single shots, in shots.
 constexpr double kLooseShots = 0.15;
-/// Of the start about the truth.
+/// Uncertainty of the start.
 constexpr double kAnchorAngleSigma = radians_from_degrees(0.5), kAnchorSpeedShare = 1e-3;
-/// Shots in packets of the formats. Recorders lose some at their borders: so many slips,
-/// and such a share of them, show where in the count the borders are.
+/// Shots in packets of the formats. Recorders lose some at their borders: this many slips, and this
+/// share of them, reveal the positions of the borders.
 constexpr std::int64_t kPacketShots[] = {96, 100};
 constexpr std::size_t kFewestAtBorders = 5;
 constexpr double kShareAtBorders = 0.7;
@@ -52,7 +51,7 @@ constexpr double kShareAtBorders = 0.7;
 class Follower : private BlockFit {
  public:
   /// @param noise  of the shots about the fit of the start, rad
-  /// @param step   from shot to shot, typically, rad
+  /// @param typical  step from shot to shot, rad
   Follower(const NumberedShots& shots, const PrismTrain& train, double noise, double step,
            std::ptrdiff_t direction, std::size_t first, std::size_t count)
       : BlockFit(train, kSoftening),
@@ -65,7 +64,7 @@ class Follower : private BlockFit {
   }
 
   /// Fits a state to all places, as if they were free of slips.
-  /// @param from  initial noise: how far directions may be off at first, rad
+  /// @param from  initial noise: initial error of the directions, rad
   /// @return scale of the residuals, rad
   double settle(RotorState& state, double from) {
     load(0, count_, 0);
@@ -81,7 +80,7 @@ class Follower : private BlockFit {
     return robust_scale(azimuth_, zenith_);
   }
 
-  /// @return places that were reached; slips and noise are then known
+  /// @return processed places; slips and noise are then known
   std::size_t run(RotorState state) {
     Checkpoint last{0, state};
     std::size_t place = 0, quiet_until = 0;
@@ -111,7 +110,7 @@ class Follower : private BlockFit {
           continue;
         }
         quiet_until = verdict.sure_until;
-        // The optics are not that good here.
+        // The optics are less accurate here.
         weights_.angle_noise = equal_noise(
             std::max(weights_.angle_noise.azimuth, std::min(test.scale, kLostSteps * step_)));
         load(place, end, lag_);
@@ -133,7 +132,7 @@ class Follower : private BlockFit {
     std::int64_t change = 0;  // of the lag
   };
   const std::vector<Change>& slips() const { return slips_; }
-  /// By how much predictions missed, summed over all shots, rad.
+  /// Sum of the predictions' errors over all shots, rad.
   double missed() const { return missed_; }
 
   std::size_t shot_at(std::size_t place) const {
@@ -144,13 +143,13 @@ class Follower : private BlockFit {
  private:
   struct Checkpoint {
     std::size_t place = 0;
-    RotorState state;  // before the shots from there on were taken in
+    RotorState state;  // before the shots from there on were used
   };
   /// How shots agree with a prediction.
   struct Test {
     double loss = 0;                          // mean of the shots
     double scale = 0;                         // of the residuals, rad
-    double delay = 0, delay_information = 0;  // s, s^-2: time by which all rotors are late
+    double delay = 0, delay_information = 0;  // s, s^-2: common delay of all rotors
     double delay_chi2() const { return delay * delay * delay_information; }
   };
   struct Verdict {
@@ -215,7 +214,7 @@ class Follower : private BlockFit {
            test.delay_chi2() > penalty();
   }
 
-  /// Whether shots may be missing without anybody noticing it.
+  /// Whether shots may be missing undetected.
   bool is_loose(const RotorState& state) const {
     double least = std::numeric_limits<double>::infinity();
     for (Eigen::Index k = 0; k < state.mean.size(); k += 3) {
@@ -225,7 +224,7 @@ class Follower : private BlockFit {
     return least * shots_.rate > kLooseShots;
   }
 
-  /// Keeps noise, usual losses and their correlation up to date.
+  /// Updates noise, usual losses and their correlation.
   void learn(const Test& test) {
     constexpr double kShare = 0.03;
     const auto toward = [](double value, double next) { return value + kShare * (next - value); };
@@ -272,7 +271,7 @@ class Follower : private BlockFit {
     }
   }
 
-  /// Losses of the loaded shots for every change of the lag that is thought of.
+  /// Losses of the loaded shots for every candidate change of the lag.
   struct LossTable {
     std::vector<std::int64_t> change;       // the first is 0
     std::vector<std::vector<double>> loss;  // [changes][shots]
@@ -283,16 +282,16 @@ class Follower : private BlockFit {
       return sum;
     }
   };
-  /// The likeliest course of the lag: a change at every place costs a penalty.
+  /// The likeliest sequence of the lag: every change has a penalty.
   struct Course {
     double loss = 0;  // of all shots, without penalties
     struct Stretch {
       std::size_t begin = 0, end = 0, row = 0;  // row of the table
     };
-    std::vector<Stretch> stretches;  // the first one is without a change, maybe empty
+    std::vector<Stretch> stretches;  // the first one is without a change, possibly empty
   };
 
-  /// @param from  first shot at which a change may be
+  /// @param from  first shot with a possible change
   static Course likeliest_course(const LossTable& table, std::size_t from, double penalty) {
     const std::size_t rows = table.change.size(), shots = table.loss.front().size();
     std::vector<double> cost(rows, std::numeric_limits<double>::infinity());
@@ -326,8 +325,8 @@ class Follower : private BlockFit {
     return course;
   }
 
-  /// Changes of the lag by how usual they are: whole rounds of the emitters, such as a packet that
-  /// was cut short; any about a packet; whole packets.
+  /// Changes of the lag by frequency: whole rounds of the emitters, such as a truncated packet; any
+  /// within a packet; whole packets.
   enum class Tier { usual, near, far };
 
   std::vector<std::int64_t> changes_of(Tier tier) const {
@@ -344,7 +343,7 @@ class Follower : private BlockFit {
 
   double penalty() const { return kSure * std::min(correlation_, kMostCorrelation); }
 
-  /// What happened between a checkpoint and the end of a block that does not fit.
+  /// Explanation of a block that does not fit, from the last checkpoint to its end.
   Verdict examine(const Checkpoint& from, std::size_t end) {
     constexpr std::size_t kFewestBehind = 12;
     Verdict verdict;
@@ -383,13 +382,13 @@ class Follower : private BlockFit {
       if (loose && none_fits) return verdict;
       Course course;
       for (const Tier tier : {Tier::usual, Tier::near, Tier::far}) {
-        // Packets are looked for only where next to nothing fits.
+        // Packets are tried only if almost nothing fits.
         if (tier == Tier::far &&
             (blocks != 1 || loose || course.loss < 0.5 * kLostLoss * static_cast<double>(shots))) {
           break;
         }
         for (const std::int64_t change : changes_of(tier)) try_change(change);
-        if (loose) {  // each change was fitted alone, and happened in the gap before these shots
+        if (loose) {  // each change was fitted separately, and lies in the gap before these shots
           std::size_t best = 0, second = 1;
           for (std::size_t row = 1; row < table.change.size(); ++row) {
             if (table.total(row) < table.total(best)) {
@@ -460,8 +459,8 @@ class Follower : private BlockFit {
   double usual_loss_ = 1.7, correlation_ = 4.0;
 };
 
-/// Moves slips to the borders of packets where most are there: at some rotation angles rotors that
-/// turn against each other leave it open by some dozens of shots where it was.
+/// Moves slips to the borders of packets if most are there: at some rotation angles
+/// counter-rotating rotors leave their position open by some dozens of shots.
 void move_to_borders(const NumberedShots& shots, ShotRange range, std::vector<FoundSlip>& slips) {
   if (slips.size() < kFewestAtBorders) return;
   const auto past = [](std::int64_t number, std::int64_t border, std::int64_t packet) {

@@ -14,7 +14,7 @@
 
 namespace risley::estimation {
 
-/// Noise is not taken below this share of the step from shot to shot: better is not needed.
+/// Lower bound of the noise, as a share of the step from shot to shot: more accuracy is not needed.
 inline constexpr double kLeastNoiseSteps = 0.2;
 /// The valid shots of a recording by their numbers in the count.
 struct NumberedShots {
@@ -40,13 +40,13 @@ struct NumberedShots {
   }
 };
 
-/// A change of the count somewhere behind valid shot `before` and not behind shot `after`.
+/// A change of the count after valid shot `before` and not after shot `after`.
 struct FoundSlip {
   std::size_t before = 0, after = 0;
   std::int64_t shots = 0;
 };
 
-/// What following the rotors of a stretch came to.
+/// Result of following the rotors of a stretch.
 struct Followed {
   std::size_t begin = 0, end = 0;  // valid shots that were reached
   std::vector<FoundSlip> slips;    // ascending
@@ -54,7 +54,7 @@ struct Followed {
   std::size_t size() const { return end > begin ? end - begin : 0; }
 };
 
-/// A stretch whose rotors are known at one time.
+/// A stretch with known rotors at one time.
 struct Anchor {
   Start start;
   std::size_t shot = 0;  // valid shot next to it
@@ -62,13 +62,13 @@ struct Anchor {
 };
 
 /// Fits a state to all of some shots, as if they were free of slips.
-/// @param noise  of the shots about the fit, rad; more than kLeastNoiseSteps is taken
-/// @param from   initial noise: how far directions may be off at first, rad
+/// @param noise  of the shots about the fit, rad; raised to kLeastNoiseSteps
+/// @param from  initial noise: initial error of the directions, rad
 /// @return scale of the residuals, rad
 double settle(const NumberedShots& shots, ShotRange rows, const Start& start, double noise,
               double from, RotorState& state);
 
-/// Follows the rotors from an anchor to both ends of a stretch, or as far as they can be followed.
+/// Follows the rotors from an anchor to both ends of a stretch, or as far as possible.
 Followed follow(const NumberedShots& shots, const Anchor& anchor, ShotRange range);
 
 }  // namespace risley::estimation

@@ -22,15 +22,15 @@ namespace risley::estimation {
 namespace {
 
 constexpr int kMostFree = kMaxParameters;
-/// Knots whose rows are multiplied at once.
+/// Knots whose rows are multiplied together.
 constexpr std::size_t kStackedKnots = 16;
-/// Knots that go through the stages of a pass together, and how many such blocks are underway: a
+/// Knots that go through the stages of a pass together, and the number of blocks in progress: a
 /// stage takes some tens of microseconds.
 constexpr std::size_t kStageKnots = 4 * kStackedKnots, kBlocks = 6;
 
 /// Calls stages with blocks of the knots, each stage with one block after the other. A pass is a
-/// chain of what covariances do, which needs no means, and a chain of means, which needs them: with
-/// two threads the second runs behind the first.
+/// chain of covariances, which needs no means, and a chain of means, which needs them: with two
+/// threads the second runs behind the first.
 /// @param blocks  kBlocks of them, with the knots [begin, end) in the order of the pass
 template <class Block, class First, class Second, class Third>
 void run_stages(std::size_t knots, std::vector<Block>& blocks, const First& first,
@@ -60,13 +60,13 @@ class Smoother {
       Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::ColMajor, kMostKnotStates<N>, kMostFree + 1>;
   using AffineMap = Eigen::Map<Eigen::Matrix<double, kD, Eigen::Dynamic>>;
   using Coupling = Eigen::Map<const Eigen::Matrix<double, kD, Eigen::Dynamic, Eigen::RowMajor>>;
-  /// Knots on their way forward, with their rows of information about the parameters.
+  /// Knots in the forward pass, with their rows of information on the parameters.
   struct AheadBlock {
     std::size_t begin = 0, end = 0;
     std::array<Eigen::MatrixXd, kStageKnots / kStackedKnots> left, right;
   };
-  /// Knots on their way back, counted from the last: what the later ones say of each as
-  /// information, and what leads over the step before it.
+  /// Knots in the backward pass, counted from the last: the information of the later ones on each,
+  /// and the transition over the step before it.
   struct BackBlock {
     std::size_t begin = 0, end = 0;
     std::array<Square, kStageKnots> later, before_step;
@@ -194,7 +194,7 @@ class Smoother {
   Eigen::Index stacked_row(std::size_t place) const {
     return static_cast<Eigen::Index>(place % kStackedKnots) * 3 * d();
   }
-  /// The right side of a knot's information about the parameters, see share().
+  /// The right side of a knot's information on the parameters, see share().
   void keep_for_sharing(std::size_t place, const Affine& x, const Affine& e, const Affine& moved,
                         AheadBlock& block) const {
     Eigen::MatrixXd& rows = block.right[place / kStackedKnots];
@@ -207,8 +207,8 @@ class Smoother {
       }
     }
   }
-  /// The knots' information about the parameters: (gradient, information) -= X^T (E, e) - C^T (X,
-  /// x) + E^T P (E, e), as one product of many knots' rows.
+  /// The knots' information on the parameters: (gradient, information) -= X^T (E, e) - C^T (X, x) +
+  /// E^T P (E, e), as one product of many knots' rows.
   void share(AheadBlock& block) {
     for (std::size_t first = block.begin, part = 0; first < block.end;
          first += kStackedKnots, ++part) {
@@ -247,8 +247,8 @@ class Smoother {
     }
   }
 
-  /// Where the motion from the knot before misses a knot's linearisation: states are deviations
-  /// from the linearisation, which need not follow the motion itself.
+  /// Difference between the motion from the previous knot and a knot's linearisation: states are
+  /// deviations from the linearisation, which need not follow the motion itself.
   Vector step_offset(std::size_t knot) const {
     return motion_offset(state(knot - 1), state(knot), step_before(knot));
   }
@@ -263,7 +263,7 @@ class Smoother {
     return std::binary_search(at_.stretch_begin.begin(), at_.stretch_begin.end(), knot);
   }
 
-  /// Smoothed means alone (modified Bryson-Frazier).
+  /// Only smoothed means (modified Bryson-Frazier).
   void backward(SmootherSolution& out) {
     Eigen::VectorXd one(free_ + 1);
     one << 1.0, out.parameter_step;
@@ -288,8 +288,8 @@ class Smoother {
     }
   }
 
-  /// As backward, with covariances: what the later knots say of a state as information Y and vector
-  /// y, so that nothing is ever a small difference of large numbers.
+  /// As backward, with covariances: information Y and vector y of the later knots on a state, so
+  /// that nothing is ever a small difference of large numbers.
   void backward_with_covariance(SmootherSolution& out) {
     std::vector<BackBlock> blocks(kBlocks);
     Square information = Square::Zero(d(), d());
@@ -328,8 +328,8 @@ class Smoother {
     out.affine_states = std::move(filtered_);
   }
 
-  /// Takes a knot's own shots and the noise of the step before it into what later knots say of it,
-  /// J := (I + J Q)^-1 J, and goes to the end of that step.
+  /// Adds a knot's own shots and the noise of the step before it to the later knots' information, J
+  /// := (I + J Q)^-1 J, and moves to the end of that step.
   /// @param[out] before_step  J between the two  @param[out] step  I + J Q
   void retreat_information(std::size_t knot, Square& information, Square& before_step,
                            Eigen::PartialPivLU<Square>& step) const {
@@ -400,7 +400,7 @@ class Smoother {
   Eigen::Index free_;
   /// After each knot's shots, then after all shots.
   std::vector<double> filtered_, covariances_;
-  Eigen::MatrixXd shared_;  ///< the knots' information about the parameters
+  Eigen::MatrixXd shared_;  ///< the knots' information on the parameters
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
 };

@@ -18,7 +18,7 @@
 namespace risley::estimation {
 namespace {
 
-/// The knot whose shots a shot is among or behind.
+/// The knot whose shots include or precede a shot.
 std::size_t knot_before(const RotorTrajectory& trajectory, std::size_t shot) {
   const auto after =
       std::upper_bound(trajectory.first_shot.begin(), trajectory.first_shot.end(), shot);
@@ -74,7 +74,7 @@ ShotResiduals residuals_at(const Solution& solution, const AngleSeries& shots,
   return out;
 }
 
-/// What rows of the states take from the knot that serves their shots, residuals apart.
+/// Inputs of rows of the states from the knot of their shots, except residuals.
 class KnotStates {
  public:
   KnotStates(const Solution& solution, std::size_t knot)
@@ -126,7 +126,7 @@ SolvedShots solved_shots(const Solution& solution, const PackedSeries& series, S
   std::size_t knot = knot_before(t, shots.begin);
   for (std::size_t shot = shots.begin; shot < shots.end;) {
     while (knot + 1 < t.size() && t.first_shot[knot + 1] <= shot) ++knot;
-    // Shots up to the knot's last, or, where none serves, up to the next knot's first.
+    // Shots up to the knot's last, or, without a knot, up to the next knot's first.
     const bool served = shot >= t.first_shot[knot] && shot < t.last_shot[knot];
     const std::size_t next = shot < t.first_shot[knot] ? t.first_shot[knot]
                              : knot + 1 < t.size()     ? t.first_shot[knot + 1]
@@ -177,7 +177,7 @@ RotorStates states_of_knots(const Solution& solution, const PackedSeries& series
   std::vector<std::size_t> shot_of;
   std::vector<std::vector<double>> angles(static_cast<std::size_t>(t.prisms));
   for (std::size_t knot = 0; knot < t.size(); ++knot) {
-    // The first shot at or behind the knot, or its last.
+    // The first shot at or after the knot, or its last.
     const ShotRange own{t.first_shot[knot], t.last_shot[knot]};
     const std::size_t shot = std::min(series.first_at(own, t.time_ns[knot]), own.end - 1);
     const std::int64_t time_ns = series.time_ns(shot);

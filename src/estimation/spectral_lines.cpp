@@ -22,15 +22,16 @@ namespace risley::estimation {
 namespace {
 
 constexpr std::size_t kFewestLineShots = 40;
-/// Shots that lines are refined with; more would only cost time.
+/// Number of shots with which lines are refined; more would only cost time.
 constexpr std::size_t kEnoughLineShots = 1000;
 /// Steps of the frequency grid per resolved frequency, 1 / duration.
 constexpr double kOversampling = 8.0;
-/// What holds constant and lines back where shots in a corner of the field say little about them,
-/// as shares of the shots. Lines of higher order, which the fit leaves out, are a tenth of the two.
+/// Regularisation of constant and lines for shots in a corner of the field, which hardly determine
+/// them, as shares of the shots. Lines of higher order, which the fit omits, are a tenth of the
+/// two.
 constexpr double kConstantRidge = 1e-4, kLineRidge = 1e-5;
 
-/// The stretch of about a window's length that holds most shots; the earliest of similar ones.
+/// The stretch of about a window's length with the most shots; the earliest of similar ones.
 ShotRange best_window(const AngleSeries& series, double window) {
   ShotRange best;
   for (double begin = 0;; begin += 0.25 * window) {
@@ -49,7 +50,7 @@ Complex transverse(const AngleSeries& series, std::size_t i) {
 }
 
 /// Least squares of a constant for each emitter and some lines, the constants eliminated: they do
-/// not overlap each other, so that takes one division each.
+/// not overlap, so that takes one division each.
 template <int Lines>
 class LineFit {
  public:
@@ -93,7 +94,7 @@ class LineFit {
   }
 
   Complex amplitude(std::size_t line) const { return amplitude_[line]; }
-  /// Of the lines, after solve(): how what is left grows with their amplitudes.
+  /// Of the lines, after solve(): increase of the remainder with their amplitudes.
   Eigen::Matrix<Complex, Lines, Lines> normal() const {
     Eigen::Matrix<Complex, Lines, Lines> factor;
     for (std::size_t a = 0; a < Lines; ++a) {
@@ -201,8 +202,8 @@ double LineSearch::unexplained(std::span<const std::ptrdiff_t> bins) const {
   return (power_ - fit.explained()) / count_;
 }
 
-/// What a fit of some lines to the thinned shots needs. The speed of one line can change without
-/// the sums of the others being made again, which halves the time of refining two lines.
+/// Data for fitting some lines to the thinned shots. The speed of one line can change without
+/// recomputing the sums of the others, which halves the time of refining two lines.
 template <int Lines>
 class LineSearch::Sums {
  public:
@@ -239,7 +240,7 @@ class LineSearch::Sums {
     }
   }
 
-  /// Mean square of what the best amplitudes leave.
+  /// Mean square of the remainder with the best amplitudes.
   double unexplained() const { return (power_ - solved().explained()) / count(); }
 
   RotorLines lines() const {
@@ -249,7 +250,7 @@ class LineSearch::Sums {
       const Complex amplitude = fit.amplitude(a);
       result.lines.push_back({speeds_[a], std::abs(amplitude), std::arg(amplitude)});
     }
-    // What the lines leave of the mean is the constants', by their shots.
+    // The mean without the lines belongs to the constants, by their shots.
     for (std::size_t j = 0; j < emitters_.size(); ++j) {
       const OfEmitter& emitter = emitters_[j];
       if (emitter.count == 0) continue;
@@ -337,7 +338,7 @@ std::vector<RotorLines> LineSearch::near(std::span<const double> speeds, double 
     bins.emplace_back();
   }
   std::vector<RotorLines> best = best_of(bins, false, most, with_image);
-  for (RotorLines& found : best) {  // rotors that stand still get their place back
+  for (RotorLines& found : best) {  // rotors at rest get their place back
     for (std::size_t k = 0; k < speeds.size(); ++k) {
       if (speeds[k] == 0)
         found.lines.insert(found.lines.begin() + static_cast<int>(k), SpectralLine{});
@@ -359,7 +360,7 @@ std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ord
   return with_layout(static_cast<int>(bins.size()), [&]<int Lines>() {
     std::vector<Candidate> all;
     Candidate candidate;
-    // Every choice of bins, one loop inside the other.
+    // Every choice of bins, in nested loops.
     const auto choose = [&](const auto& self, std::size_t line) -> void {
       if (line == Lines) {
         candidate.unexplained = unexplained<Lines>({candidate.bin.data(), Lines});
@@ -407,7 +408,7 @@ std::vector<RotorLines> LineSearch::best_of(std::span<const Bins> bins, bool ord
 }
 
 double unexplained_with(const RotorLines& lines, std::span<const double> amplitude) {
-  // Amplitudes with the phases that were found, then each phase in turn at its best.
+  // Amplitudes with the phases found, then each phase in turn at its best.
   const Eigen::Index turning = lines.normal.rows();
   Eigen::VectorXcd found(turning), wanted(turning);
   Eigen::Index line = 0;

@@ -24,7 +24,7 @@ inline ShotWeights weights_of(const Estimate& estimate) {
   return weights;
 }
 
-/// Shots of a series, and where a solution says that they went.
+/// Shots of a series, and their directions according to a solution.
 struct SolvedShots {
   AngleSeries shots;
   std::vector<std::vector<double>> rotation_angle;  ///< [prisms], rad, of any number of turns
@@ -37,7 +37,7 @@ struct SolvedShots {
 SolvedShots solved_shots(const Solution& solution, const PackedSeries& series, ShotRange shots);
 
 /// Calls make(solved) with the shots of an estimate, some at a time and from several threads, and
-/// take(result) with what it returned, in the order of the shots.
+/// take(result) with the returned value, in the order of the shots.
 template <class Make, class Take>
 void for_all_shots(const Estimate& estimate, const Make& make, const Take& take) {
   constexpr std::size_t kShots = 1 << 16;

@@ -11,6 +11,7 @@
 #include <openssl/evp.h>
 
 #include "risley/core/error.hpp"
+#include "risley/hashes/base64.hpp"
 #include "risley/io/fork_lock.hpp"
 #include "risley/io/read_bytes.hpp"
 
@@ -18,10 +19,10 @@ namespace risley::hashes {
 
 namespace {
 
-/// A call of the library, during which nobody forks (see ForkLock). The library keeps data of each
-/// thread that has called it. It frees them when the thread ends, by tables that it frees itself
-/// when the process ends, which is when oneTBB's threads end: whichever came second would use freed
-/// memory. So no data stay.
+/// A call of the library, during which no thread may fork (see ForkLock). The library keeps data
+/// for each thread that has called it. It frees them when the thread ends, using tables that it
+/// frees itself at process exit, which is when oneTBB's threads end: whichever came second would
+/// use freed memory. So no data stay.
 class LibraryCall {
  public:
   LibraryCall() = default;
@@ -77,9 +78,7 @@ std::string sha256_base64(std::string_view text) {
   unsigned char digest[EVP_MAX_MD_SIZE];
   unsigned int length = 0;
   require_done(EVP_Digest(text.data(), text.size(), digest, &length, EVP_sha256(), nullptr) == 1);
-  unsigned char encoded[2 * EVP_MAX_MD_SIZE];
-  const int characters = EVP_EncodeBlock(encoded, digest, static_cast<int>(length));
-  return {encoded, encoded + characters};
+  return base64({reinterpret_cast<const char*>(digest), length});
 }
 
 }  // namespace risley::hashes

@@ -27,7 +27,7 @@ std::vector<FittedValue> fitted_values(const Hypothesis& hypothesis) {
     }
     const auto at = std::find(fit.names.begin(), fit.names.end(), info.name);
     const auto row = static_cast<Eigen::Index>(at - fit.names.begin());
-    // What was held at zero is no answer.
+    // Parameters held at zero are not results.
     if (at == fit.names.end() && info.kind == ParameterKind::train && value == 0) continue;
     const auto sigma = [&](const Eigen::MatrixXd& covariance) {
       if (row >= covariance.rows()) return std::nan("");

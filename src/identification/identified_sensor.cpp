@@ -17,10 +17,10 @@ namespace risley::identification {
 namespace {
 
 constexpr double kLikeSpeed = 0.03, kLikeDeviation = 0.03;
-/// Of a step: the first shot stands in whole steps after the zero of the clock.
+/// Tolerance in steps: the first shot is whole steps after the zero of the clock.
 constexpr double kRoundStep = 1e-3;
 
-/// In which order the emitters of a round that share a time fire, and what their time steps are.
+/// Firing order of the emitters of a round that share a time, and their time steps.
 struct Round {
   std::vector<int> emitter;  ///< place in the grid, of every place in the round
   double step = 0;           ///< between its shots, s
@@ -39,7 +39,7 @@ Round round_of(const Identification& identification) {
   return round;
 }
 
-/// Sizes of the prisms that presets assume where they are not known, m.
+/// Sizes of the prisms assumed by presets if they are not known, m.
 constexpr double kThickness = 0.007, kThicknessSigma = 0.005;
 constexpr double kSpacing = 0.030, kSpacingSigma = 0.020;
 
@@ -102,7 +102,7 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
     sensor.train.set_place(place::incident_beam_vertical(j, prisms),
                            model.train[place::incident_beam_vertical(from, prisms)]);
   }
-  // The clock's own zero where the first shot stands a whole number of steps after it.
+  // The clock's own zero if the first shot is a whole number of steps after it.
   const double since_zero = 1e-9 * static_cast<double>(identification.grid.origin_ns);
   const double steps = since_zero * sensor.shot_rate - (result.decimation - 1);
   if (std::abs(steps - std::round(steps)) < kRoundStep && (steps > -0.5 && steps < 1.5)) {
@@ -110,7 +110,7 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
   }
   const double round_shots = sequence.firing == sensors::Firing::together ? emitters : 1;
   const double first_shot = result.decimation - 1;
-  // The time at which the rotors of the first row stand, as the sequence counts.
+  // The time to which the rotors of the first row refer in the sequence.
   const double rotor_time = sequence.firing == sensors::Firing::together
                                 ? (sequence.first_shot + std::floor(first_shot / emitters)) *
                                       round_shots / sensor.shot_rate
@@ -156,7 +156,8 @@ IdentifiedSensor identified_sensor(const Identification& identification, const s
     }
     const std::optional<double> sigma = sigma_of(fitted);
     if (sigma && !std::isfinite(*sigma)) {
-      sensor.set_knowledge({info.name, 0, "glass assumed to be that of the other prisms"});
+      sensor.set_knowledge(
+          {info.name, 0, "glass assumed to be the same as that of the other prisms"});
       continue;
     }
     sensor.set_knowledge({info.name, sigma.value_or(0.0), sigma ? kFound : "held by convention"});

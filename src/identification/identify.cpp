@@ -23,45 +23,44 @@
 namespace risley::identification {
 namespace {
 
-/// Part of a scan in which lines are searched, s, or number of shots if that is longer; where no
-/// train fits, rotors may turn nearly alike, and longer windows separate their lines.
+/// Part of a scan in which lines are searched, s, or number of shots if that is longer; if no train
+/// fits, rotors may turn nearly alike, and longer windows separate their lines.
 constexpr double kLineWindow = 1.0;
 constexpr double kLineShots = 4096;
 constexpr double kLongerWindow = 4;
 /// Window on which trains are tried, s, and its number of shots.
 constexpr double kTrialWindow = 0.15;
 constexpr std::size_t kTrialShots = 600;
-/// Before that, all arrangements are tried roughly; numbers of those that go on in two steps.
+/// Before that, all arrangements are tried roughly; numbers of those kept in two steps.
 constexpr std::size_t kRoughShots = 150;
 constexpr double kRoughTolerance = 1e-3, kHopelessSet = 4;
 constexpr std::size_t kPromising = 96, kTriedInFull = 16;
-/// Arrangements that leave so many times as much as the best one are not compared any further, but
-/// for a few.
+/// Arrangements that leave this many times as much as the best one are dropped, except for a few.
 constexpr double kHopeless = 10;
 constexpr std::size_t kFewestRivals = 3;
-/// A further prism must bring what is left down to this share: one that moves the beam does.
+/// A further prism must reduce the remainder to this share: one that moves the beam does.
 constexpr double kFurtherPrism = 0.5;
-/// Longest part of a recording that is used, s.
+/// Longest part of a recording used, s.
 constexpr double kLongest = 10;
-/// Shots of the whole stretch on which trains are compared.
+/// Shots of the whole stretch for comparing trains.
 constexpr std::size_t kComparedShots = 12'000;
-/// Shots to which the best and its close rivals are fitted.
+/// Shots for fitting the best and its close rivals.
 constexpr std::size_t kMostShots = 1'500'000;
-/// The strongest lines, of which some are the rotors' own.
+/// The strongest lines, some of which are the rotors' own.
 constexpr std::size_t kOwnLines = 5;
-/// Wedges and indices from which a fit starts: the deviation is that of the line.
+/// Wedges and indices at the start of a fit: the deviation is that of the line.
 constexpr std::array<double, 3> kStartIndex{1.45, 1.6, 1.85};
-/// Angles between a wedge and a reflector that are tried, each with the speeds of any two of this
-/// many lines.
+/// Angles tried between a wedge and a reflector, each with the speeds of any two of this many
+/// lines.
 constexpr int kReflectorPhases = 12;
 constexpr std::size_t kReflectorLines = 4;
 /// A scan reaches all around if each of these sectors about Z holds a tenth of its share.
 constexpr std::size_t kSectors = 36;
 constexpr double kFewestInSector = 0.1;
-/// A frame that is turned by more than an emitter can lean is a turned frame.
+/// A frame turned by more than an emitter can lean counts as a turned frame.
 constexpr double kTurnedFrame = 0.03;
 constexpr double kOneGlassLead = 9;
-/// A rival that leaves less than this share of the noise in a scan free of noise is equivalent.
+/// A rival that leaves less than this share of the noise in a noise-free scan is equivalent.
 constexpr double kEquivalentShare = 1e-3;
 constexpr double kEquivalentRms = 1e-10;
 
@@ -130,8 +129,8 @@ ShotGrid thinned(const ShotGrid& grid, std::size_t begin, std::size_t end, std::
 class TrainSearch {
  public:
   /// @param spectrum    in the train's frame
-  /// @param window      in which the lines were looked for, s
-  /// @param all_around  of a wedge and a reflector that turn about Z; otherwise of prisms about X
+  /// @param window  used for the lines, s
+  /// @param all_around  for a wedge and a reflector that turn about Z; otherwise prisms about X
   TrainSearch(const ShotGrid& grid, LineSpectrum spectrum, double window, bool all_around,
               const IdentifyOptions& options, const Progress& progress)
       : grid_(grid),
@@ -155,7 +154,7 @@ class TrainSearch {
                 std::atan2(-mean.imag(), std::hypot(forward, mean.real()))};
     }
     frame_.axis_up = all_around;
-    // It shows all around, and motion is judged before anything else is freed.
+    // The motion is judged before anything else is freed.
     start_freedom_.frame = start_freedom_.frame || all_around;
     choose_trial_window();
     compared_ = thinned(grid, 0, grid.size(), kComparedShots);
@@ -175,8 +174,8 @@ class TrainSearch {
     }
     if (trials.empty()) {
       throw EstimationError(
-          "no train of prisms sends its beams where this recording has them: in all arrangements "
-          "that were tried, the beams do not pass through the prisms");
+          "no prism train reproduces the beams of this recording: in all arrangements tried, the "
+          "beams do not pass through the prisms");
     }
     return compare(std::move(trials));
   }
@@ -215,16 +214,16 @@ class TrainSearch {
     model.frame = frame_;
     model.lag.assign(static_cast<std::size_t>(grid_.emitters), 0.0);
     const int prisms = model.train.prisms();
-    // A quartic follows a rotor that hunts over a window.
+    // A quartic follows a hunting rotor over a window.
     RotorCurves line(prisms, trial_begin_, trial_end_, 1, 1, true);
     for (int k = 0; k < prisms; ++k) {
       const Line& own = spectrum_.lines[arrangement.lines[static_cast<std::size_t>(k)]];
       model.train.set_place(place::refractive_index(k), index);
-      // Deviation of a beam that meets the perpendicular face upright.
+      // Deviation of a beam at normal incidence on the perpendicular face.
       const double aside = std::asin(std::min(0.95, std::abs(own.amplitude)));
       model.train.set_place(place::wedge_angle(k),
                             thinner * std::atan2(std::sin(aside), index - std::cos(aside)));
-      // A prism sends the beam towards its thick end, down at rotation angle 0.
+      // A prism deflects the beam towards its thick end, down at rotation angle 0.
       const double zero = std::arg(own.amplitude) + 0.5 * kPi;
       line.coefficient(k, 0) = zero + own.angular_velocity * trial_begin_;
       line.coefficient(k, 1) = zero + own.angular_velocity * trial_end_;
@@ -234,7 +233,7 @@ class TrainSearch {
     return model;
   }
 
-  /// The emitters where their constants say.
+  /// The emitters according to their constants.
   void set_emitters(PrismTrain& train) const {
     if (grid_.emitters == 1) return;
     const int prisms = train.prisms();
@@ -312,14 +311,13 @@ class TrainSearch {
     });
     std::stable_sort(trials.begin(), trials.end(), better);
     if (!std::isfinite(trials.front().fit.rms)) {
-      throw EstimationError(
-          "no wedge and reflector send their beams where this recording has them");
+      throw EstimationError("no wedge and reflector reproduce the beams of this recording");
     }
     return trials;
   }
 
   /// The best fits of arrangements of sets of lines, on the trial window: of all of them roughly,
-  /// then of the sets that come nearest, then of the best arrangements in full.
+  /// then of the nearest sets, then of the best arrangements in full.
   std::vector<Trial> try_all(std::size_t prisms) const {
     struct LineSet {
       std::vector<Trial> trials;
@@ -381,7 +379,7 @@ class TrainSearch {
     std::stable_sort(trials.begin(), trials.end(), better);
     return trials;
   }
-  /// From a middle index, or from higher ones and thinner wedges where beams do not get out.
+  /// From a middle index, or from higher ones and thinner wedges if beams do not get out.
   TrainFit rough_fit(const ShotGrid& grid, const Arrangement& arrangement, int iterations) const {
     TrainFit fit;
     for (const double thinner : {1.0, 0.92, 0.85}) {
@@ -396,7 +394,7 @@ class TrainSearch {
   }
   static bool better(const Trial& a, const Trial& b) { return a.fit.rms < b.fit.rms; }
 
-  /// Whether the residuals of a fit hold no line any more.
+  /// Whether the residuals of a fit no longer contain a line.
   bool nothing_left(const TrainFit& fit) const {
     double power = 0;
     const std::size_t n = trial_grid_.size();
@@ -419,7 +417,7 @@ class TrainSearch {
     return largest < 20 * power;
   }
 
-  /// Frees what makes the fit better by more than chance would.
+  /// Frees quantities that improve the fit by more than chance would.
   TrainFreedom choose_freedom(const TrainModel& model, const Motion& motion, TrainFit& best) const {
     TrainFreedom freedom = start_freedom_;
     const auto first = fit_whole(compared_, model, freedom, motion, 25, progress_.silent());
@@ -446,8 +444,8 @@ class TrainSearch {
         if (!std::isfinite(fit.rms)) continue;
         const double gained =
             chi2_excess(best, fit) - 2.0 * static_cast<double>(fit.unknowns - best.unknowns);
-        // One glass is an assumption that little is needed to give up, a turned frame or tilted
-        // prisms are a finding.
+        // A common glass is an assumption that is dropped easily, a turned frame or tilted prisms
+        // are a finding.
         const double needed = one.one_glass == freedom.one_glass ? kFairLead : kOneGlassLead;
         if (gained > needed && gained > most) {
           most = gained;
@@ -471,7 +469,7 @@ class TrainSearch {
   Identification compare(std::vector<Trial> trials) {
     Identification result;
     std::vector<Trial> chosen = one_of_each(std::move(trials));
-    // What the best one asks for is granted to all; then another may be the best.
+    // Freedoms needed by the best one are granted to all; then another may be the best.
     TrainFreedom freedom;
     Motion motion;
     std::vector<TrainFit> fits;
@@ -496,8 +494,8 @@ class TrainSearch {
           fits.begin(), fits.end(), [](const auto& a, const auto& b) { return a.rms < b.rms; });
       if (!std::isfinite(least->rms)) {
         throw EstimationError(
-            "no train follows the whole of this recording: its rotors could not be followed beyond "
-            "its middle");
+            "no train fits the whole recording: its rotors could not be followed beyond its "
+            "middle");
       }
       const auto now = static_cast<std::size_t>(least - fits.begin());
       progress_.report(0.6 + 0.1 * round);
@@ -529,7 +527,7 @@ class TrainSearch {
     return chosen;
   }
 
-  /// Whether the emitters' lags are none, those of shots that share a time, or others.
+  /// Whether the emitters' lags are zero, those of shots that share a time, or others.
   TrainFreedom settle_timing(TrainFit& best, TrainFreedom freedom, Identification& result) const {
     TrainFreedom without = freedom;
     without.lags = false;
@@ -572,7 +570,7 @@ class TrainSearch {
     }
     std::stable_sort(result.hypotheses.begin(), result.hypotheses.end(), smaller_excess);
     find_equivalents(result);
-    // All rows for the best one, and for rivals that the thinned ones do not dismiss.
+    // All rows for the best one, and for rivals not excluded by the thinned ones.
     const ShotGrid all = thinned(grid_, 0, grid_.size(), kMostShots);
     const double share = static_cast<double>(all.size()) / static_cast<double>(compared_.size());
     const auto fit_all = [&](Hypothesis& one) {
@@ -642,7 +640,7 @@ class TrainSearch {
   }
 
   /// The covariance without the assumption of one glass. The first prism of a single emitter on the
-  /// axis shows its deviation alone: variances of its index and wedge are infinite then.
+  /// axis shows only its deviation: variances of its index and wedge are infinite then.
   Eigen::MatrixXd with_glass_free(const ShotGrid& grid, const TrainFit& fit,
                                   TrainFreedom freedom) const {
     freedom.one_glass = false;
@@ -676,7 +674,7 @@ class TrainSearch {
     }
   }
 
-  /// Of equivalent trains, the one that somebody would build: wedges alike, then round ones.
+  /// Among equivalent trains, the most likely design: equal wedges, then round ones.
   /// @return whether that is another one
   static bool choose_representative(Identification& result) {
     const auto oddness = [](const Hypothesis& h) {
@@ -699,7 +697,7 @@ class TrainSearch {
     if (chosen == 0) return false;
     std::swap(all[0], all[chosen]);
     std::swap(all[0].excess, all[chosen].excess);
-    // Places changed: all of the class name each other anew.
+    // Places changed: all of the class list each other anew.
     for (Hypothesis& one : all) {
       for (std::size_t& place : one.equivalent_to) {
         if (place == 0) {
@@ -763,7 +761,7 @@ bool is_all_around(const ShotGrid& grid) {
   return static_cast<double>(*std::min_element(shots.begin(), shots.end())) >= fewest;
 }
 
-/// The lines of the beginning of a scan, and its emitters where they are not named.
+/// The lines of the beginning of a scan, and its emitters if they are not named.
 LineSpectrum lines_of(ShotGrid& grid, bool named, double window, bool all_around,
                       const IdentifyOptions& options) {
   ShotGrid head = rows_of(grid, 0, row_at(grid, window));
@@ -811,7 +809,7 @@ Identification identify(const estimation::AngleSeries& series, const IdentifyOpt
       result = TrainSearch(numbered, std::move(spectrum), window, true, options, progress).run();
       result.emitters_named = named;
       if (result.fits) return result;
-    } catch (const EstimationError&) {  // prisms may still have made it
+    } catch (const EstimationError&) {  // prisms are still possible
     }
   }
   for (double window = std::max(kLineWindow, kLineShots * grid.step);; window *= kLongerWindow) {

@@ -22,12 +22,12 @@ namespace {
 constexpr double kFewestCellsPerSecond = 1500;
 /// Least power of a line over the mean power of the spectrum.
 constexpr double kLinePower = 30;
-/// A rotor that does not turn evenly has a wide line: nothing is looked for so near to one that was
-/// found, in widths of a line.
+/// A rotor that does not turn evenly has a wide line: no other is searched this near to a line, in
+/// widths of a line.
 constexpr double kLineWidths = 2.5;
 /// Least significance of the means of places for a pattern of emitters.
 constexpr double kPatternPower = 50;
-/// A shorter period explains as much as any where it explains this share.
+/// A shorter period is chosen if it explains this share of the best.
 constexpr double kPatternShare = 0.97;
 
 /// Means of some neighbouring shots.
@@ -71,7 +71,7 @@ Cells cells_of(const ShotGrid& grid, const std::vector<Complex>& value) {
   return cells;
 }
 
-/// Least squares of a constant and lines, whose speeds are improved in the given number of steps.
+/// Least squares of a constant and lines, whose speeds are refined in the given number of steps.
 class JointFit {
  public:
   explicit JointFit(const Cells& cells) : cells_(cells), middle_(middle_of(cells)) {}
@@ -92,7 +92,7 @@ class JointFit {
     }
   }
 
-  /// @return mean square of what is left; the rest itself by cell
+  /// @return mean square of the remainder; the rest itself by cell
   double rest(std::vector<Complex>& left) const {
     left.resize(cells_.size());
     double sum = 0, count = 0;
@@ -164,7 +164,7 @@ class JointFit {
     }
     const Eigen::VectorXd step = algebra::SymmetricSolver(normal, 1e-9).solve(right);
     for (Eigen::Index k = 0; k < lines; ++k) {
-      // No further than a line is wide.
+      // No further than the width of a line.
       speed_[static_cast<std::size_t>(k)] += std::clamp(step[2 + 3 * k + 2], -1.0, 1.0) / half;
     }
   }
@@ -175,10 +175,10 @@ class JointFit {
   std::vector<Complex> amplitude_;
 };
 
-/// The strongest frequency of what is left that is none of the speeds.
+/// The strongest frequency of the remainder that is none of the speeds.
 struct Peak {
   double angular_velocity = 0;
-  double power = 0;  ///< over the mean of all powers that noise alone would give
+  double power = 0;  ///< over the mean of all powers expected from noise alone
 };
 
 Peak strongest(const Cells& cells, const std::vector<Complex>& left, double unexplained,
@@ -274,7 +274,8 @@ LineSpectrum line_spectrum(const ShotGrid& grid, const LineSpectrumOptions& opti
   LineSpectrum result;
   result.constant.assign(static_cast<std::size_t>(grid.emitters), {});
   std::vector<Line> found;
-  // The constants are means of what lines leave, and lines are fitted to what constants leave.
+  // The constants are means of the remainder without lines, and lines are fitted to that without
+  // constants.
   for (int round = 0; round < 2; ++round) {
     std::vector<Complex> moved = value;
     if (round > 0) {
@@ -299,7 +300,7 @@ LineSpectrum line_spectrum(const ShotGrid& grid, const LineSpectrumOptions& opti
     }
     found.clear();
     for (std::size_t k = 0; k < fit.speeds().size(); ++k) {
-      // What the mean over a cell takes off a line that turns meanwhile.
+      // Attenuation of a turning line by averaging over a cell.
       const double half_turn = 0.5 * fit.speeds()[k] * cells.length;
       const double kept = half_turn == 0 ? 1.0 : std::sin(half_turn) / half_turn;
       found.push_back({fit.speeds()[k], fit.amplitudes()[k + 1] / kept});

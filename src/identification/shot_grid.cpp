@@ -18,7 +18,7 @@ namespace risley::identification {
 namespace {
 
 constexpr std::size_t kFewestShots = 40;
-/// Recorded times that stand this share of a step off the grid are no rounded whole steps.
+/// Recorded times this share of a step off the grid are not rounded whole steps.
 constexpr double kLargestOffset = 0.3;
 
 }  // namespace

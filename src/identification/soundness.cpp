@@ -12,10 +12,10 @@
 namespace risley::identification {
 namespace {
 
-/// A wedge of fewer sigmas has not been seen.
+/// A wedge of fewer sigmas has not been detected.
 constexpr double kSeenSigmas = 3.0;
-/// Neighbouring residuals of noise are as good as independent. Of a train that leaves as much as
-/// the noise again, three hang together.
+/// Neighbouring residuals of noise are practically independent. In a train that leaves as much as
+/// the noise again, three are correlated.
 constexpr double kMostCorrelated = 3.0;
 
 }  // namespace
@@ -32,7 +32,7 @@ Doubt doubt_of(const Identification& found, const sensors::Sensor& sensor) {
     }
   }
   for (const FittedValue& value : fitted_values(found.best())) {
-    // What is held says how a deflection divides into wedge and glass, not whether it is there.
+    // Held values determine how a deflection divides into wedge and glass, not whether it exists.
     const double sigma =
         std::isfinite(value.sigma_given_held) ? value.sigma_given_held : value.sigma;
     if (!value.name.starts_with("wedge_angle_") || !std::isfinite(sigma)) continue;
@@ -43,8 +43,8 @@ Doubt doubt_of(const Identification& found, const sensors::Sensor& sensor) {
             false};
   }
   if (found.correlation_time_factor > kMostCorrelated) {
-    return {fmt::format("what the best train leaves is no noise: {:.0f} neighbouring shots are off "
-                        "alike",
+    return {fmt::format("the best train leaves residuals that are not noise: {:.0f} neighbouring "
+                        "shots have the same error",
                         found.correlation_time_factor),
             false};
   }

@@ -24,13 +24,13 @@ namespace {
 
 constexpr double kLowestIndex = 1.3, kHighestIndex = 2.3;
 constexpr double kTiltPrior = radians_from_degrees(0.3);
-/// The largest prism anyone builds into a scanner deviates by less.
+/// The largest prism in any scanner deviates by less.
 constexpr double kLargestDeviation = radians_from_degrees(40);
 
 constexpr std::size_t kChunkShots = 4096;
 constexpr double kOutlierSigmas = 6;
 
-/// One constant that is fitted. Of a prism the deviation stays while the glass changes; a wedge
+/// One constant that is fitted. For a prism the deviation stays while the glass changes; a wedge
 /// with two angles and a reflector have their angles as places.
 struct Unknown {
   enum class Kind { glass, deviation, place, lag, frame_yaw, frame_pitch };
@@ -107,7 +107,7 @@ void set_glass(PrismTrain& train, int prism, double index, double deviation) {
   if (is_prism(train, prism)) train.set_place(place::wedge_angle(prism), deviation / (index - 1.0));
 }
 
-/// All prisms of the mean index, their deviations as they were.
+/// All prisms with the mean index, their deviations unchanged.
 void make_one_glass(PrismTrain& train) {
   double index = 0;
   for (int k = 0; k < train.prisms(); ++k) {
@@ -116,7 +116,7 @@ void make_one_glass(PrismTrain& train) {
   for (int k = 0; k < train.prisms(); ++k) set_glass(train, k, index, deviation(train, k));
 }
 
-/// @return whether the values stay within what a sensor can be
+/// @return whether the values stay within possible ones
 bool apply(const std::vector<Unknown>& unknowns, const Eigen::VectorXd& step, TrainModel& model) {
   using Kind = Unknown::Kind;
   PrismTrain& train = model.train;
@@ -253,8 +253,7 @@ class TrainEquations {
     if (zenith != nullptr) zenith->assign(grid_.size(), 0.0);
     const bool turned = model.frame.yaw != 0 || model.frame.pitch != 0;
     const Eigen::Matrix3d back = estimation::recording_from_sensor(model.frame).transpose();
-    // The sums of the chunks are added in their order: the same numbers whatever the number of
-    // threads.
+    // The sums of the chunks are added in order: the same numbers for any number of threads.
     struct Sums {
       double squares = 0;
       Eigen::MatrixXd normal;
@@ -371,7 +370,7 @@ class TrainEquations {
     return sum;
   }
 
-  /// One row of the design: how an angle of one shot follows constants and motion.
+  /// One row of the design matrix: derivatives of one shot's angle by constants and motion.
   template <TrainLayout N, class Column>
   void fill(const Gradient<double, N>& gradient, const PrismTrain& train, int emitter,
             const std::array<double, N>& speeds, const CurveWeights& weights, int degree,
@@ -599,7 +598,7 @@ TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFre
         trial_cost = fit.cost(trial);
       }
       if (!(trial_cost < cost)) {
-        // Where not even the smallest of steps helps, this is the bottom.
+        // If not even the smallest step helps, this is the minimum.
         if (damping > 1e6) break;
         damping *= damping < 1e-6 ? 1e3 : 10;
         continue;

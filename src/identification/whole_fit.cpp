@@ -10,20 +10,20 @@
 namespace risley::identification {
 namespace {
 
-/// Segments of the curves that rotors may follow, s.
+/// Segments of the rotors' curves, s.
 constexpr std::array<double, 9> kSegmentLengths{1.6,  0.8,   0.4,    0.2,    0.1,
                                                 0.05, 0.025, 0.0125, 0.00625};
 constexpr double kUnknownPrice = 1.5;
 constexpr double kFewestSegmentShots = 30, kMostSegments = 250;
-/// Smaller is better. An unknown that chance alone fits gains 1. Motion that is not followed
-/// bends the optics, while an unknown of a curve too many costs little.
+/// Smaller is better. An unknown fitted to chance alone gains 1. Unmodelled motion bends the
+/// optics, while a surplus unknown of a curve costs little.
 double evidence(const TrainFit& fit, double limit) {
   const double angles = 2.0 * static_cast<double>(fit.azimuth_residual.size());
   return angles * std::log(mean_square(fit, limit)) +
          kUnknownPrice * static_cast<double>(fit.unknowns);
 }
 
-/// A model of the trial window carried on over all of a grid, in segments of about that length.
+/// A model of the trial window extended over all of a grid, in segments of about that length.
 std::optional<RotorCurves> carried(const ShotGrid& grid, const TrainModel& model, double length,
                                    const Progress& progress) {
   const double whole = grid.duration() + grid.step;

@@ -15,7 +15,7 @@ namespace risley::identification {
 /// First row at or after a time, s.
 std::size_t row_at(const ShotGrid& grid, double time);
 
-/// Shots that count as one: neighbouring residuals that hang together.
+/// Effective number of independent shots, given correlated neighbouring residuals.
 double correlation_factor(const TrainFit& fit);
 
 /// Difference of the two fits' chi squared, in units of the better one's residual.
@@ -26,7 +26,7 @@ std::optional<TrainFit> fit_whole(const ShotGrid& grid, const TrainModel& model,
                                   const TrainFreedom& freedom, const Motion& motion, int iterations,
                                   const Progress& progress);
 
-/// Chooses how the rotors' motion is described, by evidence: from long segments to short ones,
+/// Chooses the description of the rotors' motion by evidence: from long segments to short ones,
 /// until two in a row are worse; then the same with jumps between them.
 Motion choose_motion(const ShotGrid& grid, const TrainModel& model, const TrainFreedom& freedom,
                      const Progress& progress);

@@ -17,7 +17,7 @@
 namespace risley::io {
 namespace {
 
-/// Bytes that are written to the disk at once.
+/// Bytes written to the disk at once.
 constexpr std::uint64_t kDiskBytes = std::uint64_t{1} << 22;
 
 }  // namespace
@@ -32,7 +32,7 @@ int FileDescriptor::close() {
 }
 
 InputFile::InputFile(std::string path, std::string_view expected) : path_(std::move(path)) {
-  // A pipe would keep open() waiting without O_NONBLOCK, which regular files do not know.
+  // A pipe would block open() without O_NONBLOCK, which regular files ignore.
   const int descriptor = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
   const int problem = errno;
   file_ = std::make_shared<const FileDescriptor>(descriptor);
@@ -115,7 +115,7 @@ void BlockOutput::patch_u64(std::uint64_t offset, std::uint64_t value) {
     throw InvalidArgument(
         fmt::format("offset = {} of 8 bytes, allowed within the {} written", offset, size()));
   }
-  // A number may stand across the border of what was written already.
+  // A number may extend across the border of the bytes already written.
   std::uint8_t bytes[8];
   store<std::uint64_t>(bytes, value);
   if (offset >= written_) {
@@ -128,8 +128,8 @@ void BlockOutput::patch_u64(std::uint64_t offset, std::uint64_t value) {
 
 void BlockOutput::flush() {
   write_at(block_.data(), block_.size(), written_);
-  // The disk begins at once, so that commit() hardly waits: of a LAS file of 270 MB 0.1 s. Only a
-  // wish: whether it failed, commit() finds out.
+  // The disk begins immediately, so that commit() hardly waits: for a LAS file of 270 MB 0.1 s.
+  // Only a hint: commit() detects a failure.
   const std::uint64_t begin = written_ / kDiskBytes * kDiskBytes;
   const std::uint64_t end = (written_ + block_.size()) / kDiskBytes * kDiskBytes;
   if (end > begin) {

@@ -16,7 +16,7 @@ namespace {
 
 using namespace std::string_view_literals;
 
-/// A program that packs files, recognised by how its files begin.
+/// A compression program, recognised by the beginning of its files.
 struct Packing {
   std::string_view signature, name, command;
 };
@@ -45,7 +45,7 @@ std::string unpacked_name(const std::string& name) {
   return name + ".unpacked";
 }
 
-/// A text in the dialect in which tables are read.
+/// A text in the dialect used for reading tables.
 std::string in_plain_dialect(std::string_view text) {
   const TextDialect dialect = dialect_of(text);
   if (dialect.is_plain()) return std::string(text);
@@ -87,8 +87,7 @@ std::optional<std::string> stands_for_another(const std::string& path, std::stri
   }
   const std::string begin = lower_case(std::string(head.substr(0, 64)));
   if (begin.starts_with("<!doctype html") || begin.starts_with("<html")) {
-    return "is a page of the web (HTML), not the file itself: the download failed or wanted a "
-           "login";
+    return "is a web page (HTML), not the file itself: the download failed or required a login";
   }
   for (const Packing& packing : kPackings) {
     if (!head.starts_with(packing.signature)) continue;

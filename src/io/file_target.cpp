@@ -27,7 +27,7 @@ bool is_name_of_open_file(const fs::path& link) {
   return folder == "/dev" || (top != folder.end() && *top == "proc");
 }
 
-/// Puts a folder's entries on the disk. @return 0 or the error
+/// Syncs a folder's entries to disk. @return 0 or the error
 int sync_folder(const fs::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return errno == EACCES ? 0 : errno;  // may be written but not read

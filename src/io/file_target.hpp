@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// What outputs that are made in one go and outputs that grow share: which file they replace, and
-// how.
+// Common to outputs that are written in one go and outputs that grow: the file to replace, and how.
 #pragma once
 
 #include <cerrno>
@@ -14,11 +13,12 @@ namespace risley::io {
 /// What an output replaces.
 struct FileTarget {
   std::string path;     ///< behind symbolic links
-  bool copied = false;  ///< no regular file, or the name of an open one: bytes are copied into it
+  bool copied = false;  ///< not a regular file, or the name of an open one: bytes are copied into
+                        ///< it
   mode_t mode = 0666;   ///< of the temporary, which only this process reads
 };
 
-/// @throws FileError that names a path and a system's error
+/// @throws FileError with a path and a system error
 [[noreturn]] void refuse(const std::string& path, int error);
 
 /// Calls again what a signal interrupted.
@@ -29,18 +29,18 @@ auto whole(const Call& call) {
   return result;
 }
 
-/// Follows links to what is replaced. @throws FileError; std::system_error
+/// Follows links to the file to replace. @throws FileError; std::system_error
 FileTarget find_target(const std::string& path);
 
 /// Whether a name is that of an open file.
 bool is_named(int file, const std::string& path);
 
-/// Puts the bytes of a temporary on the disk and gives it the mode of what it replaces.
-/// @param path  as messages call the output  @throws FileError
+/// Syncs the bytes of a temporary to disk and gives it the mode of the replaced file.
+/// @param path  name of the output in messages @throws FileError
 void sync_output(const FileTarget& target, const std::string& path, int temporary,
                  const std::string& temporary_path);
 
-/// Gives a temporary its final name, for good. The name is cleared once it is gone.
+/// Renames a temporary to its final name. The name is cleared once it is gone.
 /// @throws FileError
 void replace_target(const FileTarget& target, const std::string& path, std::string& temporary_path);
 

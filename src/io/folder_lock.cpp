@@ -19,7 +19,7 @@
 namespace risley::io {
 namespace {
 
-/// Folders that this process has for itself.
+/// Folders locked by this process.
 struct OwnLocks {
   std::mutex mutex;
   std::set<FileIdentity> folders;
@@ -34,7 +34,7 @@ int open_folder(const std::string& folder) {
   return whole([&] { return ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); });
 }
 
-/// @return whether somebody else has it
+/// @return whether another process or descriptor holds it
 bool is_refused(int folder, int kind) {
   return whole([&] { return ::flock(folder, kind | LOCK_NB); }) != 0 && errno == EWOULDBLOCK;
 }
@@ -43,7 +43,7 @@ bool is_refused(int folder, int kind) {
 
 FolderLock::FolderLock(const std::string& folder) : folder_(open_folder(folder)) {
   if (folder_ < 0) return;
-  // Who only asks whether it is locked has it for a moment.
+  // A process that only checks the lock holds it for a moment.
   constexpr int kTries = 20;
   constexpr auto kPause = std::chrono::milliseconds(10);
   for (int tries = 1; is_refused(folder_, LOCK_EX); ++tries) {

@@ -19,14 +19,14 @@ namespace risley::io {
 namespace {
 
 constexpr std::uint64_t kBeginBytes = std::uint64_t{8} << 20U;
-/// Bytes that may be on their way to the disk: a second of three sensors at ten times their speed.
+/// Bytes that may be in transit to the disk: a second of three sensors at ten times their speed.
 constexpr std::uint64_t kMostOnTheWay = std::uint64_t{64} << 20U;
 
 FileTarget target_of(const std::string& path) {
   try {
     FileTarget target = find_target(path);
     if (target.copied) {
-      throw FileError(path, {}, "is no regular file, expected the name of a file");
+      throw FileError(path, {}, "is not a regular file, expected the name of a file");
     }
     return target;
   } catch (const std::system_error& error) {
@@ -87,7 +87,7 @@ void GrowingFile::write_what_comes() {
       failure = std::current_exception();
     }
     lock.lock();
-    if (failure) {  // what would follow has no place any more
+    if (failure) {  // later data have no place any more
       failure_ = failure;
       waiting_.clear();
       waiting_bytes_ = 0;
@@ -127,11 +127,11 @@ void GrowingFile::write(const std::vector<std::uint8_t>& bytes) {
     });
     if (count <= 0) {
       const int error = count < 0 ? errno : ENOSPC;
-      // What is not whole is taken back; where even that fails, readers stop at it.
+      // Partial data are removed; if even that fails, readers stop there.
       const bool taken_back = ::ftruncate(file_.get(), static_cast<off_t>(written_)) == 0;
       throw FileError(unfinished_path_, {written_, {}},
                       fmt::format("cannot be written: {}{}", std::strerror(error),
-                                  taken_back ? "; what was recorded before is in it" : ""));
+                                  taken_back ? "; it contains the data recorded so far" : ""));
     }
     done += static_cast<std::size_t>(count);
   }
@@ -139,9 +139,9 @@ void GrowingFile::write(const std::vector<std::uint8_t>& bytes) {
   if (written_ - begun_ >= kBeginBytes) hand_to_disk();
 }
 
-/// The disk begins at once: bytes that the system collects are lost with the machine, and later it
-/// makes writers wait until they are on the disk. What is there leaves memory: a file that fills it
-/// makes the system look for pages while packets wait.
+/// Writing to disk begins immediately: bytes cached by the system are lost when the machine dies,
+/// and later it makes writers wait until they are on disk. Written data leave the cache: a file
+/// that fills memory makes the system search for pages while packets wait.
 void GrowingFile::hand_to_disk() {
   const auto sync = [&](std::uint64_t from, std::uint64_t to, unsigned how) {
     return ::sync_file_range(file_.get(), static_cast<off_t>(from), static_cast<off_t>(to - from),

@@ -51,12 +51,13 @@ constexpr std::string_view kMark = ".part-";
 constexpr std::size_t kMarkBytes = 18;  // with the random name
 constexpr std::size_t kLongestName = 255;
 
-/// The name of a file with what every temporary of it begins with.
+/// The common prefix of all temporaries of a file.
 std::string marked(const std::string& name) {
   return name.substr(0, kLongestName - kMarkBytes).append(kMark);
 }
 
-/// File systems where a lock is of the whole file, so that the temporary's own writers would wait.
+/// File systems on which a lock applies to the whole file, so that the temporary's own writers
+/// would wait.
 bool locks_are_shared(int file) {
   constexpr std::array<unsigned, 3> kNetworkTypes = {0x6969, 0xff534d42, 0xfe534d42};  // NFS, SMB
   struct statfs system {};
@@ -65,8 +66,8 @@ bool locks_are_shared(int file) {
                    static_cast<unsigned>(system.f_type)) != kNetworkTypes.end();
 }
 
-/// Marks an open file as one that somebody is writing. The kernel takes the lock back when its
-/// owner ends in whatever way; numbers of processes, which containers share, play no part.
+/// Marks an open file as being written. The kernel releases the lock however its owner ends;
+/// process ids, which containers share, are not used.
 /// @return whether this is its only owner; false without such locks
 bool lock(int file) {
   if (locks_are_shared(file)) return false;
@@ -84,13 +85,13 @@ void remove_orphan(const std::string& path) {
   struct stat status {};
   const bool ours = ::fstat(file, &status) == 0 && S_ISREG(status.st_mode) &&
                     status.st_uid == ::geteuid() && status.st_nlink == 1;
-  // Its owner, if it was about to lock it, finds the name gone and takes another.
+  // An owner about to lock it finds the name gone and takes another.
   if (ours && lock(file) && is_named(file, path)) ::unlink(path.c_str());
   ::close(file);
 }
 
-/// Removes the temporaries of runs that were killed while they wrote this output. A folder is
-/// listed once by a process: those that come later are of its own time.
+/// Removes the temporaries of runs that were killed while writing this output. A process lists a
+/// folder only once: temporaries created later belong to running processes.
 void remove_orphans(const fs::path& output) {
   static std::mutex mutex;
   static std::map<std::string, std::vector<std::string>> temporaries;  // by their folder
@@ -186,6 +187,17 @@ OutputFile::~OutputFile() {
   if (temporary_path_.empty()) return;
   ::unlink(temporary_path_.c_str());
   forget_temporary(temporary_path_);
+}
+
+void OutputFile::move_to(std::string path) {
+  try {
+    const FileTarget target = find_target(path);
+    target_ = target.path;
+    copied_ = target.copied;
+    path_ = std::move(path);
+  } catch (const std::system_error& error) {
+    throw FileError(path, {}, fmt::format("cannot be written: {}", error.code().message()));
+  }
 }
 
 void OutputFile::sync() const {

@@ -28,13 +28,13 @@ bool is_ascii_every_second(std::string_view bytes, std::size_t first) {
   return true;
 }
 
-/// Text in quotes and what is not; quotes may stand within a field that begins with one.
+/// Text with and without quotes; quotes may occur within a field that begins with one.
 struct Field {
   std::string text;
   bool quoted = false;
 };
 
-/// Fields of a line of which some may be in quotes; nothing where a quote is not closed.
+/// Fields of a line, some of which may be in quotes; nothing if a quote is not closed.
 std::optional<std::vector<Field>> quoted_fields(std::string_view line, char delimiter) {
   std::vector<Field> fields(1);
   bool inside = false;
@@ -54,7 +54,7 @@ std::optional<std::vector<Field>> quoted_fields(std::string_view line, char deli
   return fields;
 }
 
-/// A number with a comma where others have a point.
+/// A number with a decimal comma.
 bool is_comma_number(std::string_view field) {
   const auto comma = field.find(',');
   if (comma == field.npos || comma + 1 == field.size() || !is_digit(field[comma + 1])) return false;
@@ -74,7 +74,7 @@ bool is_separator_line(std::string_view line) {
   return line.size() == kStatement.size() + 1 && line.starts_with(kStatement);
 }
 
-/// Whole lines of rows, the last ones of a text's beginning.
+/// Complete lines of rows, the last ones of a text's beginning.
 std::vector<std::string_view> last_rows(std::string_view text) {
   constexpr std::size_t kRows = 8;
   std::vector<std::string_view> rows;
@@ -93,7 +93,7 @@ std::vector<std::string_view> last_rows(std::string_view text) {
   return rows;
 }
 
-/// The dialect of rows whose fields this stands between; nothing where it does not.
+/// The dialect of rows with this separator; nothing if it does not fit.
 std::optional<TextDialect> dialect_between(char delimiter,
                                            const std::vector<std::string_view>& rows) {
   // With blanks, a date with a time may look like two fields.

@@ -178,7 +178,7 @@ bool LineReader::next(std::string_view& line) {
   line = std::string_view(start, static_cast<std::size_t>(stop - start));
   if (!line.empty() && line.back() == '\r') {
     line.remove_suffix(1);
-    has_line_end_ = true;  // the line feed alone was cut off
+    has_line_end_ = true;  // only the line feed was cut off
   }
   if (line_number_++ == 0 && line.starts_with(kByteOrderMark)) {
     line.remove_prefix(kByteOrderMark.size());

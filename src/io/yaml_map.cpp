@@ -30,7 +30,7 @@ std::size_t line_of(const YAML::Mark& mark) {
   return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;
 }
 
-/// Makes the tree of one document of what the library's parser finds in it.
+/// Builds the tree of one document from the events of the library's parser.
 class TreeBuilder final : public YAML::EventHandler {
  public:
   explicit TreeBuilder(const std::string& path) : path_(path) {}

@@ -23,7 +23,7 @@ using calibration::RangedRecording;
 
 constexpr std::size_t kMostBeams = 50000;  // of all recordings
 
-/// Directions of some shots before and after, and where the beams really went.
+/// Directions of some shots before and after, and the true ones.
 struct Beams {
   std::vector<Vector3<double>> before, after, truth;
 };
@@ -111,7 +111,7 @@ FlightTruth compare_flight_beams(const std::vector<RangedRecording>& recordings,
   FlightTruth result;
   result.sensor = sensors::load_sensor(truths.front());
   result.mount = trajectories::load_mount(truth_mount(truths.front()));
-  // As if the sensor sat on the body as it was designed to.
+  // As if the sensor sat on the body as designed.
   const auto turn = [&](const trajectories::Mount& mount) {
     return Eigen::Matrix3d(given.nominal.transpose() * trajectories::body_from_sensor(mount));
   };

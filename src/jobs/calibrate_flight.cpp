@@ -28,7 +28,7 @@ namespace {
 using calibration::CalibrationCode;
 using calibration::RangedRecording;
 
-/// Checks the options before anything is read.
+/// Checks the options before reading anything.
 void check_flight_options(const CalibrateFlightOptions& options) {
   check_ranged_input(options);
   if (options.range_noise) require_positive(kSetting.noise_range, *options.range_noise);
@@ -49,8 +49,8 @@ cloud::MovingPlatform platform_of(const CalibrateFlightOptions& options, const P
   cloud::MovingPlatform platform = load_platform(options.platform, progress);
   if (!platform.errors) {
     throw InvalidArgument(
-        fmt::format("{} states no accuracies: give {}, which says how wrong the trajectory may be "
-                    "and for how long. Without it, strips that do not fit may be the fault of "
+        fmt::format("{} states no accuracies: give {}, which states the size and duration of the "
+                    "trajectory's errors. Without it, strips that do not fit may be the fault of "
                     "either the sensor or the trajectory",
                     options.platform.trajectory.name(), name_of(kSetting.trajectory_errors)));
   }
@@ -64,17 +64,17 @@ std::vector<scenes::KnownGround> control_of(const std::string& path,
   scenes::Control control = scenes::load_control(path);
   if (trajectory.frame == trajectories::Frame::local) {
     if (!control.crs.empty()) {
-      throw InvalidArgument(fmt::format(
-          "{} gives known ground on the map {}, but the trajectory is in a local frame that no map "
-          "knows: give the places in that frame, without crs",
-          path, control.crs));
+      throw InvalidArgument(
+          fmt::format("{} gives known ground on the map {}, but the trajectory is in a local frame "
+                      "without a place on a map: give the places in that frame, without crs",
+                      path, control.crs));
     }
     return std::move(control.ground);
   }
   if (control.crs.empty()) {
     throw InvalidArgument(
-        fmt::format("{} does not say on which map its places are, and the trajectory is "
-                    "geocentric: add crs, such as EPSG:25832",
+        fmt::format("{} does not state the map of its places, and the trajectory is geocentric: "
+                    "add crs, such as EPSG:25832",
                     path));
   }
   const cloud::MapProjection map(control.crs, control.datum.empty() ? "EPSG:4979" : control.datum);
@@ -92,7 +92,7 @@ std::vector<scenes::KnownGround> control_of(const std::string& path,
   return std::move(control.ground);
 }
 
-/// What is added to the recordings' times to get those of the trajectory, ns.
+/// Offset from the recordings' times to those of the trajectory, ns.
 std::int64_t shift_of(const CalibratedFlight& result, const trajectories::Trajectory& trajectory,
                       std::int64_t first_ns, std::vector<Warning>& warnings) {
   const bool utc =
@@ -105,8 +105,8 @@ std::int64_t shift_of(const CalibratedFlight& result, const trajectories::Trajec
     warn(warnings, kWarning.clock_unknown,
          "{}: its times are taken to be on the trajectory's clock, after adding the clock offset "
          "of the mount",
-         utc ? "the trajectory does not say what its times count"
-             : "the recordings do not say what their clock counts");
+         utc ? "the trajectory does not state its time scale"
+             : "the recordings do not state the time scale of their clock");
   }
   return shift.value_or(0);
 }
@@ -209,7 +209,7 @@ CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options, const P
         "needed, and crossing ones are best",
         options.platform.trajectory.name(), result.strips.size()));
   }
-  // By the recordings' clock: what the offset really is will be found.
+  // By the recordings' clock: the real offset is still to be found.
   std::vector<trajectories::FlownStrip> strips = result.strips;
   for (trajectories::FlownStrip& strip : strips) {
     strip.begin_ns -= offset_ns;

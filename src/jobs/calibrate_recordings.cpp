@@ -45,7 +45,7 @@ std::string states_name(const CalibrateRecordingsOptions& options, std::size_t r
   return options.recordings.size() == 1 ? "states.nc" : fmt::format("states_{}.nc", recording + 1);
 }
 
-/// calibration.yaml, unless the sensor's own belief serves as well or better.
+/// calibration.yaml, unless the sensor's own parameters are as good or better.
 void write_files(const CalibrateRecordingsOptions& options, CalibratedRecordings& result,
                  ResultFolder& folder, InputHashes& hashes, const Progress& progress) {
   result.provenance = hashes.with_inputs(options.files.provenance);
@@ -76,7 +76,7 @@ void check(const CalibrateRecordingsOptions& options) {
   if (options.method == calibration::CalibrationMethod::paper &&
       (options.planes || !options.stations.empty() || options.prior_sigma)) {
     throw InvalidArgument(fmt::format(
-        "{} paper cannot be combined with {}, {} or {}: it uses the walls of the recordings alone",
+        "{} paper cannot be combined with {}, {} or {}: it uses only the walls of the recordings",
         name_of(kSetting.method), name_of(kSetting.planes), name_of(kSetting.stations),
         name_of(kSetting.prior_sigma)));
   }

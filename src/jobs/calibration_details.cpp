@@ -35,7 +35,7 @@ class FieldMeans {
     sum.first += first;
     sum.second += second;
   }
-  /// Hands every cell with points enough to function(count, mean of the first, of the second).
+  /// Passes every cell with enough points to function(count, mean of the first, of the second).
   template <class Function>
   FieldCells for_each(int fewest, Function&& function) const {
     FieldCells cells{kSurfaceCell, {}, {}};
@@ -56,7 +56,7 @@ class FieldMeans {
   std::map<std::pair<long, long>, Sum> sums_;
 };
 
-/// Where in the field of view points lie beyond their planes, and where before them.
+/// Distances of points from their planes over the field of view, beyond or in front.
 std::optional<WallField> wall_field(const std::vector<const SamplePoint*>& points) {
   WallField result;
   result.fewest_points = kFewestPointsInCell;
@@ -84,7 +84,7 @@ std::optional<WallField> wall_field(const std::vector<const SamplePoint*>& point
   return result;
 }
 
-/// How wrong reported directions are in each part of the field of view.
+/// Errors of reported directions over the field of view.
 std::optional<PointingField> pointing_field(const Calibration& c,
                                             const std::vector<SamplePoint>& sample) {
   FieldMeans means;

@@ -31,7 +31,7 @@ std::string with_letter(const char* name, std::size_t prism) {
   return fmt::format("{}_{}", name, static_cast<char>('a' + prism));
 }
 
-/// Whether an estimate or a calibration answers, and what it says of itself.
+/// Whether an estimate or a calibration succeeded, and its verdict.
 template <class Found>
 bool take_answer(const Found& found, CellOutcome& outcome) {
   outcome.answered = found.converged;
@@ -80,7 +80,7 @@ void take(const CalibratedRecordings& found, CellOutcome& outcome) {
                     {"directions_reported", found.truth->before.total, kUnknown}};
 }
 
-/// A message is of the cell, not of the folder where its recording happened to be.
+/// A message belongs to the cell, not to the folder of its recording.
 std::string without_folder(std::string message, const std::string& folder) {
   const std::string prefix = folder + "/";
   for (std::size_t at = message.find(prefix); at != std::string::npos; at = message.find(prefix)) {
@@ -140,7 +140,7 @@ CellOutcome outcome_in(const std::string& folder, const CampaignSetting& setting
   for (std::size_t i = 0; i < setting.simulations.size(); ++i) {
     simulation::SimulationSettings settings = setting.simulations[i];
     settings.seed = cell.seed;
-    // Stations are recorded one after the other, by rotors that meanwhile turned on.
+    // Stations are recorded one after the other, while the rotors continue to turn.
     if (i > 0) settings.seed += i * (std::uint64_t{1} << 32U);
     recordings.push_back((fs::path(folder) / fmt::format("{}{}", i + 1, setting.format)).string());
     simulation::simulate_to_file(settings, recordings.back(), {}, progress);

@@ -114,7 +114,7 @@ ChunkHead read_chunk(const std::string& path, const Progress& progress,
     ChunkHead head;
     const ChunkJson json = next();
     if (!json.is_object() || json.value(kChunkKind, 0) != kChunkVersion) {
-      fail("this is no chunk of a campaign, or one of another version of risley");
+      fail("this is not a chunk of a campaign, or it is from another version of risley");
     }
     json.at("work").get_to(head.work);
     json.at("program").get_to(head.program);
@@ -132,7 +132,7 @@ ChunkHead read_chunk(const std::string& path, const Progress& progress,
     if (next().at("sha256") != hashes::sha256(std::string_view(text).substr(0, whole))) {
       fail("the SHA-256 is not that of the lines above: the file was changed");
     }
-    if (begin != text.size()) fail("there is more after the end");
+    if (begin != text.size()) fail("data follow after the end");
     return head;
   } catch (const ChunkJson::exception& error) {
     fail(fmt::format("cannot be read: {}", error.what()));

@@ -14,7 +14,7 @@
 
 namespace risley::jobs {
 
-/// What a file of cells says of itself.
+/// Head of a file of cells.
 struct ChunkHead {
   std::string work;     ///< CampaignPlan::work
   std::string program;  ///< CampaignOptions::program
@@ -26,14 +26,14 @@ struct ChunkHead {
 /// Where the chunks of a campaign are kept: FOLDER/chunks.
 std::string chunk_folder(const std::string& folder);
 
-/// Writes cells, in their order, as lines of JSON: the head, one line per cell, and at the end the
+/// Writes cells, in order, as lines of JSON: the head, one line per cell, and at the end the
 /// SHA-256 of all lines before. @throws FileError
 void save_chunk(const std::string& path, const ChunkHead& head,
                 const std::vector<CellOutcome>& outcomes);
 
-/// Reads such a file to its end and calls with every cell, when the head is known and before
-/// anything is known of the end.
-/// @throws FileError with the line for what is damaged or no such file; Cancelled
+/// Reads such a file to its end and calls with every cell, once the head is known and before the
+/// end is checked.
+/// @throws FileError with the line for damage or another kind of file; Cancelled
 ChunkHead read_chunk(const std::string& path, const Progress& progress,
                      const std::function<void(const ChunkHead&, CellOutcome&&)>& call = {});
 

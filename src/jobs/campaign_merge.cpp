@@ -45,7 +45,7 @@ double chi2_per_degree(double degrees, double exceeded) {
 }
 
 BandedFigure mean_square(double value, double degrees) {
-  if (degrees > 1000) {  // where the series of the exact one grows long
+  if (degrees > 1000) {  // from here on the series of the exact one grows long
     return {value, chi_square_per_degree(degrees, -kTwoSided95),
             chi_square_per_degree(degrees, kTwoSided95)};
   }
@@ -144,7 +144,7 @@ class SettingSums {
   NamedSums parameters_, errors_;
 };
 
-/// Names in the order in which they were first seen.
+/// Names in the order of first occurrence.
 class Names {
  public:
   /// @return whether it is new
@@ -184,7 +184,7 @@ class CellTable {
         {"setting", CellKind::integer, "1", "number of the setting, from 0"},
         {"seed", CellKind::integer, "1", "seed of the simulation"}};
     for (const std::string& name : grid_.all()) {
-      columns.push_back({name, CellKind::text, "", "of the setting, as the plan has it"});
+      columns.push_back({name, CellKind::text, "", "of the setting, as in the plan"});
     }
     columns.push_back({"answered", CellKind::integer, "1",
                        "1 where the estimate or the calibration converged, 0 otherwise"});
@@ -195,22 +195,22 @@ class CellTable {
       columns.push_back({name + ".truth", CellKind::real, unit, "true value"});
       columns.push_back({name + ".error", CellKind::real, unit, "found minus true value"});
       columns.push_back({name + ".sigma", CellKind::real, unit,
-                         "1 sigma, what was held and may be off included"});
+                         "1 sigma, including possible errors of held parameters"});
       columns.push_back({name + ".sigma_given_held", CellKind::real, unit,
-                         "1 sigma if everything that was held is exactly as held"});
+                         "1 sigma if all held parameters are exact"});
     }
     columns.push_back({"nees_parameters", CellKind::real, "1",
-                       "squared error of the prisms' parameters, weighed by their covariance, per "
+                       "squared error of the prisms' parameters, weighted by their covariance, per "
                        "degree of freedom"});
     columns.push_back({"degrees_of_freedom", CellKind::integer, "1", "of nees_parameters"});
     columns.push_back(
-        {"nees_rotation_angles", CellKind::real, "1", "the same of rotation angles, mean"});
+        {"nees_rotation_angles", CellKind::real, "1", "the same for rotation angles, mean"});
     for (const std::string& name : errors_.all()) {
       const std::string full = name_with_unit(name);
       const std::string unit = full.ends_with("_per_s") ? "deg/s" : "deg";
       columns.push_back({full + ".rmse", CellKind::real, unit, "root mean square error"});
       columns.push_back(
-          {full + ".rmse_stated", CellKind::real, unit, "the same as the estimate states it"});
+          {full + ".rmse_stated", CellKind::real, unit, "the same as stated by the estimate"});
     }
     return columns;
   }
@@ -259,7 +259,7 @@ struct SoundChunk {
   ChunkHead head;
 };
 
-/// All files of cells, those that count by their first cell.
+/// All files of cells, the valid ones sorted by their first cell.
 std::vector<SoundChunk> find_chunks(const CampaignPlan& plan, const CampaignOptions& options,
                                     CellTable& table, CampaignResult& result,
                                     const Progress& progress) {
@@ -273,7 +273,7 @@ std::vector<SoundChunk> find_chunks(const CampaignPlan& plan, const CampaignOpti
     throw FileError(folder, {}, fmt::format("cannot be read: {}", code.message()));
   }
   if (files.empty()) {
-    throw FileError(folder, {}, "no chunk of a campaign is there, such as chunk-1-of-40.jsonl");
+    throw FileError(folder, {}, "there is no chunk of a campaign, such as chunk-1-of-40.jsonl");
   }
   std::sort(files.begin(), files.end());
   std::vector<SoundChunk> sound;
@@ -282,7 +282,7 @@ std::vector<SoundChunk> find_chunks(const CampaignPlan& plan, const CampaignOpti
     try {
       const auto check = [&](const ChunkHead& head) {
         if (head.work != plan.work) {
-          throw FileError(file, {}, "it was made of another plan, or of other files");
+          throw FileError(file, {}, "it was made from another plan, or from other files");
         }
         if (head.program != options.program) {
           throw FileError(

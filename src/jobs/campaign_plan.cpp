@@ -61,12 +61,12 @@ std::string canonical(const YamlNode& node) {
   return fmt::format("{{{}}}", fmt::join(parts, ","));
 }
 
-/// A value as text: as it is written.
+/// A value as text: unchanged.
 std::string shown(const YamlNode& node) {
   return node.kind == YamlNode::Kind::scalar ? node.scalar : canonical(node);
 }
 
-/// Puts a value at a name such as simulate.set.wedge_angle_deg, in place of what is there.
+/// Sets a value at a name such as simulate.set.wedge_angle_deg, replacing the previous one.
 void put(YamlNode& node, std::string_view name, const YamlNode& value, const std::string& path,
          std::size_t line) {
   if (name.empty()) {
@@ -75,7 +75,7 @@ void put(YamlNode& node, std::string_view name, const YamlNode& value, const std
   }
   if (node.kind == YamlNode::Kind::nothing) node.kind = YamlNode::Kind::map;
   if (node.kind != YamlNode::Kind::map) {
-    fail_at(path, line, fmt::format("grid: {} is below a value that is no map", name));
+    fail_at(path, line, fmt::format("grid: {} is below a value that is not a map", name));
   }
   const std::size_t dot = name.find('.');
   const std::string_view key = name.substr(0, dot);
@@ -109,7 +109,7 @@ class PlanReader {
       SimulationOptions one = simulation;
       one.station = station;
       result.simulations.push_back(simulation_settings(one));
-      // Whatever a simulation refuses, it refuses now. A short one: rotors take time to turn.
+      // Values that a simulation rejects are rejected now. A short one: rotors take time to turn.
       simulation::SimulationSettings begin = result.simulations.back();
       begin.duration = std::min(begin.duration, 1.0);
       const simulation::Scanner can_be_simulated(std::move(begin));
@@ -131,7 +131,7 @@ class PlanReader {
     return result;
   }
 
-  /// Files that were named, as the plan has them, with their paths.
+  /// Files named in the plan, with their paths.
   const std::map<std::string, std::string>& files() const { return files_; }
 
  private:
@@ -273,7 +273,7 @@ class PlanReader {
         job.additional.push_back(io::yaml_text(item, path_, "a name in " + map.field("free")));
       }
     }
-    // Unknown names and values out of bounds are refused before the first cell.
+    // Unknown names and values out of bounds are rejected before the first cell.
     sensors::Sensor held = believed;
     hold(job.fixed, held);
     estimation::free_parameters(job.additional, shape);
@@ -393,7 +393,7 @@ CampaignPlan parse_campaign_plan(const std::string& text, const std::string& pat
   map.at("simulate");
   if ((map.find("estimate") == nullptr) == (map.find("calibrate") == nullptr)) {
     fail_at(path, map.line(),
-            "expected either estimate or calibrate: what is done with what is simulated");
+            "expected either estimate or calibrate: how to process the simulations");
   }
   CampaignPlan plan;
   plan.path = path;

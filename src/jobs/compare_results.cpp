@@ -39,7 +39,7 @@ double sigma_of(const NamedCovariance& known, const std::string& name) {
   return at < 0 ? 0 : std::sqrt(known.matrix(at, at));
 }
 
-/// Parameters that a result held though they may be off: nothing comes on top of their sigma.
+/// Parameters that a result held though they may be off: nothing is added to their sigma.
 std::vector<std::string> held_names(const Sensor& sensor) {
   std::vector<std::string> names;
   for (const std::string& name : sensor.covariance_names) {
@@ -57,7 +57,7 @@ bool hold_alike(const Sensor& a, const Sensor& b) {
          });
 }
 
-/// Both results, each with the covariance that its part of a difference has.
+/// Both results, each with its covariance of the difference.
 struct Pair {
   const Sensor &a, &b;
   NamedCovariance known_a, known_b;
@@ -76,17 +76,17 @@ bool is_shared(const PrismTrain& train, const ParameterInfo& parameter) {
                      [&](int place) { return train[place] == train[parameter.places.front()]; });
 }
 
-/// Every place of the train once: what all prisms share by its name for all; the range offset, and
-/// sizes of prisms that a calibration found.
+/// Every place of the train once: common parameters under their common name; the range offset, and
+/// sizes of prisms from a calibration.
 std::vector<ParameterDifference> differences(const Pair& pair) {
   const Sensor &a = pair.a, &b = pair.b;
   std::vector<ParameterDifference> result;
-  std::vector<bool> told(static_cast<std::size_t>(parameter_count(a.shape())), false);
+  std::vector<bool> listed(static_cast<std::size_t>(parameter_count(a.shape())), false);
   for (const ParameterInfo& one : parameter_list(a.shape())) {
     if (one.kind != ParameterKind::train) continue;
     if (!is_shared(a.train, one) || !is_shared(b.train, one)) continue;
-    if (told[static_cast<std::size_t>(one.places.front())]) continue;
-    for (const int place : one.places) told[static_cast<std::size_t>(place)] = true;
+    if (listed[static_cast<std::size_t>(one.places.front())]) continue;
+    for (const int place : one.places) listed[static_cast<std::size_t>(place)] = true;
     result.push_back(difference_of(one.name, pair, a.get(one.name), b.get(one.name)));
   }
   for (const sensors::RangeValue& value : sensors::range_values(b.train.emitters())) {
@@ -250,7 +250,7 @@ Sensor load_result(const GivenSensor& given) {
         fmt::format("is missing: estimate and calibrate write it only if their result is better "
                     "than what the sensor believed{}",
                     fs::exists(fs::path(path) / "report.html", ignored)
-                        ? "; report.html beside it says why it is not"
+                        ? "; report.html beside it gives the reason"
                         : ""));
   }
   return sensors::load_sensor(*file);

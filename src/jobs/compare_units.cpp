@@ -3,6 +3,7 @@
 #include "risley/jobs/compare_units.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -43,8 +44,8 @@ std::string text_of(const tables::TableCell& cell) {
   return text == nullptr ? std::string() : *text;
 }
 
-/// Names in a table are those of the folder in which it was made; a table and its results may have
-/// been moved together.
+/// Names in a table are relative to its folder; a table and its results may have been moved
+/// together.
 std::string result_beside(const std::string& table, const std::string& output) {
   std::error_code ignored;
   if (fs::exists(output, ignored) || fs::path(output).is_absolute()) return output;
@@ -52,7 +53,7 @@ std::string result_beside(const std::string& table, const std::string& output) {
   return fs::exists(beside, ignored) ? beside : output;
 }
 
-/// Whether a file or folder is in the folder of a table, or below, by whatever links.
+/// Whether a file or folder is in the folder of a table, or below, whatever links lead to it.
 bool is_below_folder_of(const std::string& table, const std::string& path) {
   std::error_code code;
   const fs::path folder = fs::canonical(fs::absolute(table).parent_path(), code);
@@ -63,7 +64,7 @@ bool is_below_folder_of(const std::string& table, const std::string& path) {
          folder.end();
 }
 
-/// Follows one row to its result. @return why there is none, or nothing
+/// Follows one row to its result. @return reason if there is none, or nothing
 std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
                                 const std::vector<tables::TableCell>& cells, bool anywhere,
                                 LoadedResults& loaded) {
@@ -80,12 +81,12 @@ std::optional<LeftOut> load_row(const std::string& table, std::size_t row,
   const std::string path = result_beside(table, output);
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return LeftOut{name, fmt::format("{} is missing", path), true};
-  // A table may come from anybody: what it names is not opened wherever it is.
+  // A table may come from anyone: files that it names are not opened anywhere.
   if (!anywhere && !is_below_folder_of(table, path)) {
     return LeftOut{
         name,
         fmt::format(
-            "{} is not in the folder of {}: results elsewhere are opened on demand alone ({})",
+            "{} is not in the folder of {}: results elsewhere are opened only on request ({})",
             path, table, name_of(kSetting.anywhere)),
         true};
   }
@@ -214,13 +215,13 @@ bool are_unlike(const Sensor& a, const Sensor& b) {
          a.reference != b.reference;
 }
 
-/// @throws InvalidArgument where nothing else was to be compared
+/// @throws InvalidArgument if there was nothing else to compare
 void leave_out_unlike(ComparedUnits& found, const std::vector<Sensor>& sensors) {
   const auto words = [&](const ComparedPair& pair) {
     const bool first = sensors[pair.a].reference == sensors::CalibrationReference::planes;
     return fmt::format(
-        "{} is a calibration, which says where beams truly go, and {} an estimate of what the "
-        "sensor believes: they differ in a unit that never changed ({} compares them)",
+        "{} is a calibration, which holds true directions, and {} an estimate of the sensor's own "
+        "parameters: they differ even in a unit that never changed ({} compares them)",
         found.results[first ? pair.a : pair.b], found.results[first ? pair.b : pair.a],
         name_of(kSetting.unlike));
   };
@@ -260,6 +261,19 @@ void compare(ComparedUnits& found, const std::vector<Sensor>& sensors, const Pro
   }
 }
 
+std::vector<std::int64_t> written_ms(const std::vector<std::string>& results) {
+  using namespace std::chrono;
+  std::vector<std::int64_t> times;
+  for (const std::string& result : results) {
+    std::error_code problem;
+    const auto time = fs::last_write_time(calibration_in(result).value_or(result), problem);
+    if (problem) return {};
+    times.push_back(
+        duration_cast<milliseconds>(file_clock::to_sys(time).time_since_epoch()).count());
+  }
+  return times;
+}
+
 }  // namespace
 
 ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& progress) {
@@ -269,6 +283,7 @@ ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& 
   LoadedResults loaded = load(options, found.left_out, progress);
   require_at_least("number of results", static_cast<long long>(loaded.paths.size()), 2);
   found.results = loaded.paths;
+  found.written_ms = written_ms(found.results);
   found.units = units_of(loaded, found.left_out);
   found.is_one_series = !loaded.any_table || found.units.size() == 1;
   if (found.is_one_series) {

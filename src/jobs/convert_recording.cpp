@@ -14,7 +14,7 @@
 namespace risley::jobs {
 namespace {
 
-/// The header to write, with a type of sensor where the recording does not state it.
+/// The header to write, with a type of sensor if the recording does not state it.
 recordings::RecordingHeader header_of(PreparedRecording& input,
                                       const ConvertRecordingOptions& options,
                                       ConvertedRecording& result, const Progress& progress) {
@@ -52,7 +52,8 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
                                               {.untold = UntoldShots::guessed}, progress.silent());
   const std::unique_ptr<recordings::Reader>& reader = input.reader;
   const auto writer = recordings::create_recording(
-      options.output, header_of(input, options, result, progress.silent()), options.format);
+      options.output, header_of(input, options, result, progress.silent()), options.format,
+      options.writing);
   input.close_questions();
   // While one chunk is written, the next is read.
   recordings::Chunk chunk, next;
@@ -61,7 +62,7 @@ ConvertedRecording convert_recording(const ConvertRecordingOptions& options,
     try {
       return reader->read(next);
     } catch (const FileError& error) {
-      result.damage = error;  // the sound part is worth keeping
+      result.damage = error;  // the undamaged part is worth keeping
       return false;
     }
   };

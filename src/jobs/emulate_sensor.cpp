@@ -33,11 +33,11 @@ constexpr std::int64_t kLongestRest = 20'000'000, kShortestRest = 200'000;  // n
 constexpr int kPacketsAtOnce = 256;
 constexpr double kFastest = 100;
 constexpr std::int64_t kFarthestJump = 3600;  // s
-/// Of a status: what synchronises the clock.
+/// Of a status: the time source of the clock.
 constexpr std::uint32_t kPpsSignal = 1U << 9U, kPtpSignal = 1U << 13U, kSyncByPtp = 1U << 14U,
                         kSyncByPps = 3U << 14U;
 
-/// What sensors of a type can do. @param device_type  as recordings::Device::type
+/// Capabilities of a sensor type. @param device_type  as recordings::Device::type
 wire::SensorAbilities abilities_of(std::uint8_t device_type) {
   const bool is_avia = device_type == recordings::kAvia;
   wire::SensorAbilities abilities;
@@ -49,8 +49,8 @@ wire::SensorAbilities abilities_of(std::uint8_t device_type) {
   return abilities;
 }
 
-/// Decisions with a share, one after the other; each purpose has its own, so that one fault does
-/// not change where others fall.
+/// Random decisions with a given share, in sequence; each purpose has its own, so that one fault
+/// does not move others.
 class Chance {
  public:
   Chance(std::uint64_t seed, std::uint64_t purpose, double share)
@@ -67,7 +67,7 @@ class Chance {
   std::uint64_t index_ = 0;
 };
 
-/// A packet that is to be sent.
+/// A packet to send.
 struct Outgoing {
   std::vector<std::uint8_t> bytes;
   wire::Endpoint to;
@@ -83,7 +83,7 @@ struct Stream {
   std::int64_t first_ns = 0;  ///< of the sensor's clock
   std::int64_t begin_ns = 0;  ///< of real time
   std::uint64_t number = 0;   ///< packets since then
-  std::uint64_t of_all = 0;   ///< packets since the start, whatever their types
+  std::uint64_t of_all = 0;   ///< packets since the start, of all types
   std::uint64_t imu_number = 0;
   bool sent_any = false;
   std::uint64_t pending_lost = 0;
@@ -151,19 +151,19 @@ class Emulator {
   const Progress& progress_;
   EmulatedScan scan_;
   double rate_;  ///< of its clock, to this machine's
-  /// Of power-on, as its clock has it.
+  /// Since power-on, on its clock.
   std::int64_t epoch_ns_ = 0;
   bool has_source_ = false, has_jumped_ = false;
   wire::Interface interface_;
   std::vector<wire::UdpSocket> sockets_;         // one for each port
-  std::vector<wire::UdpSocket> public_sockets_;  // for what is sent to everybody
+  std::vector<wire::UdpSocket> public_sockets_;  // for broadcasts
   Chance loss_, duplication_, disorder_, damage_;
   wire::SensorIdentity identity_;
   std::unique_ptr<wire::SensorSession> session_;
   std::optional<Stream> stream_;
   std::multimap<std::uint64_t, Outgoing> overtaken_;  // by the packet that they follow
   std::deque<Outgoing> delayed_;
-  std::set<std::uint64_t> sent_once_;  // whose copy has still to be sent
+  std::set<std::uint64_t> sent_once_;  // whose copy must still be sent
   std::int64_t power_on_ns_ = 0, dead_until_ns_ = 0;
   std::optional<std::int64_t> first_start_ns_;
   bool restarted_ = false, heart_dead_ = false, heart_died_ = false;
@@ -206,7 +206,7 @@ void Emulator::power_off(std::int64_t now, std::int64_t time_ns) {
   dead_until_ns_ = now + time_ns;
 }
 
-/// Gains the source of its time and lets its clock jump when it is time.
+/// Acquires its time source and lets its clock jump when it is time.
 void Emulator::set_clock(std::int64_t now) {
   if (!first_start_ns_) return;
   const EmulatedClock& clock = options_.clock;
@@ -228,12 +228,12 @@ void Emulator::set_clock(std::int64_t now) {
     scan_.set_header(clock.source, by_ptp ? kPtpSignal | kSyncByPtp : kPpsSignal | kSyncByPps);
     if (clock.source_from > 0 && stream_) {
       ++truth_.clock_jumps;
-      note_(fmt::format("its time is that of {} now", to_string(clock.source)));
+      note_(fmt::format("it now uses the time of {}", to_string(clock.source)));
     }
   }
   if (clock.jump && !has_jumped_ && since_start >= *clock.jump) {
     has_jumped_ = true;
-    // No clock shows less than nothing.
+    // A clock does not go below zero.
     const std::int64_t jump_ns =
         std::max(static_cast<std::int64_t>(1e9 * clock.jump_by), -stamp(next_time_ns(now)));
     epoch_ns_ += jump_ns;
@@ -246,7 +246,7 @@ void Emulator::set_clock(std::int64_t now) {
   if (session_) session_->set_clock(sync, stamp(clock_ns(now)) - now);
 }
 
-/// Of what is sent next, since power-on.
+/// Of the next packet, since power-on.
 std::int64_t Emulator::next_time_ns(std::int64_t now) const {
   if (!stream_) return clock_ns(now);
   const std::int64_t packet =
@@ -293,7 +293,7 @@ void Emulator::say(std::int64_t now) {
   }
 }
 
-/// Starts, stops and changes what is sent as commands have it.
+/// Starts, stops and changes the data according to commands.
 void Emulator::follow_session(std::int64_t now) {
   if (!session_->connected()) heart_dead_ = false;
   if (!session_->sampling()) {
@@ -315,7 +315,7 @@ void Emulator::follow_session(std::int64_t now) {
       if (datagram.to) socket_of(datagram.from).send(*datagram.to, datagram.bytes);
     }
     ++truth_.restarts;
-    note_("restarts as it was told to");
+    note_("restarts on command");
     power_off(now, *delay + static_cast<std::int64_t>(1e9 * options_.faults.restart_time));
   }
 }
@@ -402,7 +402,7 @@ void Emulator::let_go(std::int64_t now, bool all) {
 
 void Emulator::send(const Outgoing& packet) {
   const bool sent = socket_of(session_->data_port()).send(packet.to, packet.bytes);
-  // Of two copies the one that is sent first counts.
+  // Of two copies only the one sent first counts.
   if (packet.twice && !sent_once_.insert(packet.number).second) {
     sent_once_.erase(packet.number);
     if (sent) ++truth_.duplicates;

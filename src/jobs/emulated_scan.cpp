@@ -36,7 +36,7 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   SimulationOptions wanted = options;
   wanted.duration = kScanDuration;
   wanted.rate = 100'000;
-  wanted.quantize = false;  // what a packet holds is rounded as the sensor does
+  wanted.quantize = false;  // the contents of packets are rounded as by the sensor
   simulation::SimulationSettings settings = simulation_settings(wanted);
   const int type = settings.truth.device_type;
   const std::optional<ShotGrid> grid = grid_of_type(type);
@@ -50,7 +50,7 @@ simulation::SimulationSettings settings_of(const SimulationOptions& options) {
   return settings;
 }
 
-/// Reads the next shots; after the last ones come the first again.
+/// Reads the next shots; the last ones are followed by the first again.
 void read_on(const simulation::SimulationSettings& settings,
              std::unique_ptr<simulation::Scanner>& scanner, recordings::Chunk& chunk) {
   recordings::TruthColumns truth;
@@ -75,7 +75,7 @@ EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& 
   if (bend.empty()) return;
   if (recorded_) {
     throw InvalidArgument(
-        fmt::format("{} changes simulated optics: the shots of a recording are as they are",
+        fmt::format("{} changes simulated optics: it does not apply to the shots of a recording",
                     name_of(kSetting.bend)));
   }
   SimulationOptions bent = options;
@@ -83,7 +83,7 @@ EmulatedScan::EmulatedScan(const SimulationOptions& options, const std::string& 
     bent.set.emplace_back(name, settings_.truth.get(name) + change);
   }
   bent_settings_ = settings_of(bent);
-  // What the sensor believes of itself does not change.
+  // The sensor's own parameters do not change.
   bent_settings_->reported = settings_.reported;
 }
 
@@ -99,7 +99,7 @@ void EmulatedScan::begin() {
 }
 
 void EmulatedScan::set_header(recordings::TimeReference source, std::uint32_t status) {
-  // Of pulses the second generation makes whole times, with what it is told besides.
+  // With pulses, the second generation sends complete times, using the hour that the host sets.
   const bool has_pulses = source == recordings::TimeReference::pps;
   header_.timestamp_type = numbered()
                                ? time_type_of(has_pulses ? recordings::TimeReference::utc : source)

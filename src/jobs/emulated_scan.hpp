@@ -16,12 +16,13 @@
 
 namespace risley::jobs {
 
-/// Packets of a scan that never ends, simulated or recorded.
+/// Packets of an endless scan, simulated or recorded.
 class EmulatedScan {
  public:
-  /// @param recording  path; empty: what options simulate
-  /// @param bend  what bend() adds to parameters of the true sensor, SI units; not of a recording
-  /// @throws InvalidArgument where Livox has no such type of sensor, and as RecordedScan; FileError
+  /// @param recording  path; empty: simulated by the options
+  /// @param bend  the changes of bend() to parameters of the true sensor, SI units; not for a
+  /// recording
+  /// @throws InvalidArgument if Livox has no such type of sensor, and as RecordedScan; FileError
   EmulatedScan(const SimulationOptions& options, const std::string& recording,
                const ParameterValues& bend = {});
 
@@ -31,18 +32,18 @@ class EmulatedScan {
   bool numbered() const { return recordings::is_second_generation(device_.type); }
   /// The sensor starts: packets are numbered from 0, and times are from power-on.
   void begin();
-  /// What headers say from now on. @param status  Packet::status, of the first generation
+  /// State reported in headers from now on. @param status  Packet::status, of the first generation
   void set_header(recordings::TimeReference source, std::uint32_t status);
   /// Observations of a packet of points.
   std::size_t rows(std::uint8_t data_type) const { return layout_of(data_type).rows(); }
   /// The next packet of points. @param time_ns  of its first shot
   /// @return header and records, until the next call
   std::span<const std::uint8_t> next(std::uint8_t data_type, std::int64_t time_ns);
-  /// From now on its optics are others. Its rotors and its noise go on as they would have.
+  /// From now on it has other optics. Its rotors and its noise continue unchanged.
   void bend() { bent_ = true; }
   /// An inertial sample of a sensor at rest.
   std::span<const std::uint8_t> imu(std::int64_t time_ns);
-  /// Time of so many packets of a type, ns.
+  /// Duration of this many packets of a type, ns.
   std::int64_t time_of(std::uint64_t packets, std::uint8_t data_type) const;
   /// Packets in a time.
   std::uint64_t packets_in(std::int64_t time_ns, std::uint8_t data_type) const;
@@ -55,7 +56,7 @@ class EmulatedScan {
   recordings::livox::RecordLayout layout_of(std::uint8_t data_type) const;
   /// Makes room for its records. @return where they go
   std::uint8_t* begin_packet(std::uint8_t data_type);
-  /// Writes what stands in front of them. @return the packet
+  /// Writes the header before them. @return the packet
   std::span<const std::uint8_t> end_packet(std::uint8_t data_type, std::int64_t time_ns);
 
   simulation::SimulationSettings settings_;

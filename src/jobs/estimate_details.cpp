@@ -45,7 +45,7 @@ ResidualPlane plane_of(ResidualMap map) {
   ResidualPlane result;
   std::vector<std::uint64_t> counts = map.count;
   const double typical = counts.empty() ? 1.0 : static_cast<double>(upper_median(counts));
-  // A rim cell that few beams graze would decide the colours of all others.
+  // A rim cell grazed by few beams would dominate the colours of all others.
   result.fewest_shots = std::max(kFewestShotsInCell, std::ceil(kFewestOfTypical * typical));
   result.azimuth_noise = map.sigma_azimuth / std::sqrt(typical);
   result.zenith_noise = map.sigma_zenith / std::sqrt(typical);

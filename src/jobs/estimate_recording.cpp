@@ -41,11 +41,11 @@ void write_files(const EstimateRecordingOptions& options, EstimatedRecording& re
   append(result.warnings, folder.commit());
 }
 
-/// What rotors say of the clock that turn too fast or too slowly all by the same factor.
+/// Conclusion about the clock from rotors that all turn too fast or too slowly by the same factor.
 std::string clock_words(const estimation::SpeedFactor& factor, double counted_rate) {
   std::string words = fmt::format(
-      "all rotors turn {:.5f} ± {:.5f} times as fast as is usual for this type, as they would "
-      "appear to if the clock of the recording were wrong",
+      "all rotors turn {:.5f} ± {:.5f} times as fast as usual for this type, as they would appear "
+      "to with a wrong recording clock",
       factor.value, factor.sigma);
   if (counted_rate > 0) {
     words += fmt::format(
@@ -153,6 +153,9 @@ EstimatedRecording estimate_recording(const EstimateRecordingOptions& options,
   judging.check();
   if (!options.truth.empty()) {
     result.evaluation = evaluate_by_file(result.estimate, options.truth);
+  }
+  if (options.noise_model || options.details) {
+    result.noise_model = estimation::noise_model(result.estimate, result.nominal);
   }
   if (options.details) {
     result.details =

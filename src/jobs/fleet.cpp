@@ -37,7 +37,7 @@ double probability_beyond(double z, double degrees) {
   return Eigen::numext::betainc(0.5 * degrees, 0.5, degrees / (degrees + z2));
 }
 
-/// A value and its sigma; NaN where the unit does not know it.
+/// A value and its sigma; NaN if the unit has none.
 struct Known {
   double value = 0, sigma = std::numeric_limits<double>::quiet_NaN();
 };
@@ -49,7 +49,7 @@ Known known_of(const Sensor& unit, const NamedCovariance& known, const std::stri
   return {value_of(unit, name), std::sqrt(variance)};
 }
 
-/// Everything that the bundle of beams follows from, in the middle of the fleet.
+/// Everything that determines the beam bundle, in the middle of the fleet.
 Sensor middle_of(const std::vector<Sensor>& units, const Fleet& fleet) {
   Sensor middle = units.front();
   middle.covariance_names.clear();
@@ -67,13 +67,13 @@ Sensor middle_of(const std::vector<Sensor>& units, const Fleet& fleet) {
   return middle;
 }
 
-/// How the units lie in one quantity.
+/// Distribution of the units in one quantity.
 struct Scatter {
   double middle = 0, spread = 0;
   std::vector<double> robust_z;  ///< [units]
 };
 
-/// Nothing where too few units know it.
+/// Nothing if too few units have it.
 std::optional<Scatter> scatter_of(const std::vector<Known>& known) {
   std::vector<double> values;
   for (const Known& one : known) {
@@ -100,7 +100,7 @@ void add_parameter(const std::string& name, const std::vector<Known>& known, Fle
   }
 }
 
-/// A unit that knows all of the fleet's parameters.
+/// A unit that has all of the fleet's parameters.
 struct WholeUnit {
   std::size_t place;
   Eigen::VectorXd values;
@@ -161,7 +161,7 @@ void add_combinations(const std::vector<Sensor>& units, const std::vector<NamedC
   }
 }
 
-/// The parameter that adds most to how far a unit is off in a combination.
+/// The parameter that contributes most to a unit's deviation in a combination.
 std::size_t largest_part(const Sensor& unit, const Fleet& fleet, Eigen::Index combination) {
   std::size_t largest = 0;
   double most = 0;

@@ -35,12 +35,12 @@ using calibration::TrajectoryKnots;
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostStrips = 100, kMostDrawnPairs = 6;
 constexpr std::size_t kMostPlaces = 3000, kMostStripPlaces = 200, kFewestStripPlaces = 2;
-constexpr double kShotsPerPlane = 48;         // that the sample must leave, on average
-constexpr double kAreaSquare = 10;            // with which the flown area is measured, m
+constexpr double kShotsPerPlane = 48;         // required mean number left by the sample
+constexpr double kAreaSquare = 10;            // for measuring the flown area, m
 constexpr std::size_t kAreaPoints = 200'000;  // that it is measured with
 constexpr double kLargestPlane = 20;          // m
-constexpr std::size_t kFewestStripShots = 5;  // that say where a strip lies in a cell
-constexpr double kGate = 3;                   // range sigmas beyond which a point does not count
+constexpr std::size_t kFewestStripShots = 5;  // that determine the offset of a strip in a cell
+constexpr double kGate = 3;                   // range sigmas beyond which a point is rejected
 constexpr double kClockMargin = 1e-3;         // s
 constexpr std::uint64_t kSampleStream = 1701;
 
@@ -63,7 +63,7 @@ FlightShots sample_of(const FlightShots& shots, std::size_t most, std::uint64_t 
   return calibration::rows_of(shots, rows);
 }
 
-/// The same knots for shots that are some of those they were made for.
+/// The same knots for a subset of their shots.
 TrajectoryKnots knots_for(TrajectoryKnots knots, const FlightShots& shots) {
   const auto row_at = [&](std::uint16_t strip, std::int64_t time_ns) {
     std::size_t first = 0, last = shots.size();
@@ -119,7 +119,7 @@ double plane_size_of(const ShotPoints& points, double wished) {
   return std::max(wished, std::min(std::ceil(size), kLargestPlane));
 }
 
-/// How the strips lie in the cells of one state of the calibration.
+/// Offsets of the strips in the cells for one state of the calibration.
 struct LaidStrips {
   GroundCells cells;
   std::vector<StripInCell> strips;
@@ -152,7 +152,7 @@ std::vector<double> roughness_of(const ShotPoints& points, const GroundCells& ce
   return roughness;
 }
 
-/// A mean, or a mean of squares, as it comes.
+/// A running mean, or mean of squares.
 struct Sum {
   double sum = 0;
   std::size_t count = 0;
@@ -167,7 +167,7 @@ struct BeforeAfter {
   Sum before, after;
 };
 
-/// What a square of a picture holds of its cells.
+/// Sums over the cells of a picture's square.
 struct SquareOfGround {
   BeforeAfter squares;
   Sum roughness, slope;

@@ -49,13 +49,13 @@ estimation::AngleSeries read(const recordings::Source& recording,
   if (result.cropped) {
     warn(result.warnings, kWarning.packets_incomplete,
          "the optics of {} were used to find when the shots in packets with missing points were "
-         "fired: what is found here is not independent of them",
+         "fired: the result here is not independent of them",
          input.choice->sensor.name);
   }
   return selector.take_series();
 }
 
-/// The built-in preset that has the identified train.
+/// The built-in preset with the identified train.
 void find_like(IdentifiedRecording& result) {
   const bool together = result.identification.timing == EmitterTiming::together;
   double least = std::numeric_limits<double>::infinity();
@@ -64,8 +64,8 @@ void find_like(IdentifiedRecording& result) {
     for (const sensors::Sensor& sensor : sensors::in_all_combinations(type)) {
       const auto like = identification::likeness(result.identification, sensor);
       if (!like) continue;
-      // Presets that share a train: first those that are no mirror image, then those whose
-      // emitters fire alike.
+      // Presets that share a train: first those that are not mirror images, then those with the
+      // same firing scheme.
       const bool fires_together =
           sensor.sequence && sensor.sequence->firing == sensors::Firing::together;
       const double distance =
@@ -89,15 +89,14 @@ void judge(IdentifiedRecording& result) {
         "none of the trains of up to three prisms that were tried describes this scan: the best "
         "one leaves {}",
         rms);
-    result.to_do =
-        result.cropped
-            ? "export the recording again without cropping or filtering it: a small part of the "
-              "field of view shows no lines; what is known of a sensor holds there, too, and is "
-              "what an estimate begins with"
-            : fmt::format(
-                  "check the times ({} gives the rate of shots that are counted) and that the "
-                  "recording is of one sensor at rest",
-                  name_of(kSetting.shot_rate));
+    result.to_do = result.cropped
+                       ? "export the recording again without cropping or filtering it: a small "
+                         "part of the field of view shows no lines; for a known sensor, an "
+                         "estimate works there, too, because it starts from known values"
+                       : fmt::format(
+                             "check the times ({} gives the rate of counted shots) and that the "
+                             "recording is of one sensor at rest",
+                             name_of(kSetting.shot_rate));
     return;
   }
   if (!found.decided) {
@@ -116,7 +115,7 @@ void judge(IdentifiedRecording& result) {
         doubt.refuted ? IdentificationVerdict::inconsistent : IdentificationVerdict::undecided;
     result.words = fmt::format("{}; it leaves {}", doubt.words, rms);
     result.to_do =
-        "check that the recording is of one sensor at rest, with prisms that all turn, and record "
+        "check that the recording is of one sensor at rest, with all prisms turning, and record "
         "for longer";
     return;
   }
@@ -132,19 +131,19 @@ void say_what_is_never_told(IdentifiedRecording& result) {
   if (found.emitters == 1) {
     words.emplace_back(
         "a single emitter on the axis shows only how far the first prism deflects its beam: the "
-        "prism's face order, wedge angle and refractive index cannot be separated, and it is taken "
-        "to be of the same glass as the others");
+        "prism's face order, wedge angle and refractive index cannot be separated, and its glass "
+        "is assumed to be that of the others");
   } else if (found.freedom.one_glass) {
     words.emplace_back(
-        "the prisms are taken to be of the same glass, which fits the data; the sigmas do not rely "
-        "on that");
+        "the prisms are assumed to be of the same glass, which fits the data; the sigmas do not "
+        "rely on that");
   }
   words.emplace_back(
       "a wedge of the opposite sign is the same wedge rotated by half a turn, and the mirror image "
       "of a scan is the scan of the same prisms turning the other way");
   words.emplace_back(
-      "refractive indices are relative to that of the air; windows, and fixed wedges in front of "
-      "the first prism, cannot be seen");
+      "refractive indices are relative to air; windows, and fixed wedges in front of the first "
+      "prism, cannot be detected");
 }
 
 void write(const recordings::Source& recording, const IdentifyRecordingOptions& options,

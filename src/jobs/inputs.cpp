@@ -45,7 +45,7 @@ bool is_folder_of_recordings(const std::string& name) {
   return fs::is_directory(name, ignored) && !recordings::is_recording_folder(name);
 }
 
-/// What risley itself writes beside recordings and into results.
+/// Files that risley itself writes beside recordings and into results.
 bool is_own_output(const std::string& name) {
   return ::fnmatch("states*.nc", name.c_str(), 0) == 0 || name.ends_with(".truth.nc") ||
          name.ends_with(".trajectory.csv");
@@ -59,8 +59,8 @@ bool looks_like_recording(const fs::path& path) {
                      [&name](const std::string& ending) { return name.ends_with(ending); });
 }
 
-/// Absolute, without "..", links as they are, and without a slash at its end; the current folder
-/// for an empty name.
+/// Absolute, without "..", links unresolved, and without a trailing slash; the current folder for
+/// an empty name.
 fs::path whole_path(const fs::path& path) {
   const fs::path whole = (fs::current_path() / path).lexically_normal();
   return whole.has_filename() || whole == whole.root_path() ? whole : whole.parent_path();
@@ -75,7 +75,7 @@ class Finder {
     }
   }
 
-  /// @param once  whether a file may not be named a second time
+  /// @param once  whether giving a file a second time is an error
   void add(const std::string& name, bool once) {
     progress_.check();
     found_.clear();
@@ -145,14 +145,14 @@ class Finder {
   }
 
   void take(const std::string& path, bool once) {
-    // Files that are missing have nothing but their names.
-    const std::pair<std::optional<io::FileIdentity>, std::string> who = {
+    // Missing files have only their names.
+    const std::pair<std::optional<io::FileIdentity>, std::string> identity = {
         io::file_identity(path),
         io::file_identity(path) ? std::string() : whole_path(path).string()};
-    if (once && !named_.insert(who).second) {
-      throw InvalidArgument(fmt::format("{} is named twice: once is enough", path));
+    if (once && !named_.insert(identity).second) {
+      throw InvalidArgument(fmt::format("{} is given twice: once is enough", path));
     }
-    if (taken_.insert(who).second) inputs_.push_back({path, {}});
+    if (taken_.insert(identity).second) inputs_.push_back({path, {}});
   }
 
   bool is_excluded(const fs::path& path) const {
@@ -161,8 +161,8 @@ class Finder {
     return identity && excluded_.contains(*identity);
   }
 
-  /// What a folder holds, sorted; a folder that cannot be listed is found itself, so that somebody
-  /// is told.
+  /// Contents of a folder, sorted; a folder that cannot be listed counts as an input, so that
+  /// reading it reports the error.
   std::vector<fs::path> entries_of(const fs::path& folder) {
     progress_.check();
     std::vector<fs::path> entries;
@@ -182,7 +182,7 @@ class Finder {
     return fs::is_directory(fs::symlink_status(path, ignored));  // links may lead in circles
   }
 
-  /// A link that leads nowhere is a file that is missing: who reads it is told.
+  /// A broken link counts as a file: reading it reports that the file is missing.
   static bool is_file_or_broken_link(const fs::path& path) {
     std::error_code ignored;
     return fs::is_regular_file(path, ignored) ||
@@ -204,7 +204,7 @@ class Finder {
     }
   }
 
-  /// Names that a pattern stands for, from one of its parts on.
+  /// Names that match a pattern, from one of its parts on.
   void expand(const fs::path& folder, const std::vector<fs::path>& parts, std::size_t part) {
     const std::string name = parts[part].string();
     const bool is_last = part + 1 == parts.size();
@@ -243,8 +243,8 @@ class Finder {
   const Progress& progress_;
   std::set<io::FileIdentity> excluded_;
   std::set<std::pair<std::optional<io::FileIdentity>, std::string>> taken_, named_;
-  std::vector<fs::path> roots_;     ///< the deepest folders that names stand in for sure
-  std::vector<std::string> found_;  ///< of the name that is being added
+  std::vector<fs::path> roots_;     ///< the deepest folders certain to contain the names
+  std::vector<std::string> found_;  ///< of the name being added
   std::vector<Input> inputs_;
 };
 
@@ -276,7 +276,7 @@ std::vector<Input> find_inputs(const InputNames& wanted, const Progress& progres
       finder.add(std::string(line), false);
     }
     if (is_empty) {
-      throw InvalidArgument(fmt::format("{}: {} names no recording, expected one a line",
+      throw InvalidArgument(fmt::format("{}: {} names no recording, expected one per line",
                                         name_of(kSetting.list), wanted.list));
     }
   }

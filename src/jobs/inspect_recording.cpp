@@ -14,7 +14,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   PreparedRecording input =
       prepare_recording(options.recording, options.reading, {.untold = UntoldShots::guessed},
                         progress.stage("placing"));
-  if (!options.excerpt.empty()) {  // first, because it may have to be refused
+  if (!options.excerpt.empty()) {  // first, because it may have to be rejected
     result.excerpt =
         recordings::write_excerpt(input.source, options.excerpt, options.excerpt_options,
                                   input.reading, progress.stage("sharing"));
@@ -22,7 +22,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
   if (input.reader->header().devices.size() == 1) {
     try {
       input.choose({}, progress.stage("recognising"));
-    } catch (const InvalidArgument&) {  // no preset of that type: the header names it all the same
+    } catch (const InvalidArgument&) {  // no preset of that type: the header names it anyway
     }
   }
   std::string removed;
@@ -38,7 +38,7 @@ InspectedRecording inspect_recording(const InspectRecordingOptions& options,
       reading.report(reader->fraction_read());
     }
   } catch (const FileError& error) {
-    result.damage = error;  // what was sound before is still reported
+    result.damage = error;  // the undamaged part is still reported
   }
   result.header = reader->header();
   result.audit = audit.result();

@@ -18,7 +18,7 @@ bool is_trajectory(const InspectTrajectoryOptions& options, const recordings::Re
       trajectories::trajectory_file_kind(options.trajectory, progress.silent()) ==
           trajectories::TrajectoryFileKind::none) {
     if (options.accuracy.empty()) return false;
-    throw InvalidArgument(fmt::format("{} goes with a trajectory, and {} is none",
+    throw InvalidArgument(fmt::format("{} goes with a trajectory, and {} is not one",
                                       name_of(kSetting.accuracy), options.trajectory));
   }
   const std::pair<bool, Setting> of_recordings[] = {

@@ -85,12 +85,12 @@ InputResult result_of(const Line& line) {
   return result;
 }
 
-/// The progress of all jobs together.
+/// The combined progress of all jobs.
 class SharedProgress {
  public:
   SharedProgress(std::size_t jobs, const Progress& shown) : fraction_(jobs), shown_(shown) {}
 
-  /// For one of them. Its stages each go from 0 to 1; what it has reached once stays reached.
+  /// For one of them. Its stages each go from 0 to 1; it never goes back.
   Progress of(std::size_t job) {
     return shown_.with([this, job](double fraction, std::string_view) { reach(job, fraction); });
   }
@@ -144,7 +144,8 @@ InputPlan plan_inputs(const ManyInputsOptions& options, const InputWork& work,
                                       name_of(kSetting.resume), name_of(kSetting.output),
                                       name_of(kSetting.table)));
   }
-  // Results of one input without more have always stood alone; a table alone has nothing to resume.
+  // A single result without more has no folder of its own; with a table alone there is nothing to
+  // resume.
   if (plan.many && (!options.output.empty() || options.resume)) {
     plan.journal = journal_beside(options.output.empty() ? options.table : options.output);
   }
@@ -191,10 +192,10 @@ std::string work_text(const std::string& program,
   return fmt::format("{}\n{}\n", program, fmt::join(lines, "\n"));
 }
 
-/// Lines of JSON in a file that grows, to be read in any order.
+/// Lines of JSON in a growing file, with random access.
 class InputRun::Journal {
  public:
-  /// @param path  empty: a temporary file  @param go_on  behind the lines that are there
+  /// @param path  empty: a temporary file @param go_on  append to the existing lines
   Journal(const std::string& path, bool go_on)
       : path_(path.empty() ? fs::temp_directory_path().string() : path),
         file_(nullptr, &std::fclose) {
@@ -202,11 +203,11 @@ class InputRun::Journal {
     file_.reset(path.empty() ? std::tmpfile() : std::fopen(path.c_str(), go_on ? "a+e" : "w+e"));
     if (!file_) fail();
     if (go_on) find_lines();
-    // A line that a crash cut off ends here.
+    // Terminates a line that a crash cut off.
     write("\n{\"risley\":\"records\"}\n");
   }
 
-  /// Where the last line of every place begins, of earlier runs.
+  /// Start of the last line of every place, from earlier runs.
   const std::map<std::string, long>& earlier() const { return earlier_; }
 
   /// @return where it begins
@@ -332,7 +333,7 @@ ExitStatus InputRun::run_job(std::size_t place, const Progress& progress) {
   InputOutcome outcome;
   bool is_made = false;
   try {
-    // Before the work: if the file changes meanwhile, the result is made again.
+    // Before the work: if the file changes meanwhile, the result is recomputed.
     hashes_[place] = input_hashes(job.input, progress.silent());
     if (resume_) {
       if (const std::optional<ExitStatus> before = made_before(place, progress)) return *before;
@@ -345,7 +346,7 @@ ExitStatus InputRun::run_job(std::size_t place, const Progress& progress) {
   } catch (...) {
     outcome = work_.failed(job);
   }
-  // What stands where a failed result would be is of an earlier run.
+  // A file in the place of a failed result is from an earlier run.
   const FileHashes outputs = is_made ? outputs_of(job, progress) : FileHashes();
   lines_[place] = journal_->add({{"place", job.place},
                                  {"work_sha256", work_hash_},
@@ -359,7 +360,7 @@ ExitStatus InputRun::run_job(std::size_t place, const Progress& progress) {
   return outcome.status;
 }
 
-/// Files of a result, named by their place beside the journal, so that both may be moved.
+/// Files of a result, named relative to the journal, so that both may be moved.
 FileHashes InputRun::outputs_of(const InputJob& job, const Progress& progress) const {
   FileHashes outputs;
   if (plan_.journal.empty()) return outputs;
@@ -373,7 +374,7 @@ FileHashes InputRun::outputs_of(const InputJob& job, const Progress& progress) c
   return outputs;
 }
 
-/// The status of a result that need not be made again, which is noted.
+/// The status of a result that need not be recomputed, which is recorded.
 std::optional<ExitStatus> InputRun::made_before(std::size_t place, const Progress& progress) {
   const InputJob& job = plan_.jobs[place];
   const auto found = journal_->earlier().find(job.place);
@@ -387,7 +388,7 @@ std::optional<ExitStatus> InputRun::made_before(std::size_t place, const Progres
     }
     const FileHashes outputs = outputs_of(job, progress);
     const auto noted = line.at("outputs").get<FileHashes>();
-    // Of a result that went well, its files and no others.
+    // For a successful result, its files and no others.
     if (status == kDone && outputs.size() != noted.size()) return std::nullopt;
     for (const auto& output : noted) {
       if (std::find(outputs.begin(), outputs.end(), output) == outputs.end()) return std::nullopt;

@@ -38,13 +38,13 @@ trajectories::Trajectory trajectory_of(const GivenTrajectory& given, const std::
 cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& progress) {
   if (files.trajectory.empty()) {
     throw InvalidArgument(
-        fmt::format("{} is missing: mount, accuracies, errors and crs are for a sensor that moves",
+        fmt::format("{} is missing: mount, accuracies, errors and crs are for a moving sensor",
                     name_of(kSetting.trajectory)));
   }
   if (files.mount.empty()) {
     throw InvalidArgument(
-        fmt::format("{} is missing: a file that says how the sensor sits on the platform of the "
-                    "trajectory (axes, lever arm, boresight, clock)",
+        fmt::format("{} is missing: a file that describes how the sensor is mounted on the "
+                    "platform of the trajectory (axes, lever arm, boresight, clock)",
                     name_of(kSetting.mount)));
   }
   cloud::MovingPlatform platform;

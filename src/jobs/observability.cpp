@@ -15,7 +15,7 @@
 namespace risley::jobs {
 namespace {
 
-/// What both kinds have in common.
+/// Common to both kinds.
 estimation::EstimateOptions settings_of(const ObservabilityOptions& options,
                                         sensors::Sensor sensor) {
   estimation::EstimateOptions result;

@@ -10,25 +10,30 @@
 #include <thread>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "risley/core/error.hpp"
 #include "risley/core/progress.hpp"
 #include "risley/jobs/sensor_choice.hpp"
 #include "risley/parallel/parallel.hpp"
-#include "risley/recordings/livox/numbered_packet.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
+
+#include "jobs/network_unit.hpp"
 
 namespace risley::jobs {
 namespace {
 
-using recordings::livox::PacketDecoder;
 using recordings::livox::ShotGrid;
 
-/// What only the thread has of a sensor.
+/// One of this many shots with a return is shown, and at most this many are kept for the viewer:
+/// some seconds. The number is prime, so that every emitter is among them.
+constexpr std::size_t kShownOf = 61, kMostSeen = 10'000;
+
+/// Data of a sensor used only by the thread.
 struct Followed {
-  std::optional<PacketDecoder> decoder;  // of the first generation
+  explicit Followed(std::uint8_t device_type) : packets(device_type) {}
+
+  UnitPackets packets;
   std::optional<estimation::RunningEstimate> estimate;
+  std::size_t returns = 0;  // since the last one shown
 };
 
 }  // namespace
@@ -39,29 +44,18 @@ class OpticsWatch::Work {
     const std::optional<sensors::Sensor> given = given_sensor(reference);
     for (const WatchedSensor& watched : sensors) {
       OpticsHealth& health = health_.emplace_back();
-      std::optional<sensors::Sensor>& sensor = sensors_.emplace_back();
-      device_types_.push_back(watched.device_type);
-      if (given && (given->serial.empty() || given->serial == watched.serial)) {
-        if (given->device_type != watched.device_type) {
-          throw InvalidArgument(fmt::format(
-              "{}: it is a {}, and the sensor {} on the network is a {}; name another reference",
-              reference.name(),
-              recordings::device_type_name(static_cast<std::uint8_t>(given->device_type)),
-              watched.serial, recordings::device_type_name(watched.device_type)));
-        }
-        sensor = given;
-        health.is_reference = true;
+      SensorOfUnit& sensor =
+          sensors_.emplace_back(sensor_of_unit(watched, given, reference.name()));
+      health.is_reference = sensor.is_given;
+      if (sensor.sensor) {
+        health.reference = sensor.sensor->name;
       } else {
-        sensor = preset_of_type(watched.device_type);
+        health.words = kNoPreset;
       }
-      if (sensor) {
-        health.reference = sensor->name;
-      } else {
-        health.words = "there is no preset for its type";
-      }
+      followed_.emplace_back(watched.device_type);
     }
     grids_.resize(sensors.size());
-    followed_.resize(sensors.size());
+    seen_.resize(sensors.size());
     thread_ = std::thread([this] { run(); });
   }
 
@@ -109,6 +103,11 @@ class OpticsWatch::Work {
     return health_;
   }
 
+  std::vector<SeenShot> take_seen(std::size_t sensor) {
+    const std::scoped_lock lock(mutex_);
+    return std::exchange(seen_[sensor], {});
+  }
+
  private:
   struct Waiting {
     std::size_t sensor = 0;
@@ -144,7 +143,8 @@ class OpticsWatch::Work {
     } catch (const Cancelled&) {
       throw;
     } catch (const recordings::livox::BadPacket&) {  // counted by the writer of the file
-    } catch (const std::exception& error) {          // such as no memory: the recording goes on
+    } catch (const std::exception& error) {          // such as out of memory: the recording
+                                                     // continues
       const std::scoped_lock lock(mutex_);
       health_[one.sensor].words = error.what();
     }
@@ -153,53 +153,48 @@ class OpticsWatch::Work {
   void follow(const Waiting& one) {
     Followed& followed = followed_[one.sensor];
     chunk_.clear();
-    if (recordings::is_second_generation(device_types_[one.sensor])) {
-      const auto header = recordings::livox::decode_numbered_header(one.packet);
-      if (header.data_type == recordings::livox::kNumberedImu) return;
-      const auto layout = recordings::livox::numbered_layout(header.data_type, header.records);
-      if (!followed.estimate) begin(one.sensor, layout->cartesian);
-      recordings::livox::decode_numbered_packet(one.packet, device_types_[one.sensor], 0, chunk_);
-    } else {
-      const auto header = recordings::livox::decode_packet_header(one.packet);
-      if (header.data_type == recordings::livox::kImuDataType) return;
-      if (!followed.estimate) {
-        begin_decoder(one.sensor);
-        begin(one.sensor, recordings::livox::record_layout(header.data_type)->cartesian);
-      }
-      followed.decoder->decode(one.packet, chunk_);
+    {
+      const std::scoped_lock lock(mutex_);
+      if (grids_[one.sensor]) followed.packets.set_grid(*grids_[one.sensor]);
     }
+    if (!followed.packets.decode(one.packet, chunk_)) return;
+    if (!followed.estimate) begin(one.sensor, followed.packets.cartesian());
+    see(one.sensor);
     const bool estimated = followed.estimate->add(chunk_.observations, progress_);
     const std::scoped_lock lock(mutex_);
     ++health_[one.sensor].packets;
     if (estimated) health_[one.sensor].state = followed.estimate->state();
   }
 
-  void begin_decoder(std::size_t sensor) {
-    recordings::livox::PacketDecoderOptions decoding;
-    decoding.device_type = device_types_[sensor];
-    {
-      const std::scoped_lock lock(mutex_);
-      decoding.grid = grids_[sensor];
+  void see(std::size_t sensor) {
+    const recordings::Observations& rows = chunk_.observations;
+    std::size_t& returns = followed_[sensor].returns;
+    const std::scoped_lock lock(mutex_);
+    for (std::size_t i = 0; i < rows.size() && seen_[sensor].size() < kMostSeen; ++i) {
+      if (rows.valid[i] == 0 || !(rows.range[i] > 0) || ++returns < kShownOf) continue;
+      returns = 0;
+      seen_[sensor].push_back({static_cast<float>(rows.azimuth[i]),
+                               static_cast<float>(rows.zenith[i]),
+                               static_cast<float>(rows.range[i])});
     }
-    followed_[sensor].decoder.emplace(decoding);
   }
 
   void begin(std::size_t sensor, bool cartesian) {
     estimation::RunningOptions options;
-    options.sensor = *sensors_[sensor];
+    options.sensor = *sensors_[sensor].sensor;
     options.is_sensor = health_[sensor].is_reference;  // does not change
     options.cartesian = cartesian;
     followed_[sensor].estimate.emplace(std::move(options));
   }
 
-  std::vector<std::uint8_t> device_types_;
-  std::vector<std::optional<sensors::Sensor>> sensors_;
+  std::vector<SensorOfUnit> sensors_;
 
   mutable std::mutex mutex_;  // of all that follows
   std::condition_variable changed_;
   std::deque<Waiting> waiting_;
   std::vector<OpticsHealth> health_;
   std::vector<std::optional<ShotGrid>> grids_;
+  std::vector<std::vector<SeenShot>> seen_;
   bool ending_ = false, busy_ = false;
 
   CancelFlag cancel_;
@@ -221,5 +216,8 @@ void OpticsWatch::add(std::size_t sensor, std::span<const std::uint8_t> packet) 
 }
 void OpticsWatch::finish(double longest) { work_->finish(longest); }
 std::vector<OpticsHealth> OpticsWatch::health() const { return work_->health(); }
+std::vector<SeenShot> OpticsWatch::take_seen(std::size_t sensor) {
+  return work_->take_seen(sensor);
+}
 
 }  // namespace risley::jobs

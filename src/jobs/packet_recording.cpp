@@ -15,7 +15,7 @@ namespace {
 
 using recordings::kNoPlace;
 
-/// Shots of fewer packets do not show the rotors.
+/// Shots of fewer packets do not reveal the rotors.
 constexpr std::size_t kFewestPackets = 10;
 
 }  // namespace
@@ -113,7 +113,7 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
   const std::size_t packets = shots_.packets.size(), whole = whole_packets();
   const auto unknown =
       static_cast<std::size_t>(std::count(found.place.begin(), found.place.end(), kNoPlace));
-  const std::size_t told = found.place.size() - unknown;
+  const std::size_t known = found.place.size() - unknown;
   const std::string lacking =
       fmt::format("points are missing in {} of {} packets, and the file does not say which",
                   packets - whole, packets);
@@ -124,8 +124,8 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
   if (found.followed) {
     warn(result.warnings, kWarning.packets_incomplete,
          "{}: the rotors were followed, which shows when each of {} shots was fired; {} shots that "
-         "fit two places in their packet are left out",
-         lacking, told, unknown);
+         "fit two places in their packet are not used",
+         lacking, known, unknown);
   } else if (untold == UntoldShots::guessed) {
     estimation::GuessedPlaces guess = estimation::guess_places(shots_, found.place);
     found.place = std::move(guess.place);
@@ -133,20 +133,20 @@ PlacedRows PacketRecording::place_rows(const sensors::Sensor& sensor,
     warn(result.warnings, kWarning.times_guessed,
          "{}: they do not show how the rotors of the sensor {} turned. The times of {} of {} shots "
          "are guessed, in their order, and may be off by up to {:.2g} ms; {}",
-         lacking, sensor.name, unknown, told + unknown, 1e3 * result.time_uncertainty, remedy);
-  } else if (told < kFewestPackets * static_cast<std::size_t>(shots_.places)) {
+         lacking, sensor.name, unknown, known + unknown, 1e3 * result.time_uncertainty, remedy);
+  } else if (known < kFewestPackets * static_cast<std::size_t>(shots_.places)) {
     throw EstimationError(fmt::format(
         "{}: when the shots were fired is unknown, because they do not show how the rotors of the "
         "sensor {} turned. The places of {} shots are known without that, in {} whole packets and "
         "in runs that continue from packet to packet; at least {} are needed; {}",
-        lacking, sensor.name, told, whole, kFewestPackets * static_cast<std::size_t>(shots_.places),
-        remedy));
+        lacking, sensor.name, known, whole,
+        kFewestPackets * static_cast<std::size_t>(shots_.places), remedy));
   } else {
     warn(result.warnings, kWarning.shots_unused,
          "{}: they do not show how the rotors of the sensor {} turned. Only {} of {} shots are "
          "used, whose places are known without that, in {} whole packets and in runs that continue "
          "from packet to packet; {}",
-         lacking, sensor.name, told, told + unknown, whole, remedy);
+         lacking, sensor.name, known, known + unknown, whole, remedy);
   }
   if (shot_rate) {
     warn(result.warnings, kWarning.packets_incomplete,

@@ -16,11 +16,11 @@
 
 namespace risley::jobs {
 
-/// When the rows of a recording were fired, as far as it is known.
+/// Firing times of the rows of a recording, as far as known.
 struct PlacedRows {
   recordings::PacketPlaces places;
-  std::vector<Warning> warnings;  ///< what was done about missing points
-  double time_uncertainty = 0;    ///< by which guessed times may be off, s; 0: there are none
+  std::vector<Warning> warnings;  ///< treatment of missing points
+  double time_uncertainty = 0;    ///< possible error of guessed times, s; 0: there are none
 };
 
 /// A recording of one sensor with one time for each packet, some of which lack points: all of its
@@ -31,13 +31,13 @@ class PacketRecording {
   static std::optional<PacketRecording> open(const PreparedRecording& recording,
                                              const Progress& progress);
 
-  /// Every shot in the middle of the places that it may have, which is no worse than a few degrees
-  /// of the rotors: how the recording can be looked at before more is known.
+  /// Puts every shot in the middle of its possible places, to within a few degrees of the rotors:
+  /// good enough for a first look at the recording.
   recordings::PacketPlaces middle_places() const;
 
   /// Follows the rotors to find when each shot was fired.
   /// @param shot_rate  within packets, Hz, if it was given
-  /// @throws EstimationError when shots without a time are left out and hardly any remain
+  /// @throws EstimationError when hardly any shots remain after dropping those without a time
   PlacedRows place_rows(const sensors::Sensor& sensor, std::optional<double> shot_rate,
                         UntoldShots untold, const Progress& progress) const;
 

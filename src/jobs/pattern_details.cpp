@@ -22,7 +22,7 @@ PatternDetails pattern_details(const GivenSensor& sensor, const sensors::ScanPat
   result.coverage = sensors::pattern_coverage(result.sensor, scan, coverage, progress);
   const double rate = scan.shot_rate.value_or(result.sensor.shot_rate);
   const double rows = coverage.after.back() * rate / static_cast<double>(scan.every);
-  // No common factor with the number of emitters, or only some of them would be seen.
+  // No common factor with the number of emitters, or only some of them would be visible.
   auto thinning = static_cast<std::uint64_t>(std::ceil(rows / kMostDrawn));
   while (std::gcd(thinning, static_cast<std::uint64_t>(result.sensor.train.emitters())) != 1) {
     ++thinning;

@@ -19,8 +19,8 @@ namespace {
 
 constexpr std::uint64_t kPieceRows = 65536;
 
-/// A number as the manufacturer's scan sequences print it: ten digits, nine of them after the point
-/// at most, no zeros at the end.
+/// A number as printed in the manufacturer's scan sequences: ten digits, at most nine of them after
+/// the point, no zeros at the end.
 void append_number(std::string& text, double value) {
   const double whole = std::floor(std::log10(std::max(std::abs(value), 1.0)));
   const int decimals = 9 - static_cast<int>(std::min(whole, 9.0));
@@ -30,8 +30,8 @@ void append_number(std::string& text, double value) {
   if (text.back() == '.') text.pop_back();
 }
 
-/// @param all_around  azimuths from 0 to 360 degrees, as the manufacturer's file of the Mid-360 has
-///                    them, instead of -180 to 180
+/// @param all_around  azimuths from 0 to 360 degrees, as in the manufacturer's file of the Mid-360,
+/// instead of -180 to 180
 std::string csv_rows(const sensors::ScanPattern& pattern, bool all_around) {
   std::string text;
   for (std::size_t i = 0; i < pattern.size(); ++i) {

@@ -16,10 +16,10 @@ namespace risley::jobs {
 /// Wavelength of every Livox Risley sensor, which presets do not hold: manufacturer's user manuals.
 inline constexpr double kWavelengthNm = 905;
 
-/// A scan pattern on its way into a stream.
+/// A scan pattern being written to a stream.
 class PatternStream {
  public:
-  /// @param result  counts rows and blocked shots, and takes what a format has to say
+  /// @param result  counts rows and blocked shots, and receives the format's remarks
   PatternStream(const sensors::Sensor& sensor, const WritePatternOptions& options,
                 std::ostream& stream, const Progress& progress, WrittenPattern& result)
       : sensor_(sensor), options_(options), stream_(stream), progress_(progress), result_(result) {}
@@ -32,7 +32,7 @@ class PatternStream {
   /// Appends to the output. @throws FileError
   void put(const std::string& text);
 
-  /// Puts what `text` makes of every piece of the pattern, in its order.
+  /// Writes the result of `text` for every piece of the pattern, in order.
   /// @param pass  number of the pass over the whole pattern, from 0
   void put_rows(const std::function<std::string(const sensors::ScanPattern&)>& text, int pass = 0,
                 int passes = 1);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The scanner definition that HELIOS++ reads: attributes and elements as its documentation has them
+// The scanner definition for HELIOS++: attributes and elements as in its documentation
 // (https://github.com/3dgeo-heidelberg/helios, "Scanners and platforms").
 #include <algorithm>
 #include <cmath>
@@ -38,7 +38,7 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-/// Text within a comment, where two hyphens may not meet.
+/// Text within a comment, where two consecutive hyphens are not allowed.
 std::string commented(std::string text) {
   for (std::size_t at = text.find("--"); at != std::string::npos; at = text.find("--", at)) {
     text.replace(at, 2, "- -");
@@ -46,7 +46,7 @@ std::string commented(std::string text) {
   return text;
 }
 
-/// Fifteen digits, and zero for what is nothing beside 1.
+/// Fifteen digits, and zero for values negligible beside 1.
 std::string number(double value) {
   return fmt::format("{:.15g}", std::abs(value) < 1e-15 ? 0.0 : value);
 }
@@ -54,9 +54,10 @@ std::string number(double value) {
 std::string comment_of(const sensors::HeliosScanner& scanner, const sensors::Sensor& sensor) {
   std::string text = fmt::format(
       "<!-- The scan pattern of {} by risley. Axes: x right, y forward, z up. The sign of an angle "
-      "chooses the face\n       that is inclined: positive the first, negative the second. Against "
-      "the pattern itself {:.3g} degree (root mean\n       square), {:.3g} at most, over {} shots; "
-      "a shot of the pattern at time t is at t {} {:.10g} s here.\n",
+      "chooses the face\n       that is inclined: positive the first, negative the second. "
+      "Deviation from "
+      "the pattern itself: {:.3g} degree (root\n       mean square), {:.3g} at most, over {} "
+      "shots; a shot of the pattern at time t is at t {} {:.10g} s here.\n",
       commented(sensor.name), degrees_from_radians(scanner.rms),
       degrees_from_radians(scanner.worst), scanner.compared, scanner.time_lag < 0 ? '-' : '+',
       std::abs(scanner.time_lag));

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Lidar profiles of NVIDIA's Isaac Sim: the JSON file of its versions up to 4.5, and the OmniLidar
-// prim in USD of those since. Both hold one emitter state, with one emitter for every shot, as
-// solid-state lidars have it.
+// prim in USD of those since. Both hold one emitter state, with one emitter for every shot, as for
+// solid-state lidars.
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -57,7 +57,7 @@ std::vector<EmitterColumn> emitter_columns(double first_time) {
   };
 }
 
-/// Puts the columns as arrays; shots that do not get through are left out.
+/// Writes the columns as arrays; blocked shots are dropped.
 void put_columns(PatternStream& out, const std::function<std::string(const EmitterColumn&)>& head,
                  const std::string& tail) {
   const double first = sensors::scan_pattern(out.sensor(), 0, 1, out.options().scan).time.front();
@@ -83,7 +83,7 @@ void put_columns(PatternStream& out, const std::function<std::string(const Emitt
   }
 }
 
-/// Checks what both forms hold, and says what they do not.
+/// Checks the contents of both forms, and reports what they cannot hold.
 void begin(PatternStream& out, bool whole_rate) {
   const double duration = out.options().duration;
   constexpr double kLongest = 4.2;  // nanoseconds are 32-bit numbers

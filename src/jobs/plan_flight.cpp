@@ -68,14 +68,14 @@ void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options) 
   options.plan = trajectories::load_flight_plan(files.plan);
   if (files.mount.empty()) {
     throw InvalidArgument(
-        fmt::format("{} is missing: a file that says how the sensor sits on the platform and, with "
-                    "its sigmas, how well that is known before the flight",
+        fmt::format("{} is missing: a file that describes how the sensor is mounted on the "
+                    "platform and, with its sigmas, how well that is known before the flight",
                     name_of(kSetting.mount)));
   }
   if (files.errors.empty()) {
     throw InvalidArgument(
-        fmt::format("{} is missing: a file that says how wrong the trajectory of the flight will "
-                    "be, and for how long",
+        fmt::format("{} is missing: a file that states the expected size and duration of the "
+                    "trajectory's errors",
                     name_of(kSetting.trajectory_errors)));
   }
   options.mount = mount_of(files.mount);
@@ -133,8 +133,8 @@ PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress
   } else {
     planned.terrain.ground = scenes::Ground{};
     warn(result.warnings, kWarning.terrain_assumed,
-         "no terrain is given: the ground is taken to be level at a height of 0, from which the "
-         "least can be learned; roofs show more");
+         "no terrain is given: the ground is assumed level at a height of 0, which reveals least; "
+         "roofs reveal more");
   }
   const bool all_held =
       std::all_of(options.mount.boresight.begin(), options.mount.boresight.end(),

@@ -26,7 +26,8 @@ namespace {
 using estimation::StoredPoseUse;
 using recordings::Extrinsics;
 
-/// @throws FileError when the file is a trajectory: its own problem, or that it is none of a lidar
+/// @throws FileError when the file is a trajectory: its own problem, or that it is not a recording
+/// of a lidar
 void refuse_trajectory(const recordings::Source& source, const Progress& progress) {
   if (source.recording()) return;
   const std::string& path = source.name();
@@ -41,7 +42,8 @@ void refuse_trajectory(const recordings::Source& source, const Progress& progres
                               found.format, found.size()));
 }
 
-/// Opens a recording for the first time. @throws FileError for a trajectory, which is no recording
+/// Opens a recording for the first time. @throws FileError for a trajectory, which is not a
+/// recording
 std::unique_ptr<recordings::Reader> open_lidar(const recordings::Source& source,
                                                const recordings::ReadOptions& reading,
                                                const Progress& progress) {
@@ -56,12 +58,12 @@ std::unique_ptr<recordings::Reader> open_lidar(const recordings::Source& source,
     throw InvalidArgument(
         fmt::format("{}, {}: {}", name_of(kSetting.extrinsics), source.name(), error.what()));
   }
-  // Columns that are called yaw and pitch may be either.
+  // Columns named yaw and pitch may be either.
   if (reader->header().format == "named-csv") refuse_trajectory(source, progress);
   return reader;
 }
 
-/// The pose that a roll about the optical axis amounts to: recorded = pose unrolled.
+/// The pose equivalent to a roll about the optical axis: recorded = pose unrolled.
 Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
   const Eigen::Matrix3d axis_frame = estimation::recording_from_sensor(frame);
   const Eigen::Matrix3d turn =
@@ -74,8 +76,8 @@ Extrinsics roll_about_axis(double roll, const estimation::FrameTurn& frame) {
           {}};
 }
 
-/// Whether times are evidently counted with a sensor's rate: each shot follows the one before it by
-/// the same time, from the first row to the last.
+/// Whether times are evidently counted with a sensor's rate: the same time step from each shot to
+/// the next, from the first row to the last.
 class EvenTimes {
  public:
   explicit EvenTimes(double shot_rate) : usual_step_(1e9 / shot_rate) {}
@@ -105,7 +107,7 @@ class EvenTimes {
     if (shots_ < 2 || std::abs(step_ / usual_step_ - 1.0) > kOtherRate) return std::nullopt;
     return 1e9 / mean_step();
   }
-  /// The times as they are counted with the rate, from 0.
+  /// The times as counted with the rate, from 0.
   void count(std::vector<std::int64_t>& time_ns) const {
     const double step = mean_step();
     for (std::int64_t& time : time_ns) {
@@ -122,13 +124,13 @@ class EvenTimes {
   std::int64_t first_ = 0, last_ = 0, shots_ = 0;
 };
 
-/// All valid shots of a recording whose times are counted, because a rate was asked for or because
-/// they evidently are.
+/// All valid shots of a recording with counted times, because a rate was given or because they
+/// evidently are.
 std::optional<estimation::CountedShots> counted_shots(const recordings::Source& source,
                                                       recordings::ReadOptions options,
                                                       const sensors::Sensor& sensor,
                                                       const Progress& progress) {
-  options.emitters = 0;  // beams as the file has them
+  options.emitters = 0;  // beams as in the file
   const auto reader = recordings::open_recording(source, options, progress);
   estimation::ShotSelector selector({.rate = std::nullopt, .ranges = false, .rows = true});
   EvenTimes even(sensor.shot_rate);
@@ -149,7 +151,7 @@ std::optional<estimation::CountedShots> counted_shots(const recordings::Source& 
   return shots;
 }
 
-/// What the count of a recording's shots is worth.
+/// Quality of the count of a recording's shots.
 estimation::ShotCount count_of(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
                                const Progress& progress) {
   for (const std::uint8_t beam : shots.series.beam) {
@@ -158,7 +160,7 @@ estimation::ShotCount count_of(const estimation::CountedShots& shots, const sens
   return estimation::find_slips(shots, sensor, progress);
 }
 
-/// What was found wrong with a count.
+/// Errors found in a count.
 std::vector<Warning> warnings_of(const estimation::ShotCount& count, double rate, bool given) {
   std::vector<Warning> warnings;
   std::int64_t lost = 0;
@@ -201,8 +203,7 @@ std::vector<Warning> warnings_of(const estimation::ShotCount& count, double rate
 
 std::string share_text(double share) { return fmt::format("{:.1f} %", 100.0 * share); }
 
-/// The sensor whose rate counts the shots of a recording whose times are all the same, where it is
-/// known.
+/// The sensor whose rate counts the shots of a recording with constant times, if it is known.
 std::optional<sensors::Sensor> sensor_to_count_by(const recordings::RecordingHeader& header,
                                                   const recordings::ReadOptions& reading,
                                                   const std::optional<sensors::Sensor>& given) {
@@ -214,28 +215,27 @@ std::optional<sensors::Sensor> sensor_to_count_by(const recordings::RecordingHea
   return preset_of_type(device.type);
 }
 
-/// What is wrong with a count of shots where those without a return were removed; empty where they
-/// were not. @param emitters  of the sensor, which fire in turn
+/// The defect of a count of shots where those without a return were removed; empty if they were
+/// not. @param emitters  of the sensor, which fire in turn
 std::string words_of_removed(const estimation::CountedShots& shots, int emitters) {
   const double rows = estimation::rows_between_jumps(shots, emitters);
-  // Where a packet is missing now and then, rotors can be followed from one to the next.
+  // If a packet is missing occasionally, rotors can be followed from one to the next.
   constexpr double kFewest = 1000;
   if (rows >= kFewest) return {};
   return fmt::format(
       "shots without a return were removed from this file, which has no times: about every {:.0f} "
       "rows the beam jumps, and how many shots are missing there, so when each was fired, is lost. "
-      "Directions and ranges hold all the same: they can be looked at, converted, and made a "
+      "Directions and ranges are still valid: they can be viewed, converted, and made into a "
       "cloud. "
       "An estimation needs the recording with times of single shots, or with shots without a "
-      "return "
-      "kept as 0 0 0, or what it was exported from (LVX, a capture, or a bag of CustomMsg)",
+      "return kept as 0 0 0, or the original of the export (LVX, a capture, or a bag of CustomMsg)",
       rows);
 }
 
-/// What a recording without times lacks: only their rate, or shots; what is wrong with the shots
-/// themselves comes first.
-/// @throws recordings::MissingTimes, FileError for what is no scan, EstimationError where shots
-/// were removed
+/// Requirements of a recording without times: only their rate, or shots; defects of the shots
+/// themselves come first.
+/// @throws recordings::MissingTimes, FileError for data that are not a scan, EstimationError if
+/// shots were removed
 [[noreturn]] void refuse_without_times(const PreparedRecording& recording,
                                        const Progress& progress) {
   constexpr double kAnyRate = 1e5;  // Hz
@@ -259,14 +259,14 @@ std::string words_of_removed(const estimation::CountedShots& shots, int emitters
   throw EstimationError(fmt::format("{}: has no times", name));
 }
 
-/// @throws EstimationError where shots are missing all over a recording whose shots were counted
+/// @throws EstimationError if shots are missing all over a recording with counted shots
 void require_all_shots(const estimation::CountedShots& shots, const sensors::Sensor& sensor,
                        const std::string& name) {
   const auto words = words_of_removed(shots, sensor.train.emitters());
   if (!words.empty()) throw EstimationError(fmt::format("{}: {}", name, words));
 }
 
-/// Counts shots whose times are all the same, and refuses a recording without times.
+/// Counts shots with constant times, and rejects a recording without times.
 void find_times(PreparedRecording& recording, const Preparation& wishes, const Progress& progress) {
   if (const auto sensor =
           sensor_to_count_by(recording.reader->header(), recording.reading, wishes.sensor)) {
@@ -282,8 +282,8 @@ void find_times(PreparedRecording& recording, const Preparation& wishes, const P
   }
 }
 
-/// Turns the rows back by the pose that the recording states, where its points were moved by it, or
-/// by the roll that its emitters show.
+/// Turns the rows back by the pose stated in the recording, if its points were moved by it, or by
+/// the roll that its emitters show.
 void turn_back(PreparedRecording& recording, const Progress& progress) {
   const recordings::RecordingHeader& header = recording.reader->header();
   if (recording.reading.extrinsics || header.devices.size() != 1) return;
@@ -328,12 +328,12 @@ void turn_back(PreparedRecording& recording, const Progress& progress) {
          "pose, or 0,0,0 for shots in the sensor's frame",
          found,
          recording.turned_back ? "they were turned back, because a hub recorded them"
-                               : "they were taken as they are",
+                               : "they were left unchanged",
          name_of(kSetting.extrinsics));
   }
 }
 
-/// Follows the rotors where shots are counted, and mends the count.
+/// Follows the rotors if shots are counted, and corrects the count.
 void mend_count(PreparedRecording& recording, const Progress& progress) {
   const SensorChoice& choice = *recording.choice;
   const sensors::Sensor& sensor = choice.sensor;
@@ -411,7 +411,7 @@ PreparedRecording prepare_recording(const recordings::Source& source,
     if (!packets) mend_count(result, progress);
   }
   if (!packets) return result;
-  // A pose that was found says more of the packets.
+  // A detected pose says more about the packets.
   if (result.reading.extrinsics && !options.extrinsics) {
     packets = PacketRecording::open(result, progress);
   }

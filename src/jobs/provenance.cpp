@@ -15,7 +15,7 @@ namespace risley::jobs {
 
 namespace {
 
-/// Pipes and the like: reading them again waits forever, or finds nothing.
+/// Pipes and similar files: reading them again waits forever, or finds nothing.
 bool is_read_once(const std::string& path) {
   const auto type = std::filesystem::status(path).type();
   using Type = std::filesystem::file_type;
@@ -26,7 +26,7 @@ bool is_read_once(const std::string& path) {
 
 struct InputHashes::Input {
   std::string memory;  ///< name of columns in memory
-  /// Files and their SHA-256, which is empty for what can be read only once.
+  /// Files and their SHA-256, which is empty for files that can be read only once.
   std::vector<std::pair<std::string, std::string>> hashes{};
   parallel::TaskGroup task{};  ///< that finds them
 
@@ -57,7 +57,7 @@ InputHashes::InputHashes(const std::vector<recordings::Source>& inputs, const Pr
             input.hashes.emplace_back(file, "");
             if (!is_read_once(file)) files.push_back(source.open_file(file));
           }
-          source = {};  // and with it what was read of it
+          source = {};  // and the data read from it
           auto place = input.hashes.begin();
           for (const io::InputFile& file : files) {
             place = std::find_if(place, input.hashes.end(),

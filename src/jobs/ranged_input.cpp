@@ -19,7 +19,7 @@ using calibration::RangedRecording;
 
 namespace {
 
-/// Each recording stands for observations of its own.
+/// Each recording represents separate observations.
 void require_recordings(const std::vector<recordings::Source>& recordings) {
   if (recordings.empty()) throw InvalidArgument("no recording is given, expected one or more");
   for (std::size_t i = 0; i < recordings.size(); ++i) {

@@ -13,19 +13,19 @@
 
 namespace risley::jobs {
 
-/// What looks at an estimate before its shots are all that is left of it.
+/// Callback for an estimate before it is reduced to its shots.
 using EstimateTaker = std::function<void(const estimation::Estimate&, const Progress&)>;
 
-/// @throws InvalidArgument for no recordings, one that is given twice, rate or noise out of range
+/// @throws InvalidArgument for no recordings, one given twice, rate or noise out of range
 void check_ranged_input(const RangedInputOptions& options);
 
 /// Each held open.
 std::vector<recordings::Source> held_open(std::vector<recordings::Source> sources);
 
-/// Reads one recording, finds its rotation angles, and adds to the result what there is to know
-/// beside its shots. Stages: reading, rotation angles.
+/// Reads one recording, finds its rotation angles, and adds its properties other than the shots to
+/// the result. Stages: reading, rotation angles.
 /// @throws as read_for_estimation(), estimate(), ranged_recording(); the message names the file
-/// @param source  the recording of that number, perhaps held open
+/// @param source  the recording of that number, possibly held open
 calibration::RangedRecording read_ranged(recordings::Source source,
                                          const RangedInputOptions& options, std::size_t number,
                                          RangedInput& result, const Progress& progress,

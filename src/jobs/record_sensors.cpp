@@ -45,23 +45,24 @@ using wire::ClientState;
 constexpr std::int64_t kMillisecond = 1'000'000, kWireSecond = 1'000'000'000;  // ns
 constexpr std::int64_t kFramePeriod = 50 * kMillisecond;
 constexpr std::int64_t kSilenceTold = kWireSecond;
-/// Broadcasts that were on their way when the handshake came say nothing.
+/// Broadcasts in transit at the time of the handshake are ignored.
 constexpr std::int64_t kBroadcastSettles = 1500 * kMillisecond;
 constexpr std::int64_t kLongestStop = 2 * kWireSecond;
 constexpr std::int64_t kLongestPoll = 20 * kMillisecond;
-/// After a longer step this process stood still, and what came meanwhile is not yet read.
+/// After a longer step this process was suspended, and packets from that time have not been read
+/// yet.
 constexpr std::int64_t kStoodStill = 200 * kMillisecond;
 constexpr std::int64_t kWatchPeriod = 500 * kMillisecond;
-/// How long the end of a recording waits for the estimate of what came last, s.
+/// Longest wait at the end of a recording for the estimate of the last packets, s.
 constexpr double kLongestFinish = 2;
 /// Half a second of an Avia at ten times its speed.
 constexpr std::size_t kReceiveBuffer = std::size_t{16} << 20U;
 constexpr std::size_t kMostStatuses = 100, kMostReports = 1000;
 constexpr std::size_t kMostPassiveSensors = 16;
-/// Of a status: anything but what a healthy sensor reports (PPS, PTP, time synchronisation).
+/// Of a status: anything but the reports of a healthy sensor (PPS, PTP, time synchronisation).
 constexpr std::uint32_t kTroubles = 0xC0000DFF;
 
-/// Whether the output is made of the file that grows.
+/// Whether the output is made from the growing file.
 bool is_converted(const std::string& output) { return lower_case(output).ends_with(".nc"); }
 
 /// The name of a generation's file.
@@ -69,7 +70,7 @@ std::string file_name(const std::string& output, bool numbered) {
   if (is_converted(output)) return output;
   const std::string ending = lower_case(output).ends_with(".lvx2") ? ".lvx2" : ".lvx";
   const std::string wanted = numbered ? ".lvx2" : ".lvx";
-  // As it was written, in whichever case.
+  // As typed, in either case.
   return ending == wanted ? output : output.substr(0, output.size() - ending.size()) + wanted;
 }
 
@@ -97,6 +98,7 @@ struct LiveSensor {
   /// Changes, by the host's clock, ns.
   std::vector<std::pair<std::int64_t, wire::SensorReport>> reports;
   std::uint64_t alarms_told = 0;
+  std::string words_told;  ///< of its points
 };
 
 /// Of this machine, ns since 1970.
@@ -131,16 +133,16 @@ class Recorder {
   void add_sensor(const FoundSensor& found, bool numbered);
   void open_files();
   void take_broadcasts(std::int64_t now);
-  void tell_of_newcomer(const FoundSensor& heard);
+  void note_newcomer(const FoundSensor& heard);
   void take_commands(LiveSensor& live, std::int64_t now);
-  /// @return how many datagrams there were, of strangers too
+  /// @return number of datagrams, including foreign ones
   std::size_t take_data(LiveSensor& live, std::int64_t now);
   void watch_silence(LiveSensor& live, std::int64_t now);
   void write_frame(bool last);
   void stop_all();
   void finish_files();
   void begin_watch();
-  void tell_watch(std::int64_t now, bool over);
+  void report_to_watch(std::int64_t now, bool over);
   std::uint64_t rejected_by(const LiveSensor& live) const;
   RecordedSensors result();
   static std::string name_of(const LiveSensor& live) { return live.result.sensor.serial; }
@@ -156,17 +158,18 @@ class Recorder {
   std::set<std::string> newcomers_;                 // serial numbers
   std::vector<std::unique_ptr<PacketFile>> files_;  // by RecordedSensors::files
   std::unique_ptr<OpticsWatch> optics_;             // where the optics are watched
+  std::unique_ptr<LivePoints> points_;              // where points are published
   std::vector<const wire::UdpSocket*> waiting_;
   std::optional<std::int64_t> first_packet_ns_,
       first_data_ns_;  ///< also a rejected one; a sound one
   std::int64_t last_data_ns_ = 0, frame_due_ns_ = 0, watch_due_ns_ = 0;
   std::int64_t step_ns_ = 0;           // when the last step began
-  std::int64_t patient_until_ns_ = 0;  // until then packets may wait for longer
+  std::int64_t patient_until_ns_ = 0;  // until then packets may wait longer
   std::uint64_t passive_strangers_ = 0;
 };
 
-/// Of a packet that a sensor of the second generation sent: by its own interval, as far as it tells
-/// the type.
+/// Device type of a second-generation sensor, as far as the shot interval in its packet determines
+/// it.
 std::uint8_t numbered_type(std::span<const std::uint8_t> packet) {
   const auto header = recordings::livox::decode_numbered_header(packet);
   const auto grid = recordings::livox::interval_grid(header, recordings::kUnknownDeviceType);
@@ -188,7 +191,7 @@ void Recorder::add_sensor(const FoundSensor& found, bool numbered) {
   }
 }
 
-/// Takes whoever sends packets to the data port, and what their times say of the sensor.
+/// Registers the senders of packets to the data port, and the properties shown by their times.
 void Recorder::find_passively() {
   struct Heard {
     recordings::livox::PacketDecoder decoder{{.grid = recordings::livox::kGrid100kHz}};
@@ -248,7 +251,7 @@ void Recorder::find() {
     if (sensors_.empty()) {
       throw wire::NetworkError(fmt::format(
           "{}: no packet came in {} s; a passive recording hears only what sensors send to this "
-          "address and port: name the port that the other host told them with {}",
+          "address and port: name the port that the other host set with {}",
           to_string(passive_data_->local()), options_.find_time,
           risley::name_of(kSetting.data_port)));
     }
@@ -313,7 +316,7 @@ void Recorder::begin_session(LiveSensor& live, std::int64_t now) {
 void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
   switch (event.kind) {
     case ClientEvent::Kind::connected:
-      // What is there was sent before; the sensor sends nothing more until it is started again.
+      // Pending packets were sent before; the sensor sends nothing more until it is started again.
       take_data(live, steady_ns());
       live.order->flush();
       ++live.result.sessions;
@@ -323,6 +326,7 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
       if (const auto grid = recordings::livox::grid_of_firmware(event.text)) {
         live.order->set_grid(*grid);
         if (optics_) optics_->set_grid(live.place, *grid);
+        if (points_) points_->set_grid(live.place, *grid);
       }
       break;
     case ClientEvent::Kind::sensor_state:
@@ -365,7 +369,7 @@ void Recorder::take_event(LiveSensor& live, const ClientEvent& event) {
   }
 }
 
-/// What a sensor of the second generation says of itself: changes are kept, and troubles told.
+/// Processes a status report of a second-generation sensor: keeps changes and reports problems.
 void Recorder::take_report(LiveSensor& live, const wire::SensorReport& report) {
   if (report.temperature_cdeg) {
     const double temperature = 1e-2 * *report.temperature_cdeg;
@@ -395,8 +399,8 @@ void Recorder::step_session(LiveSensor& live, std::int64_t now) {
   for (const ClientEvent& event : live.session->take_events()) take_event(live, event);
 }
 
-/// The table of sensors stands before the data: nobody can join.
-void Recorder::tell_of_newcomer(const FoundSensor& heard) {
+/// Notes a sensor that appears late. It cannot join: the table of sensors stands before the data.
+void Recorder::note_newcomer(const FoundSensor& heard) {
   constexpr std::size_t kMostNewcomers = 100;
   const bool known = std::any_of(sensors_.begin(), sensors_.end(), [&](const auto& live) {
     return live->result.sensor.serial == heard.serial;
@@ -405,18 +409,18 @@ void Recorder::tell_of_newcomer(const FoundSensor& heard) {
       !newcomers_.insert(heard.serial).second) {
     return;
   }
-  note_(fmt::format("{} at {}: came after the recording had begun, and cannot join it, because the "
-                    "table of sensors stands at the beginning of the file; record it into another",
+  note_(fmt::format("{} at {}: appeared after the recording had begun, and cannot join it, because "
+                    "the file begins with the table of sensors; record it into another file",
                     heard.serial, to_string(heard.address)),
         true);
 }
 
-/// A sensor of the first generation that broadcasts has no host: it is new, or it came back. One of
+/// A sensor of the first generation that broadcasts has no host: it is new, or it returned. One of
 /// the second answers every search.
 void Recorder::take_broadcasts(std::int64_t now) {
   if (!options_.passive) listener_.search(now);
   for (const FoundSensor& heard : listener_.take()) {
-    tell_of_newcomer(heard);
+    note_newcomer(heard);
     for (const auto& live : sensors_) {
       if (live->result.sensor.serial != heard.serial || !live->session || live->stopped) continue;
       const bool lost = live->session->state() == ClientState::lost;
@@ -454,6 +458,8 @@ std::size_t Recorder::take_data(LiveSensor& live, std::int64_t now) {
     if (!first_data_ns_) first_data_ns_ = now;
     last_data_ns_ = now;
     whose.data_ns = now;
+    // Without waiting for those that it may have overtaken.
+    if (points_) points_->add(whose.place, datagram.bytes, datagram.kernel_ns);
   };
   if (passive_data_) {
     return passive_data_->receive([&](const wire::UdpSocket::Datagram& datagram) {
@@ -466,7 +472,7 @@ std::size_t Recorder::take_data(LiveSensor& live, std::int64_t now) {
       ++passive_strangers_;
     });
   }
-  // From the handshake on, and from nobody but whom it was shaken with.
+  // Only after the handshake, and only from the sensor that it was made with.
   const bool connected = live.session && live.result.sessions > 0;
   return live.data->receive([&](const wire::UdpSocket::Datagram& datagram) {
     if (connected && datagram.from.address == live.result.sensor.address) {
@@ -499,7 +505,7 @@ void Recorder::write_frame(bool last) {
 
 void Recorder::step(std::int64_t now, std::int64_t wait_until) {
   const std::int64_t host = host_ns();
-  const std::int64_t begin = steady_ns();  // behind host, so that no standstill hides between
+  const std::int64_t begin = steady_ns();  // behind host, so that no suspension is missed
   if (begin - std::exchange(step_ns_, begin) > kStoodStill) {
     patient_until_ns_ = begin + recordings::livox::PacketOrder::kLongestWait;
   }
@@ -520,7 +526,7 @@ void Recorder::step(std::int64_t now, std::int64_t wait_until) {
     frame_due_ns_ = now + kFramePeriod;
   }
   if (now >= watch_due_ns_) {
-    tell_watch(now, false);
+    report_to_watch(now, false);
     watch_due_ns_ = now + kWatchPeriod;
   }
   wire::wait_for(waiting_, std::min(until, frame_due_ns_) - steady_ns());
@@ -540,7 +546,7 @@ void Recorder::stop_all() {
   for (std::int64_t now = begin; !all_stopped() && now - begin < kLongestStop; now = steady_ns()) {
     step(now, begin + kLongestStop);
   }
-  // What came before the sensors stopped is still in the kernel, among what strangers sent.
+  // Packets from before the sensors stopped are still in the kernel, among foreign ones.
   constexpr int kMostRounds = 1000;
   for (int round = 0; round < kMostRounds && !sensors_.empty(); ++round) {
     const std::int64_t now = steady_ns();
@@ -550,7 +556,7 @@ void Recorder::stop_all() {
   }
 }
 
-/// One for each generation that there is.
+/// One for each generation present.
 void Recorder::open_files() {
   std::array<std::vector<recordings::Device>, 2> devices;  // by generation
   for (const auto& live : sensors_) {
@@ -564,8 +570,8 @@ void Recorder::open_files() {
   }
   if (is_converted(options_.output) && !devices[0].empty() && !devices[1].empty()) {
     throw InvalidArgument(fmt::format(
-        "{} = {}: sensors of both generations were found, and NetCDF is made of one recording; "
-        "choose sensors with {}, or record LVX, which writes one file for each generation",
+        "{} = {}: sensors of both generations were found, and NetCDF holds one recording; choose "
+        "sensors with {}, or record LVX, which writes one file for each generation",
         risley::name_of(kSetting.output), options_.output, risley::name_of(kSetting.serial)));
   }
   for (const bool numbered : {false, true}) {
@@ -594,7 +600,7 @@ RecordedSensors Recorder::run() {
   std::exception_ptr failure;
   try {
     for (std::int64_t now = begin; !progress_.cancelled(); now = steady_ns()) {
-      // Of packets that are all rejected, the first one counts.
+      // If all packets are rejected, the first one counts.
       const std::optional<std::int64_t> first = first_data_ns_ ? first_data_ns_ : first_packet_ns_;
       const std::int64_t end = first && options_.duration ? *first + duration : kEndless;
       if (now >= end) break;
@@ -602,14 +608,14 @@ RecordedSensors Recorder::run() {
         try {
           progress_.report(static_cast<double>(now - *first_data_ns_) /
                            static_cast<double>(duration));
-        } catch (const Cancelled&) {  // between two looks: the same clean end
+        } catch (const Cancelled&) {  // between two checks: the same clean end
           break;
         }
       }
       step(now, end);
     }
     stop_all();
-  } catch (const FileError&) {  // no room on the disk: the sensors are stopped all the same
+  } catch (const FileError&) {  // disk full: the sensors are stopped anyway
     failure = std::current_exception();
     for (const auto& live : sensors_) {
       if (live->session) live->session->stop(steady_ns());
@@ -625,10 +631,10 @@ RecordedSensors Recorder::run() {
     std::uint64_t rejected = 0;
     for (const auto& live : sensors_) rejected += rejected_by(*live);
     if (first_packet_ns_) {
-      throw wire::NetworkError(fmt::format(
-          "{}: all {} packets that came from {} were rejected, because they are not of Livox's "
-          "protocol or hold no times in order; nothing was recorded",
-          to_string(interface_.address), rejected, name_of(*sensors_.front())));
+      throw wire::NetworkError(
+          fmt::format("{}: all {} packets that came from {} were rejected, because they are not of "
+                      "Livox's protocol or hold no times in order; nothing was recorded",
+                      to_string(interface_.address), rejected, name_of(*sensors_.front())));
     }
     throw wire::NetworkError(fmt::format("{}: no packet came from {}; nothing was recorded",
                                          to_string(interface_.address),
@@ -636,23 +642,35 @@ RecordedSensors Recorder::run() {
   }
   finish_files();
   if (optics_) optics_->finish(kLongestFinish);
-  tell_watch(last_data_ns_, true);
+  if (points_) points_->finish(kLongestFinish);
+  report_to_watch(last_data_ns_, true);
   return result();
 }
 
 void Recorder::begin_watch() {
   for (std::size_t i = 0; i < sensors_.size(); ++i) sensors_[i]->place = i;
-  if (!options_.watch_optics) return;
   std::vector<WatchedSensor> watched;
   watched.reserve(sensors_.size());
   for (const auto& live : sensors_) {
     watched.push_back({live->result.sensor.serial, live->result.sensor.device_type});
   }
-  optics_ = std::make_unique<OpticsWatch>(watched, options_.optics_reference);
+  if (options_.watch_optics) {
+    optics_ = std::make_unique<OpticsWatch>(watched, options_.optics_reference);
+  }
+  if (!options_.publish) return;
+  points_ = std::make_unique<LivePoints>(watched, *options_.publish);
+  const std::vector<PublishedPoints> published = points_->published();
+  for (std::size_t i = 0; i < published.size(); ++i) {
+    if (published[i].is_calibrated || published[i].calibration.empty()) continue;
+    note_(fmt::format("{}: no calibration was given for its points: they are where the sensor "
+                      "says, with the sigmas of the preset {}",
+                      name_of(*sensors_[i]), published[i].calibration),
+          true);
+  }
 }
 
-/// Tells of alarms, and whoever watches of all.
-void Recorder::tell_watch(std::int64_t now, bool over) {
+/// Reports alarms, and passes everything to the watcher.
+void Recorder::report_to_watch(std::int64_t now, bool over) {
   std::vector<OpticsHealth> optics;
   if (optics_) optics = optics_->health();
   for (std::size_t i = 0; i < optics.size(); ++i) {
@@ -660,6 +678,17 @@ void Recorder::tell_watch(std::int64_t now, bool over) {
     if (optics[i].state.alarms == live.alarms_told) continue;
     live.alarms_told = optics[i].state.alarms;
     note_(fmt::format("{}: {}", name_of(live), alarm_words(optics[i])), true);
+  }
+  std::vector<PublishedPoints> published;
+  if (points_) published = points_->published();
+  for (std::size_t i = 0; i < published.size(); ++i) {
+    LiveSensor& live = *sensors_[i];
+    if (published[i].words == live.words_told) continue;
+    live.words_told = published[i].words;
+    note_(live.words_told.empty()
+              ? fmt::format("{}: its points come again", name_of(live))
+              : fmt::format("{}: no points are published: {}", name_of(live), live.words_told),
+          true);
   }
   if (!watch_) return;
   LiveRecording state;
@@ -675,6 +704,8 @@ void Recorder::tell_watch(std::int64_t now, bool over) {
     one.status = live->status;
     one.report = live->report;
     if (live->place < optics.size()) one.optics = optics[live->place];
+    if (live->place < published.size()) one.published = published[live->place];
+    if (optics_) one.seen = optics_->take_seen(live->place);
     state.sensors.push_back(std::move(one));
   }
   watch_(state);
@@ -685,7 +716,7 @@ std::uint64_t Recorder::rejected_by(const LiveSensor& live) const {
          (live.session ? live.session->rejected() : 0);
 }
 
-/// Gives the files their names, or makes what was asked for of the only one.
+/// Renames the files, or makes the requested output from the only one.
 void Recorder::finish_files() {
   if (!is_converted(options_.output)) {
     for (const auto& file : files_) file->close();
@@ -723,6 +754,8 @@ RecordedSensors Recorder::result() {
   recorded.strangers = listener_.strangers() + passive_strangers_;
   std::vector<OpticsHealth> optics;
   if (optics_) optics = optics_->health();
+  std::vector<PublishedPoints> published;
+  if (points_) published = points_->published();
   std::int64_t first_host_ns = std::numeric_limits<std::int64_t>::max();
   for (const auto& live : sensors_) {
     if (const auto first = live->order->first_host_ns()) {
@@ -738,6 +771,7 @@ RecordedSensors Recorder::result() {
     one.kernel_drops = data.kernel_drops();
     one.rejected = rejected_by(*live);
     if (live->place < optics.size()) one.optics = optics[live->place];
+    if (live->place < published.size()) one.published = published[live->place];
     for (const recordings::livox::PacketGap& gap : live->order->gaps()) {
       one.gaps.push_back({1e-9 * static_cast<double>(gap.host_from_ns - first_host_ns),
                           1e-9 * static_cast<double>(gap.host_to_ns - first_host_ns), gap.lost,
@@ -782,6 +816,7 @@ RecordedSensors record_sensors(const RecordOptions& options, const RecordNote& n
   }
   if (options.watch_optics)
     given_sensor(options.optics_reference);  // not after a search of seconds
+  if (options.publish) require_usable(*options.publish);
   return Recorder(options, wire::interface_of(options.interface), note, progress, watch).run();
 }
 

@@ -16,9 +16,9 @@
 namespace risley::jobs {
 namespace {
 
-/// A longer gap is none that anybody waits for, ns; the clock jumped.
+/// A longer gap is not waited for, ns; the clock jumped.
 constexpr std::int64_t kLongestRecordedGap = 10'000'000'000;
-/// A tag that has its return's number.
+/// A tag that contains its return's number.
 constexpr unsigned kEchoAt = 4;
 
 double interval_ns(const recordings::livox::ShotGrid& grid) {
@@ -54,18 +54,17 @@ RecordedScan::RecordedScan(std::string path, std::uint8_t sensor_type)
   const auto refuse = [&](const std::string& problem) {
     throw InvalidArgument(fmt::format("{} = {}: {}", name_of(kSetting.recording), path_, problem));
   };
-  if (!header.has_range) refuse("has no ranges, which packets cannot do without");
+  if (!header.has_range) refuse("has no ranges, which packets require");
   if (header.devices.size() != 1) {
-    refuse(fmt::format("is of {} sensors, expected one; a virtual sensor is one, too",
+    refuse(fmt::format("is of {} sensors, expected one; a virtual sensor is a single one",
                        header.devices.size()));
   }
   device_ = header.devices.front();
   if (device_.type_inferred || !grid_of_type(device_.type)) device_.type = sensor_type;
   const auto grid = grid_of_type(device_.type);
   if (!grid) {
-    refuse(
-        fmt::format("its device type {} is none that can be emulated, allowed {}; name the sensor",
-                    device_.type, emulated_types_text()));
+    refuse(fmt::format("its device type {} cannot be emulated, allowed {}; name the sensor",
+                       device_.type, emulated_types_text()));
   }
   grid_ = *grid;
   if (!find_row()) throw FileError(path_, {}, "holds no shots that could be sent");
@@ -81,7 +80,7 @@ void RecordedScan::open() {
 bool RecordedScan::find_row() {
   while (row_ >= chunk_.observations.size()) {
     row_ = 0;
-    if (!reader_->read_sound(chunk_)) return false;  // what came before damage was sent
+    if (!reader_->read_sound(chunk_)) return false;  // data before the damage were sent
   }
   return true;
 }
@@ -129,7 +128,7 @@ void RecordedScan::next(recordings::Observations& record) {
     record.range[number] = rows.range[row_];
     record.intensity[number] = rows.intensity[row_];
     record.valid[number] = 1;
-    // The second generation's tags do not say which return it is.
+    // The second generation's tags do not contain the return number.
     const bool as_it_is = rows.tag[row_] != 0 || recordings::is_second_generation(device_.type);
     record.tag[number] =
         as_it_is ? rows.tag[row_] : static_cast<std::uint8_t>((number + 1) << kEchoAt);

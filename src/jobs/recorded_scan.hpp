@@ -13,24 +13,24 @@
 
 namespace risley::jobs {
 
-/// How the shots of a type of sensors follow each other; empty where that is not known.
+/// Timing of the shots of a sensor type; empty if that is not known.
 /// @param device_type  Device::type
 std::optional<recordings::livox::ShotGrid> grid_of_type(int device_type);
-/// The types that it knows, for messages.
+/// The supported types, for messages.
 std::string emulated_types_text();
 
-/// The shots of a recording on the time grid of a sensor, with its gaps, over and over.
+/// The shots of a recording on the time grid of a sensor, with its gaps, in a loop.
 class RecordedScan {
  public:
-  /// @param sensor_type  Device::type where the recording does not name one
+  /// @param sensor_type  Device::type if the recording does not name one
   /// @throws FileError; InvalidArgument for a recording of several sensors, without times or
-  ///         ranges, and of a type that Livox's protocol does not have
+  /// ranges, and of a type unknown to Livox's protocol
   RecordedScan(std::string path, std::uint8_t sensor_type);
 
   const recordings::Device& device() const { return device_; }       ///< serial number and type
   const recordings::livox::ShotGrid& grid() const { return grid_; }  ///< of its shots
 
-  /// The returns of the next shot of the grid; without a return where the recording has no shot.
+  /// The returns of the next shot of the grid; without a return if the recording has no shot.
   /// @param record  as many rows as the sensor sends returns @throws FileError
   void next(recordings::Observations& record);
 

@@ -33,14 +33,14 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   const std::string name = input.source.name();
   recordings::require_one_device(reader.header(), name);
   input.require_whole();
-  input.source = {};  // the rows are read for the last time
+  input.source = {};  // the last pass over the rows
   EstimationInput result;
   result.whole_steps = reader.header().cartesian && !input.turned_back && !input.cut_mended;
   estimation::SelectionOptions selection = options.selection;
   selection.ranges = options.selection.ranges || result.whole_steps;
   estimation::ShotSelector selector(selection);
   recordings::TimeAudit audit(reader.header());
-  // While some chunks are looked at, the next are read.
+  // While some chunks are processed, the next are read.
   std::array<recordings::Chunk, 4> chunks;
   const auto read_next = [&](std::size_t slot) {
     if (!reader.read(chunks[slot])) return false;
@@ -62,7 +62,7 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
   if (result.counts.clock_resets > 0) {
     warn(result.warnings, kWarning.clock_reset,
          "the clock of the recording jumps back {} times: the pieces share their parameters, and "
-         "in each the rotors are found anew",
+         "the rotors are found anew in each",
          result.counts.clock_resets);
   }
   result.head = selector.head();
@@ -74,14 +74,14 @@ EstimationInput read_for_estimation(const EstimationInputOptions& options,
 void warn_of_left_out(const estimation::SelectionCounts& counts, std::vector<Warning>& warnings) {
   if (counts.out_of_order > 0) {
     warn(warnings, kWarning.shots_unused,
-         "{} of {} shots are a little earlier than the shot before and were left out: packets came "
+         "{} of {} shots are a little earlier than the shot before and were dropped: packets came "
          "late",
          counts.out_of_order, counts.rows);
   }
   if (counts.equal_times > 0) {
     warn(warnings, kWarning.shots_unused,
-         "{} of {} shots have the time of the shot before, so that it is unknown when they were "
-         "fired, and were left out: {} counts shots, where none is missing",
+         "{} of {} shots have the time of the shot before, so their firing times are unknown and "
+         "they were dropped: {} counts shots, where none is missing",
          counts.equal_times, counts.rows, name_of(kSetting.shot_rate));
   }
 }

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Gives a file a name that nothing has: calibration.earlier.yaml, calibration.earlier-2.yaml, ...
+/// Renames a file to an unused name: calibration.earlier.yaml, calibration.earlier-2.yaml, ...
 std::string set_aside(const fs::path& file) {
   for (int number = 1;; ++number) {
     fs::path aside = file;
@@ -36,7 +36,7 @@ std::string set_aside(const fs::path& file) {
       return aside.string();
     }
     if (errno == EEXIST) continue;
-    // A file system that cannot promise it.
+    // A file system that does not support it.
     if (errno != EINVAL || ::rename(file.c_str(), aside.c_str()) != 0) {
       throw FileError(aside.string(), {},
                       fmt::format("cannot be written: {}", std::strerror(errno)));
@@ -91,10 +91,10 @@ std::vector<Warning> ResultFolder::commit() {
   if (folder_.empty()) return moves;
   for (io::OutputFile& file : files_) file.sync();
   committed_ = true;
-  // From here on the folder holds files of two runs.
+  // From here on the folder contains files of two runs.
   io::write_text_file(path(kIncomplete),
                       "The files beside this one may come from different runs: the last run was "
-                      "stopped while it\nput its results in place. Run it again.\n");
+                      "stopped while it\nmoved its results into place. Run it again.\n");
   for (const std::string& name : left_over()) {
     const std::string aside = set_aside(path(name));
     warn(moves, kWarning.results_renamed,
@@ -155,8 +155,8 @@ void require_settled(const std::string& result) {
   if (folder.empty()) folder = ".";
   if (fs::exists(folder / kIncomplete, ignored)) {
     throw FileError((folder / kIncomplete).string(), {},
-                    "says that the files beside it may be of different runs, because the last one "
-                    "was stopped: run it again");
+                    "says that the files beside it may be from different runs, because the last "
+                    "one was stopped: run it again");
   }
   if (io::is_locked_by_other(folder.string())) {
     throw FileError(folder.string(), {},
@@ -182,9 +182,9 @@ bool is_own_result(const std::string& file) {
 
 void require_own_result(const std::string& file) {
   if (is_own_result(file)) return;
-  throw FileError(file, {},
-                  "is not a result of risley, and would be replaced by one: move it, or give "
-                  "another folder");
+  throw FileError(
+      file, {},
+      "is not a result of risley, and would be overwritten: move it, or give another folder");
 }
 
 }  // namespace risley::jobs

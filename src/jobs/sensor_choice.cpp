@@ -32,18 +32,21 @@ using estimation::SensorMatch;
 using estimation::SensorRecognition;
 using sensors::Sensor;
 
-/// A variant of a sensor's optics is tried if the residuals of its own are this many times what
-/// its noise and the recording's rounding leave, and taken where it leaves this share of them.
+/// A variant of a sensor's optics is tried if the residuals of the original are this many times the
+/// noise and the recording's rounding, and used if it leaves this share of them.
 constexpr double kPoorOptics = 3.0, kBetterOptics = 0.5;
-/// Times are at fault where counted shots leave this share of what the times do.
+/// Times are wrong if counted shots leave this share of their residuals.
 constexpr double kBetterCounted = 0.5;
 /// Fewer shots do not fill a field of view.
 constexpr std::size_t kFewestInField = 1000;
-/// The emitters' firing order says the rest; smaller rolls are within what emitters may be off.
+/// The emitters' firing order covers the rest; smaller rolls are within the emitters' tolerance. In
+/// a sensor that scans all around they are a few degrees beside the axis, and shots without a
+/// return shift the means used to find them: a quarter of the circle can cause up to 25 degrees.
 constexpr double kLeastRoll = radians_from_degrees(20.0);
+constexpr double kLeastRollAllAround = radians_from_degrees(45.0);
 
-/// The built-in presets of the types of sensors, which bear the names of their models; those of
-/// single units, of reversed rotors and of the manufacturer's sequences have names of their own.
+/// The built-in presets of the sensor types, which have the names of their models; those of single
+/// units, of reversed rotors and of the manufacturer's sequences have other names.
 std::vector<Sensor> type_presets() {
   std::vector<Sensor> result;
   for (const std::string& name : sensors::builtin_preset_names()) {
@@ -53,7 +56,7 @@ std::vector<Sensor> type_presets() {
   return result;
 }
 
-/// Built-in presets of the same type whose faces stand otherwise.
+/// Built-in presets of the same type with other face orders.
 std::vector<Sensor> variants_of(const Sensor& sensor) {
   std::vector<Sensor> result;
   for (const std::string& name : sensors::builtin_preset_names()) {
@@ -75,7 +78,7 @@ FirstShots first_shots(const recordings::Source& source, const recordings::ReadO
   if (std::any_of(beam.begin(), beam.end(), [](std::uint8_t one) { return one != 0; })) {
     return shots;
   }
-  int emitters = 1;  // that every candidate's fire in turn
+  int emitters = 1;  // if every candidate's fire in turn
   for (const Sensor& sensor : candidates) emitters = std::lcm(emitters, sensor.train.emitters());
   shots.beams = BeamSource::counted;
   for (std::size_t i = 0; i < shots.head.size(); ++i) {
@@ -85,7 +88,7 @@ FirstShots first_shots(const recordings::Source& source, const recordings::ReadO
   return shots;
 }
 
-/// Empty where there are too few shots.
+/// Empty if there are too few shots.
 std::optional<SensorRecognition> recognised(FirstShots& shots, std::span<const Sensor> candidates) {
   try {
     return estimation::recognise_sensor(shots.head, candidates, shots.beams, &shots.found);
@@ -112,7 +115,7 @@ std::vector<PresetMisfit> best_two(const SensorRecognition& found,
   return misfits;
 }
 
-/// What was found of a recognition's best match; its words are the caller's.
+/// Records a recognition's best match; the caller adds the words.
 void take(const SensorRecognition& found, std::span<const Sensor> candidates,
           SensorChoice& choice) {
   const SensorMatch& best = found.matches.front();
@@ -120,7 +123,10 @@ void take(const SensorRecognition& found, std::span<const Sensor> candidates,
   choice.fits = found.fits;
   choice.order = best.order;
   choice.frame = best.frame;
-  if (std::abs(best.roll) > kLeastRoll) choice.roll = best.roll;
+  const bool all_around = choice.sensor.train.layout().axis_up;
+  if (std::abs(best.roll) > (all_around ? kLeastRollAllAround : kLeastRoll)) {
+    choice.roll = best.roll;
+  }
   choice.misfits = best_two(found, candidates);
 }
 
@@ -133,7 +139,7 @@ std::string comparison(const std::vector<PresetMisfit>& misfits) {
   return text;
 }
 
-/// Exchanges the type's preset for a variant where the shots leave no doubt.
+/// Replaces the type's preset by a variant if the shots leave no doubt.
 void try_variants(FirstShots& shots, SensorChoice& choice) {
   const std::vector<Sensor> variants = variants_of(choice.sensor);
   if (variants.empty()) return;
@@ -161,7 +167,7 @@ void call_it_a_guess(SensorChoice& choice, const std::string& why) {
        choice.sensor.name, why, name_of(kSetting.sensor));
 }
 
-/// Where the values of a calibration are from; empty for other presets.
+/// Source of a calibration's values; empty for other presets.
 std::string origin_of(const Sensor& sensor) {
   if (sensor.reference == sensors::CalibrationReference::none) return {};
   std::string text = sensor.reference == sensors::CalibrationReference::planes ? ", a calibration"
@@ -172,7 +178,7 @@ std::string origin_of(const Sensor& sensor) {
   return text;
 }
 
-/// What is left where shots did not decide: the best description, the field of view, or a habit.
+/// Fallback if shots did not decide: the best fit, the field of view, or the default.
 void guess(const FirstShots& shots, const std::optional<SensorRecognition>& found,
            std::span<const Sensor> candidates, SensorChoice& choice) {
   if (found && found->fits) {
@@ -204,8 +210,8 @@ void guess(const FirstShots& shots, const std::optional<SensorRecognition>& foun
   choice.misfits = best_two(*found, candidates);
   choice.words = "no built-in preset describes the scan: " + comparison(choice.misfits);
   warn(choice.warnings, kWarning.sensor_unknown,
-       "{}; {} is assumed. {} names the sensor, by a preset or a calibration file; the prisms of "
-       "an unknown sensor can be found with identify",
+       "{}; {} is assumed. {} names the sensor, by a preset or a calibration file; identify can "
+       "find the prisms of an unknown sensor",
        choice.words, choice.sensor.name, name_of(kSetting.sensor));
 }
 
@@ -213,18 +219,18 @@ std::string span_text(double from, double to) {
   return fmt::format("{:.0f}", degrees_from_radians(to - from));
 }
 
-/// What may have made shots that lie beyond the field of view of every sensor.
-/// @param lines  of emitters that the file names
+/// Possible sources of shots beyond the field of view of every sensor.
+/// @param lines  of emitters named in the file
 std::string wide_words(const recordings::DirectionSpread& spread, int lines) {
   constexpr int kMostEmitters = 6;  // of sensors with prisms
   if (lines > kMostEmitters) {
-    return fmt::format(
-        "those of a spinning lidar of {} lines or more, which has no prisms to be found", lines);
+    return fmt::format("those of a spinning lidar of {} lines or more, which has no prisms to find",
+                       lines);
   }
   struct Wide {
     const char* name;
     double azimuth_deg, zenith_deg;
-    double least;  ///< share of the azimuths that is rarely behind something
+    double least;  ///< share of the azimuths that is rarely occluded
     const char* why_not;
   };
   static constexpr std::array kWide{
@@ -248,7 +254,7 @@ std::string wide_words(const recordings::DirectionSpread& spread, int lines) {
   return "merged clouds of several sensors: record or export each of them by itself";
 }
 
-/// Says so where most ranges are shorter than the sensor measures.
+/// Warns if most ranges are shorter than the sensor's minimum.
 std::string too_near_words(const AngleSeries& shots, const Sensor& sensor) {
   std::size_t returns = 0, below = 0;
   for (const double range : shots.range) {
@@ -264,8 +270,8 @@ std::string too_near_words(const AngleSeries& shots, const Sensor& sensor) {
       sensor.name);
 }
 
-/// Says why no sensor can have made the shots, where that is so.
-/// @param lines  of emitters that the file names
+/// States why no sensor can be the source of the shots, if that is so.
+/// @param lines  of emitters named in the file
 std::string impossible_words(FirstShots& first, std::span<const Sensor> candidates, int lines) {
   const AngleSeries& shots = first.head;
   if (shots.size() < recordings::kFewestJudged) return {};
@@ -280,7 +286,7 @@ std::string impossible_words(FirstShots& first, std::span<const Sensor> candidat
     if (!(field > 0) || radius < 0.5 * field + kMargin) wide_enough.push_back(sensor);
   }
   if (candidates.size() == 1 && !wide_enough.empty()) return {};
-  // What sees all around holds every scan: its rotors must show, too.
+  // A sensor that scans all around contains every scan: its rotors must show, too.
   const bool all_around =
       std::all_of(wide_enough.begin(), wide_enough.end(),
                   [](const Sensor& sensor) { return sensor.train.layout().axis_up; });
@@ -301,7 +307,7 @@ std::string impossible_words(FirstShots& first, std::span<const Sensor> candidat
       wide_words(spread, lines));
 }
 
-/// Looks at the first shots before any sensor is. @return whether one may have made them
+/// Checks the first shots before choosing a sensor. @return whether a sensor can be the source
 bool are_possible(FirstShots& shots, std::span<const Sensor> candidates, SensorChoice& choice) {
   if (shots.beams == BeamSource::recorded) {
     for (const std::uint8_t beam : shots.head.beam) choice.lines = std::max(choice.lines, beam + 1);
@@ -347,7 +353,7 @@ SensorChoice choose_without_times(const recordings::Source& source, recordings::
   return choice;
 }
 
-/// Whether counting shots at a rate would give the times that they have.
+/// Whether counting shots at a rate would give their recorded times.
 bool are_as_counted(const AngleSeries& shots, double rate) {
   constexpr double kOtherRate = 0.02;
   if (shots.size() < 2) return false;
@@ -355,10 +361,10 @@ bool are_as_counted(const AngleSeries& shots, double rate) {
          kOtherRate;
 }
 
-/// Whether counted shots show one of some sensors of one shot rate better than the times do: these
-/// are at fault then.
-/// @param misfit  of what the times show, rad
-/// @param count   gives the first shots as counted at that rate
+/// Whether counted shots fit one of some sensors of one shot rate better than the recorded times:
+/// these are wrong then.
+/// @param misfit  with the recorded times, rad
+/// @param count  returns the first shots as counted at that rate
 template <class Count>
 bool is_at_fault_by_count(std::span<const Sensor> some, double misfit, Count&& count,
                           SensorChoice& choice) {
@@ -370,15 +376,15 @@ bool is_at_fault_by_count(std::span<const Sensor> some, double misfit, Count&& c
   take(*found, some, choice);
   choice.times_at_fault = true;
   warn(choice.warnings, kWarning.times_corrected,
-       "the times of the recording are at fault: by them its scan is not that of a {}, and counted "
-       "at {:.6g} shots per second it is",
+       "the times of the recording are wrong: with them its scan does not match a {}, but counted "
+       "at {:.6g} shots per second it does",
        choice.sensor.model, choice.sensor.shot_rate);
   return true;
 }
 
-/// What the type that a file names says, and whether the shots contradict it.
-/// @param types  gives the presets of all types
-/// @param count  gives the first shots as counted at the rate of that type
+/// The type named in a file, and whether the shots contradict it.
+/// @param types  returns the presets of all types
+/// @param count  returns the first shots as counted at the rate of that type
 template <class Types, class Count>
 SensorChoice choose_by_name(FirstShots& shots, const Sensor& named, Types&& types, Count&& count) {
   SensorChoice choice;
@@ -407,8 +413,8 @@ SensorChoice choose_by_name(FirstShots& shots, const Sensor& named, Types&& type
     choice.misfits.push_back({named.name, misfit_of(match)});
   }
   warn(choice.warnings, kWarning.sensor_contradicted,
-       "the file names a {}, but its scan is that of a {}: {}; {} decides which it was",
-       named.model, candidates[found->matches.front().candidate].model, comparison(choice.misfits),
+       "the file names a {}, but its scan matches a {}: {}; {} decides", named.model,
+       candidates[found->matches.front().candidate].model, comparison(choice.misfits),
        name_of(kSetting.sensor));
   return choice;
 }
@@ -439,10 +445,10 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
   if (device.type != recordings::kUnknownDeviceType) {
     named = preset_of_type(device.type);
     if (!named) {
-      throw InvalidArgument(fmt::format(
-          "the optics of a {} are not known, and this needs them; what does without reads its "
-          "recordings: info, convert; {} names a preset or calibration of its optics",
-          recordings::device_type_name(device.type), name_of(kSetting.sensor)));
+      throw InvalidArgument(
+          fmt::format("this needs the optics of a {}, which are not known; info and convert read "
+                      "its recordings without them; {} names a preset or calibration of its optics",
+                      recordings::device_type_name(device.type), name_of(kSetting.sensor)));
     }
   }
   if (named && (!has_times || !one_sensor)) {
@@ -453,7 +459,7 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
   }
   if (!has_times) return choose_without_times(source, reading, candidates(), shots, progress);
   if (one_sensor) {
-    // Beams that are counted may be those of any.
+    // Counted beams may be those of any sensor.
     shots = first_shots(source, reading,
                         reading.shot_rate ? candidates() : std::span<const Sensor>(), progress);
   }
@@ -504,8 +510,8 @@ SensorChoice choose(const recordings::Source& source, const recordings::ReadOpti
       choice = std::move(counted);
       choice.times_at_fault = true;
       warn(choice.warnings, kWarning.times_corrected,
-           "the times of the recording are at fault: by them no built-in preset describes its "
-           "scan; counted at {:.6g} shots per second, {} does",
+           "the times of the recording are wrong: with them no built-in preset describes its scan; "
+           "counted at {:.6g} shots per second, {} does",
            choice.sensor.shot_rate, choice.sensor.name);
     }
   }
@@ -547,7 +553,7 @@ std::string to_string(ChosenBy chosen_by) {
 
 AngleSeries first_second(const recordings::Source& source, const recordings::ReadOptions& options,
                          const Progress& progress) {
-  // One shot a second, and all of the head.
+  // One shot per second, and all of the head.
   estimation::ShotSelector selector({.rate = 1.0, .ranges = true, .rows = false});
   const auto reader = recordings::open_recording(source, options, progress);
   recordings::Chunk chunk;
@@ -580,14 +586,14 @@ SensorChoice choose_sensor(const recordings::Source& source, const recordings::R
   FirstShots own;
   FirstShots& shots = looked_at != nullptr ? *looked_at : own;
   SensorChoice choice = choose(source, reading, header, given, shots, progress);
-  // The reach of the specification is that on grey walls.
+  // The specified reach is for grey walls.
   constexpr double kOnBrightWalls = 1.5;
   const double reach = kOnBrightWalls * choice.sensor.range_maximum;
   if (!(reach > 0) || !choice.impossible.empty() || sensor_name(choice) == "unknown") return choice;
   choice.beyond_reach =
       recordings::beyond_reach(shots.head.range, reach, choice.sensor.name).value_or("");
   if (choice.beyond_reach.empty()) choice.beyond_reach = too_near_words(shots.head, choice.sensor);
-  // The reader reports what no sensor reaches.
+  // The reader reports ranges beyond any sensor's reach.
   if (!choice.beyond_reach.empty() &&
       !recordings::beyond_reach(shots.head.range, recordings::kFarthestReach, "")) {
     choice.warnings.push_back({kWarning.implausible_values, choice.beyond_reach});

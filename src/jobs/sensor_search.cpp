@@ -15,7 +15,7 @@
 namespace risley::jobs {
 namespace {
 
-/// Of one network; more are somebody's noise.
+/// Of one network; more are noise.
 constexpr std::size_t kMostSensors = 255;
 
 }  // namespace
@@ -29,7 +29,7 @@ void require_find_time(const RecordOptions& options) {
 }
 
 BroadcastListener::BroadcastListener(const wire::Interface& interface) {
-  // Each hears what is sent to its address only. Broadcasts come to 255.255.255.255; those of some
+  // Each receives only packets for its address. Broadcasts come to 255.255.255.255; those of some
   // emulators to the network, or to this host alone.
   const auto listen = [&](std::vector<wire::UdpSocket>& sockets, std::uint16_t port) {
     sockets.emplace_back(wire::Endpoint{wire::kEverybody, port}, 0, interface.name);
@@ -43,7 +43,7 @@ BroadcastListener::BroadcastListener(const wire::Interface& interface) {
   try {
     answers_.emplace_back(wire::Endpoint{interface.address, wire::kSearchPort});
   } catch (const wire::NetworkError&) {
-    // Another program, such as a driver, has the port: sensors answer whoever asks.
+    // Another program, such as a driver, has the port: sensors answer any sender.
     answers_.emplace_back(wire::Endpoint{interface.address, 0});
   }
 }
@@ -74,7 +74,7 @@ std::optional<FoundSensor> BroadcastListener::sensor_of(const wire::UdpSocket::D
       return FoundSensor{reply->serial, reply->device_type, datagram.from.address,
                          reply->command_port};
     }
-    // Searches of this host and others, and what sensors say to their hosts.
+    // Searches of this host and others, and messages of sensors to their hosts.
     if (frame == nullptr) ++strangers_;
     return std::nullopt;
   }

@@ -34,7 +34,7 @@ void assign(sensors::Sensor& sensor, const ParameterValues& values) {
   }
 }
 
-/// Sets what the sensor adds to true ranges, too.
+/// Sets range errors, too.
 void assign_truth(sensors::Sensor& sensor, const ParameterValues& values) {
   ParameterValues parameters;
   for (const auto& [name, value] : values) {
@@ -61,7 +61,8 @@ void check_moves(const SimulationOptions& options) {
   }
 }
 
-/// What moves the sensor, of a trajectory or a flight plan and a mount; nothing where it stands.
+/// Motion of the sensor, from a trajectory or a flight plan and a mount; nothing if it is
+/// stationary.
 std::optional<simulation::Platform> platform_from(const SimulationOptions& options,
                                                   const simulation::SimulationSettings& settings) {
   if (options.trajectory.empty() && options.flight.empty()) {
@@ -73,13 +74,13 @@ std::optional<simulation::Platform> platform_from(const SimulationOptions& optio
                                       name_of(kSetting.flight)));
   }
   if (options.mount.empty()) {
-    throw InvalidArgument(
-        fmt::format("{} is missing: a file that says how the sensor sits on the moving platform",
-                    name_of(kSetting.mount)));
+    throw InvalidArgument(fmt::format(
+        "{} is missing: a file that describes how the sensor is mounted on the moving platform",
+        name_of(kSetting.mount)));
   }
   if (!settings.scene) {
     throw InvalidArgument(
-        fmt::format("{} is missing: what the moving sensor scans, for example a terrain",
+        fmt::format("{} is missing: the scene of the moving sensor, for example a terrain",
                     name_of(kSetting.scene)));
   }
   simulation::Platform platform;

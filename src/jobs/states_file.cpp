@@ -103,7 +103,7 @@ void write_states(const io::OutputFile& output, const StatesContent& content,
     variables.push_back(define<double>(file, shots, column.name, column.units, column.long_name));
   }
   const auto outlier =
-      define<std::uint8_t>(file, shots, "outlier", "", "shot left out as an outlier");
+      define<std::uint8_t>(file, shots, "outlier", "", "shot rejected as an outlier");
   file.put_numbers(outlier, "flag_values", std::array<std::uint8_t, 2>{0, 1});
   file.put_text(outlier, "flag_meanings", "used left_out");
 

@@ -35,7 +35,8 @@ const std::vector<Format>& formats() {
       {{"npy",
         "float32 pairs of azimuth and elevation (radians), for MuJoCo-LiDAR, OmniPerception"},
        put_npy},
-      {{"helios-xml", "the prisms for HELIOS++, and what it cannot show of them"}, put_helios_xml},
+      {{"helios-xml", "the prisms for HELIOS++, and the parts of them that it cannot represent"},
+       put_helios_xml},
       {{"json", "a lidar profile of Isaac Sim up to 4.5, one emitter per shot"}, put_isaac_json},
       {{"usda", "an OmniLidar in USD for Isaac Sim 5 and later, one emitter per shot"},
        put_isaac_usda}};

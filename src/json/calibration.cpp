@@ -22,7 +22,7 @@ Json datum_json(calibration::DatumKind kind, const FormalDatum& datum) {
   return object;
 }
 
-Json vector_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+Json direction_json(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
 
 Json unobservable_json(const std::vector<estimation::WeakDirection>& directions) {
   Json list = Json::array();
@@ -37,7 +37,7 @@ Json number_json(const calibration::CalibratedNumber& number) {
           {"prior_sigma", number_or_null(number.prior_sigma)}};
 }
 
-/// By the names that presets have, less their "range_"; the offset is the constant.
+/// By their names in presets, less their "range_"; the offset is the constant.
 Json ranges_json(const Calibration& c) {
   Json ranges = Json::object();
   constexpr std::string_view kPrefix = "range_";
@@ -82,7 +82,7 @@ Json of(const jobs::CalibratedRecordings& found) {
     planes.push_back(
         {{"name", plane.name},
          {"recording", found.recordings[plane.recording].path},
-         {"normal", vector_json(plane.normal)},
+         {"normal", direction_json(plane.normal)},
          {"offset_m", plane.distance},
          {"points", plane.points},
          {"outliers", plane.outliers},

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/cloud_of_stations.hpp"
 #include "risley/json/results.hpp"
 
 #include "json/parts.hpp"
@@ -42,6 +43,43 @@ Json strip_json(const StripDistribution& s) {
            {{"stripe_m", s.profile.stripe},
             {"across_m", s.profile.across},
             {"density_per_m2", s.profile.density}}}};
+}
+
+Json calibration_json(const jobs::RecordingCloud& made) {
+  const bool is_none = made.calibrated_against == sensors::CalibrationReference::none;
+  return {{"path", made.calibration},
+          {"calibrated_against", is_none ? Json() : Json(to_string(made.calibrated_against))}};
+}
+
+/// One of the stations: its part of a cloud's result, and its pose.
+Json station_json(const jobs::StationCloud& one) {
+  Json json = of(one.cloud);
+  for (const char* of_all :
+       {"format", "output", "without_pose", "strips", "frame", "point_frame", "common_factors",
+        "warnings", "calibration", "file", "byte_offset", "line"}) {
+    json.erase(of_all);
+  }
+  json["name"] = one.name;
+  json["position_m"] = {{"value", vector_json(one.pose.place)},
+                        {"sigma", vector_json(one.pose.sigma)}};
+  const auto& [roll, pitch, heading] = one.pose.angles;
+  const auto& sigma = one.pose.angle_sigma;
+  json["roll_deg"] = value_json(roll, sigma.roll);
+  json["pitch_deg"] = value_json(pitch, sigma.pitch);
+  json["heading_deg"] = value_json(heading, sigma.heading);
+  if (!one.adjusted) return json;
+  Json targets = Json::array();
+  for (std::size_t t = 0; t < one.targets.size(); ++t) {
+    targets.push_back({{"name", one.targets[t].name},
+                       {"points", one.measured[t].points},
+                       {"in_scan_m", vector_json(one.measured[t].at)},
+                       {"residual_m", vector_json(one.adjusted->residuals[t])}});
+  }
+  json["targets"] = targets;
+  json["fit"] = {{"chi2", one.adjusted->chi2},
+                 {"degrees_of_freedom", one.adjusted->degrees_of_freedom},
+                 {"p_value", one.adjusted->p_value}};
+  return json;
 }
 
 }  // namespace
@@ -88,12 +126,29 @@ Json of(const jobs::RecordingCloud& made) {
       {"warnings", of(s.warnings)},
   };
   if (s.damage) json.update(of(*s.damage));
-  const bool is_none = made.calibrated_against == sensors::CalibrationReference::none;
-  json["calibration"] = {
-      {"path", made.calibration},
-      {"calibrated_against", is_none ? Json() : Json(to_string(made.calibrated_against))}};
+  json["calibration"] = calibration_json(made);
   if (s.distribution) json["distribution"] = distribution_json(*s.distribution);
   return json;
+}
+
+Json of(const jobs::CloudOfStations& made) {
+  Json stations = Json::array();
+  std::vector<Warning> warnings;
+  for (const jobs::StationCloud& one : made.stations) {
+    stations.push_back(station_json(one));
+    for (const Warning& warning : one.cloud.summary.warnings) {
+      warnings.push_back(of_file(one.cloud.recording, warning));
+    }
+  }
+  return {{"points", made.points()},
+          {"format", made.format},
+          {"output", made.output},
+          {"point_frame", made.frame},
+          {"common_factors", made.factors},
+          {"factors_of_one_station", made.factors_of_source},
+          {"calibration", calibration_json(made.stations.front().cloud)},
+          {"stations", stations},
+          {"warnings", of(warnings)}};
 }
 
 }  // namespace risley::json

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "risley/jobs/beam_origins.hpp"
+#include "risley/jobs/compare_clouds.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/compare_units.hpp"
 
@@ -100,6 +101,31 @@ Json of(const jobs::BeamOrigins& found) {
           {"cells", found.map.size()},
           {"y_m", {{"min", found.least_y}, {"max", found.greatest_y}}},
           {"z_m", {{"min", found.least_z}, {"max", found.greatest_z}}}};
+}
+
+Json of(const jobs::ComparedClouds& compared) {
+  const cloud::SurfaceChange& change = compared.change;
+  Json cells = Json::array();
+  for (const cloud::SurfaceCell& cell : change.cells) {
+    cells.push_back({{"place_m", vector_json(cell.place)},
+                     {"normal", vector_json(cell.normal)},
+                     {"distance_m", cell.distance},
+                     {"sigma_m", cell.sigma},
+                     {"significant", cell.significant},
+                     {"points", {cell.points_a, cell.points_b}}});
+  }
+  return {{"a", {{"path", compared.a}, {"points", compared.points_a}}},
+          {"b", {{"path", compared.b}, {"points", compared.points_b}}},
+          {"cell_size_m", compared.options.cell},
+          {"reach_m", compared.options.reach},
+          {"false_alarm", compared.options.false_alarm},
+          {"detection_sigmas", change.critical},
+          {"significant", change.significant},
+          {"uneven", change.uneven},
+          {"unseen", change.unseen},
+          {"shared_factors", change.shared},
+          {"cells", cells},
+          {"warnings", of(change.warnings)}};
 }
 
 }  // namespace risley::json

@@ -57,7 +57,8 @@ Json start_json(const estimation::Start& start) {
           {"residual_rms_deg", deg(start.residual_rms)}};
 }
 
-/// What rotors say of the clock, and the shot rate with which they would turn as usual.
+/// Conclusion from the rotors about the clock, and the shot rate with which they would turn as
+/// usual.
 Json shot_clock_json(const jobs::EstimatedRecording& found) {
   if (!found.estimate.speed_factor) return nullptr;
   const estimation::SpeedFactor& factor = *found.estimate.speed_factor;
@@ -84,6 +85,32 @@ Json fixed_json(const estimation::Estimate& estimate) {
     object[info.name] = estimate.sensor.get(info.name) / info.si_per_unit;
   }
   return object;
+}
+
+/// Under the names used in lidar odometry programs, in their units.
+Json noise_model_json(const estimation::NoiseModel& model) {
+  const auto known = [](const std::optional<double>& value, double scale) {
+    return value ? Json(scale * *value) : Json(nullptr);
+  };
+  return {{"range_m", model.range},
+          {"range_distance_m", model.range_distance},
+          {"range_source", model.range_source},
+          {"azimuth_deg", deg(model.azimuth)},
+          {"zenith_deg", deg(model.zenith)},
+          {"direction_deg", deg(model.direction)},
+          {"point_variance_m2", model.point_variance()},
+          {"shared",
+           {{"direction_deg", known(model.shared_direction, kDegreesPerRadian)},
+            {"direction_source", model.shared_direction_source},
+            {"range_m", known(model.shared_range, 1)},
+            {"range_source", model.shared_range_source}}},
+          {"settings",
+           {{"VoxelMap",
+             {{"noise_model/ranging_cov", model.range},
+              {"noise_model/angle_cov", deg(model.direction)}}},
+            {"FAST-LIVO2", {{"lio/dept_err", model.range}, {"lio/beam_err", deg(model.direction)}}},
+            {"Point-LIO", {{"mapping/lidar_meas_cov", model.point_variance()}}},
+            {"FAST-LIO", {{"LASER_POINT_COV", model.point_variance()}}}}}};
 }
 
 }  // namespace
@@ -152,6 +179,7 @@ Json of(const jobs::EstimatedRecording& found) {
   object["residuals"]["unit_variance"] = e.unit_variance;
   object["residuals"]["variance_factor"] = e.variance_factor;
   if (e.sensor.combination) object["combination"] = *e.sensor.combination;
+  if (found.noise_model) object["noise_model"] = noise_model_json(*found.noise_model);
   if (found.evaluation) object["truth"] = evaluation_json(*found.evaluation, shape);
   return object;
 }

@@ -113,7 +113,7 @@ Json held_json(const FlightCalibration& c) {
   for (const calibration::HeldParameter& held : c.held) {
     object[held.name] = {{"value", in_file_unit(held.name, held.held, shape)},
                          {"stated_sigma", in_file_unit(held.name, held.stated_sigma, shape)},
-                         {"told", in_file_unit(held.name, held.told, shape)},
+                         {"told", in_file_unit(held.name, held.from_flight, shape)},
                          {"sigma", in_file_unit(held.name, held.sigma, shape)},
                          {"significant", held.significant}};
   }

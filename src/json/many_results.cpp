@@ -56,9 +56,9 @@ InputWork work_of(std::string verb, std::string label) {
   return work;
 }
 
-void tell_all(const Tell& tell, const std::string& file, const std::vector<Warning>& warnings) {
+void note_all(const Note& note, const std::string& file, const std::vector<Warning>& warnings) {
   for (const Warning& warning : warnings) {
-    tell(warning_text(of_file(file, warning)), false);
+    note(warning_text(of_file(file, warning)), false);
   }
 }
 
@@ -77,20 +77,20 @@ std::vector<std::string> result_files_of(const InputJob& job) {
   return names;
 }
 
-/// Before an hour of computing; of rotor states not all are written.
+/// Checked before an hour of computation; some rotor states are not written.
 void require_own_results(const InputJob& job) {
   for (const std::string& file : result_files_of(job)) {
     if (!file.ends_with(".nc")) jobs::require_own_result(file);
   }
 }
 
-/// The outcome of a job whose numbers have a verdict, once its warnings are told.
-/// @param solution  of what was found  @param words  what it was made from
+/// The outcome of a job whose numbers have a verdict, after its warnings.
+/// @param solution  of what was found @param words  its source
 template <class Found, class Solution>
 InputOutcome judged(const InputJob& job, const Found& found, const Solution& solution,
-                    const Tell& tell, const std::string& words) {
-  tell_all(tell, job.input, found.warnings);
-  tell_all(tell, job.input, solution.warnings);
+                    const Note& note, const std::string& words) {
+  note_all(note, job.input, found.warnings);
+  note_all(note, job.input, solution.warnings);
   Json json = of(found);
   const std::string reason = solution.converged ? "" : solution.reason;
   json["input"] = job.input;
@@ -102,7 +102,7 @@ InputOutcome judged(const InputJob& job, const Found& found, const Solution& sol
           fmt::format("{}; {}", text, words)};
 }
 
-/// A verb that makes a folder of results of every input.
+/// A verb that writes a folder of results for every input.
 /// @param solve  called with the job, its own options and the progress
 template <class Options, class Solve>
 InputWork work_into_folders(std::string verb, std::string label, Options options, Solve solve) {
@@ -128,11 +128,11 @@ bool is_trajectory(const InspectEachOptions& options, const InputJob& job,
                              progress);
 }
 
-InputOutcome inspect_poses(const InputJob& job, const InspectEachOptions& options, const Tell& tell,
+InputOutcome inspect_poses(const InputJob& job, const InspectEachOptions& options, const Note& note,
                            const Progress& progress) {
   const jobs::InspectedTrajectory found =
       jobs::inspect_trajectory({job.input, options.accuracy, options.topic}, progress);
-  tell_all(tell, job.input, found.warnings);
+  note_all(note, job.input, found.warnings);
   Json json = of(found);
   json["input"] = job.input;
   return {jobs::kDone, text_of(json),
@@ -140,12 +140,12 @@ InputOutcome inspect_poses(const InputJob& job, const InspectEachOptions& option
                       grouped(json.value("records", std::uint64_t{0})))};
 }
 
-InputOutcome inspect(const InputJob& job, const InspectEachOptions& options, const Tell& tell,
+InputOutcome inspect(const InputJob& job, const InspectEachOptions& options, const Note& note,
                      const Progress& progress) {
-  if (is_trajectory(options, job, progress)) return inspect_poses(job, options, tell, progress);
+  if (is_trajectory(options, job, progress)) return inspect_poses(job, options, note, progress);
   const jobs::InspectedRecording found =
       jobs::inspect_recording({job.input, reading_of(options.reading, job), {}, {}}, progress);
-  tell_all(tell, job.input, found.warnings);
+  note_all(note, job.input, found.warnings);
   Json json = with_status(of(found), found.damage);
   json["input"] = job.input;
   std::string text =
@@ -158,7 +158,7 @@ InputOutcome inspect(const InputJob& job, const InspectEachOptions& options, con
   return {found.damage ? jobs::kBadFile : jobs::kDone, text_of(json), std::move(text)};
 }
 
-InputOutcome convert_poses(const InputJob& job, const ConvertEachOptions& options, const Tell& tell,
+InputOutcome convert_poses(const InputJob& job, const ConvertEachOptions& options, const Note& note,
                            const Progress& progress) {
   if (options.sensor_type) {
     throw InvalidArgument(fmt::format("{} is for recordings, and {} is a trajectory",
@@ -166,9 +166,9 @@ InputOutcome convert_poses(const InputJob& job, const ConvertEachOptions& option
   }
   const jobs::ConvertedTrajectory done = jobs::convert_trajectory(
       {job.input, job.output, options.format, options.accuracy, options.topic}, progress);
-  tell_all(tell, job.input, done.warnings);
+  note_all(note, job.input, done.warnings);
   for (const std::string& one : done.left_out) {
-    tell(fmt::format("{}: {}", job.output, one), false);
+    note(fmt::format("{}: {}", job.output, one), false);
   }
   Json json = of(done);
   json.update({{"input", job.input}, {"output", job.output}});
@@ -176,24 +176,24 @@ InputOutcome convert_poses(const InputJob& job, const ConvertEachOptions& option
           fmt::format("{}: {} records", job.output, grouped(done.records))};
 }
 
-InputOutcome convert(const InputJob& job, const ConvertEachOptions& options, const Tell& tell,
+InputOutcome convert(const InputJob& job, const ConvertEachOptions& options, const Note& note,
                      const Progress& progress) {
-  if (is_trajectory(options, job, progress)) return convert_poses(job, options, tell, progress);
+  if (is_trajectory(options, job, progress)) return convert_poses(job, options, note, progress);
   const jobs::ConvertedRecording done =
       jobs::convert_recording({job.input, reading_of(options.reading, job), job.output,
-                               options.format, options.sensor_type},
+                               options.format, options.sensor_type, options.writing},
                               progress);
-  tell_all(tell, job.input, done.warnings);
+  note_all(note, job.input, done.warnings);
   const std::uint64_t written = done.observations - done.left_out;
   if (done.left_out > 0) {
-    tell(fmt::format("{}: {} of {} observations have no place in this format and were left out",
+    note(fmt::format("{}: {} of {} observations do not fit this format and were dropped",
                      job.output, done.left_out, done.observations),
          false);
   }
   Json json = with_status(of(done), done.damage);
   json.update({{"input", job.input}, {"output", job.output}});
   if (done.damage) {
-    tell(fmt::format("{}; the {} observations before it are saved in {}", done.damage->what(),
+    note(fmt::format("{}; the {} observations before it are saved in {}", done.damage->what(),
                      written, job.output),
          true);
   }
@@ -213,7 +213,7 @@ std::string ending_of(const std::string& format) {
   return {};
 }
 
-/// What sent the beams where the points are.
+/// The source of the points' directions.
 std::string calibration_text(const jobs::RecordingCloud& made) {
   using sensors::CalibrationReference;
   return fmt::format("{} ({})", made.calibration,
@@ -224,15 +224,15 @@ std::string calibration_text(const jobs::RecordingCloud& made) {
 }
 
 InputOutcome make_cloud(const InputJob& job, jobs::CloudOfRecordingOptions options,
-                        const CloudPages& pages, const Tell& tell, const Progress& progress) {
+                        const CloudPages& pages, const Note& note, const Progress& progress) {
   options.recording = job.input;
   options.reading = reading_of(options.reading, job);
   options.output = job.output;
   const jobs::RecordingCloud made = jobs::cloud_of_recording(options, progress);
   const cloud::CloudSummary& s = made.summary;
-  tell_all(tell, job.input, s.warnings);
+  note_all(note, job.input, s.warnings);
   if (s.damage) {
-    tell(fmt::format("{}; the {} points before it are saved in {}", s.damage->what(), s.points,
+    note(fmt::format("{}; the {} points before it are saved in {}", s.damage->what(), s.points,
                      job.output),
          true);
   }
@@ -301,7 +301,7 @@ Json undecided(const std::string& message) {
           {"verdict",
            {{"code", "undecided"},
             {"words", message},
-            {"to_do", "mend what the words name, or record again"}}}};
+            {"to_do", "fix the named error, or record again"}}}};
 }
 
 Json with_status(Json result, const std::optional<FileError>& damage) {
@@ -309,63 +309,63 @@ Json with_status(Json result, const std::optional<FileError>& damage) {
   return result;
 }
 
-InputWork estimate_each(jobs::EstimateRecordingOptions options, const Tell& tell) {
+InputWork estimate_each(jobs::EstimateRecordingOptions options, const Note& note) {
   return work_into_folders(
       "estimate", "estimating", std::move(options),
-      [tell](const InputJob& job, jobs::EstimateRecordingOptions& own, const Progress& progress) {
+      [note](const InputJob& job, jobs::EstimateRecordingOptions& own, const Progress& progress) {
         own.recording = job.input;
         const jobs::EstimatedRecording found = jobs::estimate_recording(own, progress);
         const estimation::Estimate& e = found.estimate;
         return judged(
-            job, found, e, tell,
+            job, found, e, note,
             fmt::format("{}, {} shots, {} of them outliers", jobs::sensor_name(found.choice),
                         grouped(e.series.size()), grouped(e.outliers)));
       });
 }
 
-InputWork calibrate_each(jobs::CalibrateRecordingsOptions options, const Tell& tell) {
+InputWork calibrate_each(jobs::CalibrateRecordingsOptions options, const Note& note) {
   options.recordings.assign(1, recordings::Source("each recording"));
   return work_into_folders(
       "calibrate", "calibrating", std::move(options),
-      [tell](const InputJob& job, jobs::CalibrateRecordingsOptions& own, const Progress& progress) {
+      [note](const InputJob& job, jobs::CalibrateRecordingsOptions& own, const Progress& progress) {
         own.recordings = {job.input};
         const jobs::CalibratedRecordings found = jobs::calibrate_recordings(own, progress);
         const calibration::Calibration& c = found.calibration;
-        return judged(job, found, c, tell,
+        return judged(job, found, c, note,
                       fmt::format("{}, {} points on {} planes", jobs::sensor_name(found.choice),
                                   grouped(c.points), c.planes.size()));
       });
 }
 
 InputWork cloud_each(jobs::CloudOfRecordingOptions options, const CloudPages& pages,
-                     const Tell& tell) {
+                     const Note& note) {
   InputWork work = work_of("cloud", "making points");
   work.counted = "points";
   const std::string& format = options.cloud.writer.format;
   work.ending =
       cloud::find_cloud_format("", format.empty() ? cloud::cloud_formats().front().name : format)
           .ending;
-  work.run = [options = std::move(options), pages, tell](const InputJob& job,
+  work.run = [options = std::move(options), pages, note](const InputJob& job,
                                                          const Progress& progress) {
-    return make_cloud(job, options, pages, tell, progress);
+    return make_cloud(job, options, pages, note, progress);
   };
   return work;
 }
 
-InputWork inspect_each(InspectEachOptions options, const Tell& tell) {
+InputWork inspect_each(InspectEachOptions options, const Note& note) {
   InputWork work = work_of("info", "reading");
-  work.run = [options = std::move(options), tell](const InputJob& job, const Progress& progress) {
-    return inspect(job, options, tell, progress);
+  work.run = [options = std::move(options), note](const InputJob& job, const Progress& progress) {
+    return inspect(job, options, note, progress);
   };
   return work;
 }
 
-InputWork convert_each(ConvertEachOptions options, const Tell& tell) {
+InputWork convert_each(ConvertEachOptions options, const Note& note) {
   InputWork work = work_of("convert", "converting");
   work.counted = "observations";
   work.ending = ending_of(options.format);
-  work.run = [options = std::move(options), tell](const InputJob& job, const Progress& progress) {
-    return convert(job, options, tell, progress);
+  work.run = [options = std::move(options), note](const InputJob& job, const Progress& progress) {
+    return convert(job, options, note, progress);
   };
   return work;
 }

@@ -37,6 +37,8 @@ Json turn_json(bool axis_up, Json yaw, Json about_first, Json about_second) {
   return json;
 }
 
+Json vector_json(const Eigen::Vector3d& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
 Json frame_json(const std::optional<estimation::FrameEstimate>& turn, bool axis_up) {
   const estimation::FrameEstimate frame = turn.value_or(estimation::FrameEstimate{});
   Json json = turn_json(axis_up, value_json(0, 0),

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
 #include "risley/calibration/datum.hpp"
@@ -20,53 +21,56 @@
 
 namespace risley::json {
 
-// What several results have in common. Angles come in rad and leave in deg.
+// Common parts of several results. Angles are converted from rad to deg.
 
 inline double deg(double radians) { return degrees_from_radians(radians); }
 
-/// NaN and the infinite have no place in JSON.
+/// JSON cannot represent NaN and infinity.
 Json number_or_null(double value);
 
 /// An angle and its sigma.
 Json value_json(double value, double sigma);
 
-/// A verdict: stable code, words, what to do.
+/// A verdict: stable code, words, recommended action.
 template <class Verdict>
 Json verdict_json(const Verdict& verdict) {
   return {{"code", to_string(verdict.code)}, {"words", verdict.words}, {"to_do", verdict.to_do}};
 }
 
-/// Which sensor it was and how that is known: sensor, preset, sensor_chosen_by, sensor_choice.
+/// The sensor and how it was chosen: sensor, preset, sensor_chosen_by, sensor_choice.
 Json choice_json(const jobs::SensorChoice& choice);
 
-/// A turn of a frame by the names of its angles, of which a sensor about Z has a roll, too.
+/// The turn of a frame by the names of its angles, including a roll for a sensor about Z.
 /// @param about_first  and second: in the order of estimation::turn_names()
 Json turn_json(bool axis_up, Json yaw, Json about_first, Json about_second);
 
-/// How a recording's frame is turned; zeros without sigma where it is the sensor's.
-/// @param axis_up  of the sensor: a roll takes the place of the yaw, which is 0
+/// The turn of a recording's frame; zeros without sigma if it is the sensor's.
+/// @param axis_up  of the sensor: a roll replaces the yaw, which is 0
 Json frame_json(const std::optional<estimation::FrameEstimate>& turn = {}, bool axis_up = false);
 
-/// Where the count of shots was wrong: [{row, shots}], shots null where they could not be counted.
+/// Errors in the count of shots: [{row, shots}], shots null if they could not be counted.
 Json slips_json(const std::vector<recordings::ShotSlip>& slips);
-/// Slips of all recordings, each with the name of its own.
+/// Slips of all recordings, each with its recording's name.
 Json slips_of_all(const std::vector<jobs::ReadRecording>& recordings);
 
 /// A combination of parameters that data do not determine.
 Json weak_direction_json(const estimation::WeakDirection& direction);
 
-/// Those of a job, then those of what it computed.
+/// First those of a job, then those of its result.
 Json all_warnings(std::vector<Warning> of_job, const std::vector<Warning>& own);
 
-/// How far directions are off, with sigmas.
+/// Errors of directions, with sigmas.
 Json pointing_json(const calibration::PointingError& pointing);
-/// An error that is tolerated; null where none is.
+/// The tolerance; null if there is none.
 /// @param tolerance  rad; 0: none
 Json tolerance_json(double tolerance);
+/// The three numbers.
+Json vector_json(const Eigen::Vector3d& vector);
+
 /// Errors of directions against a known truth.
 Json errors_json(const calibration::DirectionErrors& errors);
 
-/// What calibrations on walls and in flight end with.
+/// Final members of calibrations on walls and in flight.
 /// @tparam Found  jobs::CalibratedRecordings or jobs::CalibratedFlight
 template <class Found>
 void add_end(const Found& found, Json& object) {
@@ -84,10 +88,10 @@ void add_end(const Found& found, Json& object) {
                      {"after", errors_json(found.truth->after)}};
 }
 
-/// What a plan says where a calibration says whose sensor it was, and how it turned out.
+/// Members of a plan in place of a calibration's sensor and verdict.
 Json plan_head(const std::string& sensor);
 
-/// How the points of a flight lie on the ground.
+/// Distribution of a flight's points on the ground.
 Json distribution_json(const cloud::PointDistributionSummary& distribution);
 
 }  // namespace risley::json

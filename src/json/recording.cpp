@@ -23,12 +23,12 @@ Json range_json(const std::optional<ValueRange>& range, double scale) {
   return {{"min", range->min * scale}, {"max", range->max * scale}};
 }
 
-/// YAW,PITCH,ROLL as --extrinsics takes them.
+/// YAW,PITCH,ROLL as for --extrinsics.
 std::array<double, 3> yaw_pitch_roll_deg(const recordings::Extrinsics& pose) {
   return {deg(pose.yaw), deg(pose.pitch), deg(pose.roll)};
 }
 
-/// What only sensors of the second generation report.
+/// Data reported only by sensors of the second generation.
 Json numbered_json(const recordings::RecordingHeader& header, const recordings::Device& device,
                    const recordings::NumberedAudit& audit) {
   Json tags = Json::array();
@@ -70,7 +70,7 @@ Json devices_json(const recordings::RecordingHeader& header, const TimeAuditResu
   return devices;
 }
 
-/// Counts by number, the empty ones left out.
+/// Counts by number, without empty ones.
 template <class Counts>
 Json counts_json(const Counts& counts) {
   Json object = Json::object();
@@ -93,7 +93,7 @@ Json excerpt_json(const recordings::Excerpt& excerpt) {
           {"does_not_hold", contents.lacks}};
 }
 
-/// What a reader found in a recording, and how sound its times are.
+/// A reader's findings about a recording, and the quality of its times.
 Json audit_json(const recordings::RecordingHeader& header, const TimeAuditResult& audit,
                 std::optional<double> time_uncertainty = {}) {
   const auto if_times = [&header](auto value) { return header.has_times ? Json(value) : Json(); };

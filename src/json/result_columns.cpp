@@ -15,7 +15,7 @@ namespace {
 using tables::CellKind;
 using tables::TableCell;
 
-/// Nothing, where a result does not have such a value.
+/// Nothing if a result has no such value.
 const Json* value_at(const Json& result, const std::vector<std::string>& places) {
   for (const std::string& place : places) {
     const Json::json_pointer pointer(place);

@@ -87,8 +87,7 @@ Problem problem_of_object(const Json& value, const Schema& schema, const std::st
   const Json& rest = word(words, "additionalProperties");
   for (const auto& [name, one] : value.items()) {
     if (names.contains("pattern") && !matches(name, names["pattern"].get<std::string>())) {
-      return fmt::format("{}: '{}' is no name that is known there", place,
-                         name.substr(0, kLongestName));
+      return fmt::format("{}: '{}' is not a known name there", place, name.substr(0, kLongestName));
     }
     const auto found = known.find(name);
     if (found == known.end() && !rest.is_object()) continue;
@@ -115,7 +114,7 @@ Problem problem_of_list(const Json& value, const Schema& schema, const std::stri
   return {};
 }
 
-/// Of those words that combine schemas.
+/// For the keywords that combine schemas.
 Problem problem_of_parts(const Json& value, const Schema& schema, const std::string& place) {
   const Json& words = schema.words;
   const auto of = [&](const Json& part) { return problem_of(value, {part, schema.file}, place); };

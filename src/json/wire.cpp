@@ -1,5 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "risley/core/angle.hpp"
@@ -71,7 +73,7 @@ const char* sync_name(std::uint8_t sync) {
   return sync < std::size(kNames) ? kNames[sync] : "unknown";
 }
 
-/// What a sensor of the second generation says of itself.
+/// A report of a sensor of the second generation.
 Json report_json(const wire::SensorReport& report) {
   return {
       {"work_state", report.work_state ? Json(wire::work_state_words(*report.work_state)) : Json()},
@@ -103,7 +105,7 @@ Json alarm_json(const estimation::OpticsAlarm& alarm) {
           {"sigma", alarm.sigma / unit}};
 }
 
-/// What a sensor says of itself, in words.
+/// State reported by a sensor, in words.
 Json status_json(std::uint32_t status) {
   const auto level = [status](int bit) {
     constexpr const char* kNames[] = {"normal", "warning", "error", "unknown"};
@@ -117,13 +119,13 @@ Json status_json(std::uint32_t status) {
           {"system", level(kSystem)}};
 }
 
-/// Least and greatest that the sensor told.
+/// Least and greatest reported by the sensor.
 Json temperature_json(const jobs::RecordedSensor& one) {
   if (!one.coldest) return {};
   return {{"min", *one.coldest}, {"max", *one.warmest}};
 }
 
-/// @param report  empty where there is none
+/// @param report  empty if there is none
 Json live_report_json(const std::optional<wire::SensorReport>& report) {
   if (!report) return {};
   Json json = report_json(*report);
@@ -132,7 +134,7 @@ Json live_report_json(const std::optional<wire::SensorReport>& report) {
   return json;
 }
 
-/// @param optics  empty where they are not watched
+/// @param optics  empty if they are not watched
 Json optics_json(const std::optional<jobs::OpticsHealth>& optics) {
   if (!optics) return {};
   const estimation::RunningState& state = optics->state;
@@ -174,6 +176,50 @@ Json optics_json(const std::optional<jobs::OpticsHealth>& optics) {
           {"alarm", state.alarm ? alarm_json(*state.alarm) : Json()}};
 }
 
+/// Published points; null if none were requested.
+Json published_json(const std::optional<jobs::PublishedPoints>& published) {
+  return published ? Json(published->points) : Json();
+}
+
+Json milliseconds(const std::optional<double>& seconds) {
+  return seconds ? Json(1e3 * *seconds) : Json();
+}
+
+/// Time within which 99 % of the frames of points followed their packets.
+Json latency_json(const std::optional<jobs::PublishedPoints>& published) {
+  return published ? milliseconds(published->latency) : Json();
+}
+
+/// Their further properties.
+Json publishing_json(const std::optional<jobs::PublishedPoints>& published) {
+  if (!published) return {};
+  return {{"calibration", published->calibration},
+          {"is_calibrated", published->is_calibrated},
+          {"words", published->words},
+          {"frames", published->frames},
+          {"missing_packets", published->missing_packets},
+          {"longest_latency_ms", milliseconds(published->longest_latency)}};
+}
+
+Json viewers_json(const std::optional<wire::FoxgloveCounts>& counts) {
+  if (!counts) return {};
+  return {{"connections", counts->connections},
+          {"refused", counts->refused},
+          {"sent_frames", counts->sent_messages},
+          {"dropped_frames", counts->dropped_messages}};
+}
+
+/// Shots for drawing on a page: azimuth and zenith, deg, and range, m.
+Json seen_json(const std::vector<jobs::SeenShot>& seen) {
+  const auto hundredths = [](double value) { return std::round(100 * value) / 100; };
+  Json shots = Json::array();
+  for (const jobs::SeenShot& shot : seen) {
+    shots.push_back({hundredths(degrees_from_radians(shot.azimuth)),
+                     hundredths(degrees_from_radians(shot.zenith)), hundredths(shot.range)});
+  }
+  return shots;
+}
+
 }  // namespace
 
 Json of(const std::vector<jobs::FoundSensor>& found) {
@@ -205,7 +251,10 @@ Json of(const jobs::RecordedSensors& recorded) {
                    {"reports", reports_json(one.reports)},
                    {"temperature_deg_c", temperature_json(one)},
                    {"output", recorded.files[one.file].path},
-                   {"optics", optics_json(one.optics)}});
+                   {"optics", optics_json(one.optics)},
+                   {"published", published_json(one.published)},
+                   {"latency_ms", latency_json(one.published)},
+                   {"publishing", publishing_json(one.published)}});
     sensors.push_back(std::move(sensor));
   }
   std::uint64_t frames = 0, bytes = 0;
@@ -222,6 +271,7 @@ Json of(const jobs::RecordedSensors& recorded) {
       {"receive_buffer_bytes",
        {{"asked", recorded.receive_buffer_asked}, {"granted", recorded.receive_buffer_granted}}},
       {"strangers", recorded.strangers},
+      {"viewers", viewers_json(recorded.viewers)},
       {"sensors", sensors}};
 }
 
@@ -237,7 +287,11 @@ Json of(const jobs::LiveRecording& live) {
                    {"silent", one.silent},
                    {"status", one.status ? status_json(*one.status) : Json()},
                    {"report", live_report_json(one.report)},
-                   {"optics", optics_json(one.optics)}});
+                   {"optics", optics_json(one.optics)},
+                   {"published", published_json(one.published)},
+                   {"latency_ms", latency_json(one.published)},
+                   {"publishing", publishing_json(one.published)},
+                   {"seen", seen_json(one.seen)}});
     sensors.push_back(std::move(sensor));
   }
   return {{"duration_s", live.duration}, {"over", live.over}, {"sensors", sensors}};

@@ -53,7 +53,7 @@ struct KernelColumns {
 void check_beams(const PrismTrain& train, std::span<const std::uint8_t> beam, std::size_t shots) {
   if (beam.empty()) return;
   require_length("beam", beam.size(), shots);
-  // Eight beams at a time: what is added carries a byte that is too large into its highest bit.
+  // Eight beams at a time: the addition carries a byte that is too large into its highest bit.
   constexpr std::uint64_t kOnes = 0x0101010101010101, kLow = 0x7f * kOnes, kHigh = 0x80 * kOnes;
   const std::uint64_t lift = (0x80 - static_cast<std::uint64_t>(train.emitters())) * kOnes;
   std::uint64_t over = 0;

@@ -18,12 +18,12 @@ using Batch = xsimd::batch<double>;
 constexpr std::size_t kLanes = Batch::size;
 
 /// Groups of shots that take each step of the model together: see AngleLinearisations. 16 and 32
-/// are no faster. Functions of a block have to be `flatten`: a call within a step costs more than
-/// it.
+/// are no faster. Functions of a block must be `flatten`: a call within a step costs more than the
+/// step.
 constexpr std::size_t kGroups = 8;
 constexpr std::size_t kBlock = kGroups * kLanes;
 
-/// The columns of one block of shots. The last one is filled up with copies of its last shot.
+/// The columns of one block of shots. The last one is padded with copies of its last shot.
 class ShotBlock {
  public:
   ShotBlock(std::size_t begin, std::size_t shots)
@@ -50,9 +50,9 @@ class ShotBlock {
     value.store_aligned(lanes);
     for (std::size_t i = 0; i < rest(); ++i) to[i] = lanes[i];
   }
-  /// How many shots of a group are NaN.
+  /// Number of NaN shots in a group.
   std::size_t count_invalid(const Batch& value, std::size_t group) const {
-    if (xsimd::all(value == value)) return 0;  // xsimd's != says no to two NaN
+    if (xsimd::all(value == value)) return 0;  // xsimd's != is false for two NaN
     alignas(64) double lanes[kLanes];
     value.store_aligned(lanes);
     std::size_t count = 0;
@@ -68,7 +68,7 @@ class ShotBlock {
   std::size_t begin_, count_;
 };
 
-/// Blocks of shots on their way through a train, step by step.
+/// Blocks of shots passing through a train, step by step.
 template <TrainLayout N>
 class Directions {
  public:

@@ -10,8 +10,8 @@
 
 namespace risley {
 
-/// Plain arguments of one kernel call: the kernels are compiled for other instruction sets than
-/// the rest, so nothing with inline functions of its own may cross this border.
+/// Plain arguments of one kernel call: the kernels are compiled for other instruction sets than the
+/// rest, so no type with inline functions may cross this border.
 struct BatchArguments {
   const double* parameters = nullptr;     ///< whole flat vector
   const FaceOrder* face_order = nullptr;  ///< [prisms]
@@ -26,7 +26,7 @@ struct BatchArguments {
   const double* face_position = nullptr;  ///< [2 prisms], for the origin
   double* origin[3] = {nullptr, nullptr, nullptr};
   double* const* d_azimuth =
-      nullptr;  ///< [parameter_count(shape) + prisms][shots], some maybe nullptr
+      nullptr;  ///< [parameter_count(shape) + prisms][shots], some may be nullptr
   double* const* d_zenith = nullptr;
 };
 

@@ -39,24 +39,25 @@ class Gap {
     for (std::size_t prism = 0; prism + 2 < N; ++prism) {
       entering_ = through(prism, entering_, fixed_angles[prism]);
     }
-    // The beam behind the last prism but one runs over a closed curve; seen from its centre the
-    // curve is nearly a circle, with the rotation angle as its azimuth.
+    // The beam after the last prism but one traces a closed curve; seen from its centre the curve
+    // is nearly a circle, with the rotation angle as its azimuth.
     Vector sum{0, 0, 0};
     for (int i = 0; i < kSamples; ++i) sum += forward(i * kTwoPi / kSamples);
     centre_ = normalized(sum);
     const Vector start = forward(0.0);
     radius_ = angle_between(start, centre_);
-    // The basis turns with the curve: its first axis points to where rotation angle zero does.
+    // The basis turns with the curve: its first axis points in the direction of rotation angle
+    // zero.
     first_ = normalized(start - dot(start, centre_) * centre_);
     second_ = cross(centre_, first_);
   }
 
   double radius() const { return radius_; }
 
-  /// The beam in the gap when the last prism but one stands at an angle.
+  /// The beam in the gap for an angle of the last prism but one.
   Vector forward(double angle) const { return through(N - 2, entering_, angle); }
 
-  /// The beam in the gap that the last prism, at an angle, sends into the asked direction.
+  /// The beam in the gap that the last prism, at a given angle, sends in the requested direction.
   Vector backward(double angle) const {
     const double sine = std::sin(angle), cosine = std::cos(angle);
     Vector beam = direction_;
@@ -79,8 +80,8 @@ class Gap {
     return angle;
   }
 
-  /// How far, rad, the beam wanted in the gap lies outside the curve of the beams that can be had;
-  /// zero is a solution, NaN means that no beam leaves the last prism in the asked direction.
+  /// Distance, rad, of the required beam in the gap outside the curve of the possible beams; zero
+  /// is a solution, NaN means that no beam leaves the last prism in the requested direction.
   double miss(double last_angle) const {
     const Vector beam = backward(last_angle);
     if (!std::isfinite(beam.x)) return std::numeric_limits<double>::quiet_NaN();
@@ -140,7 +141,7 @@ InverseSolution solve(const PrismTrain& train, int beam, const Vector& direction
   const Gap<N> gap(train, beam, fixed_angles, direction);
   if (!(gap.radius() > 1e-9)) {
     throw InvalidArgument(fmt::format(
-        "prism {} does not deviate the beam, so every rotation angle of it is an answer", N - 1));
+        "prism {} does not deviate the beam, so every rotation angle of it is a solution", N - 1));
   }
   const auto miss = [&](double angle) { return gap.miss(angle); };
   InverseSolution solution;
@@ -176,7 +177,7 @@ InverseSolution solve(const PrismTrain& train, int beam, const Vector& direction
     if (after != 0.0 && std::signbit(here) != std::signbit(after)) {
       add(root_between(miss, i * kStep, here, (i + 1) * kStep, after));
     }
-    // Two roots between samples, or one where they merge, show as a dip towards zero.
+    // Two roots between samples, or one where they merge, appear as a dip towards zero.
     const double sign = here > 0 ? 1.0 : -1.0;
     if (std::isfinite(before) && sign * before > sign * here && sign * after >= sign * here) {
       const double a = (i - 1) * kStep, b = (i + 1) * kStep;

@@ -31,7 +31,7 @@ struct ShapeAngle {
   const char* symbol;
 };
 
-/// What place::wedge_angle() is of an element.
+/// Meaning of place::wedge_angle() for an element.
 ShapeAngle shape_angle(ElementKind kind) {
   switch (kind) {
     case ElementKind::wedge:
@@ -191,7 +191,7 @@ double in_file_unit(std::string_view name, double value, TrainShape shape) {
 }
 
 const ParameterInfo* find_parameter_of_any_train(std::string_view name) {
-  // One emitter alone has no number, and faces have names of their own.
+  // A single emitter has no number, and faces have their own names.
   for (const TrainShape shape :
        {TrainShape{kMaxPrisms, 1}, {kMaxPrisms, kMaxEmitters}, {kWedgeAndReflector, 1}}) {
     for (const ParameterInfo& parameter : parameter_list(shape)) {

@@ -15,7 +15,7 @@
 namespace risley::parallel {
 namespace {
 
-/// TBB ends what runs within work that failed, and returns from it as if all were done.
+/// TBB ends the loops within work that failed, and returns from it as if all were done.
 void require_done(tbb::task_group_context& context) {
   if (context.is_group_execution_cancelled()) throw Cancelled();
 }

@@ -16,7 +16,7 @@ std::string type_text(const py::handle& object) {
   return py::str(py::type::handle_of(object).attr("__name__"));
 }
 
-/// What numpy makes of it, which must be of one of the kinds: b, i, u, f.
+/// The numpy array made from it, which must be of one of the kinds b, i, u, f.
 py::array numpy_array(const py::handle& values, std::string_view name, std::string_view kinds,
                       std::string_view wanted) {
   py::array array = py::array::ensure(values);

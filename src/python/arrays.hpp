@@ -17,7 +17,7 @@
 
 namespace risley::python {
 
-/// A column as an array that cannot be written to, without a copy. It keeps its owner alive.
+/// A column as a read-only array, without a copy. It keeps its owner alive.
 /// @param owner  of the column's memory
 template <class T, class Owner>
 py::array_t<T> view_of(const std::vector<T>& column, const std::shared_ptr<const Owner>& owner) {
@@ -28,7 +28,7 @@ py::array_t<T> view_of(const std::vector<T>& column, const std::shared_ptr<const
   return array;
 }
 
-/// An array that owns what was a vector.
+/// An array that takes ownership of a vector.
 template <class T>
 py::array_t<T> array_of(std::vector<T> values) {
   auto owner = std::make_unique<std::vector<T>>(std::move(values));
@@ -39,7 +39,7 @@ py::array_t<T> array_of(std::vector<T> values) {
   return py::array_t<T>(size, data, base);
 }
 
-/// A matrix [rows, columns], or a vector, as an array of its own.
+/// A matrix [rows, columns], or a vector, as a separate array.
 inline py::array_t<double> array_of(const Eigen::MatrixXd& matrix) {
   py::array_t<double> array({matrix.rows(), matrix.cols()});
   Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
@@ -51,7 +51,7 @@ using Numbers = py::array_t<double, py::array::c_style>;
 using Times = py::array_t<std::int64_t, py::array::c_style>;
 using Bytes = py::array_t<std::uint8_t, py::array::c_style>;
 
-/// Numbers of any shape; an array of double in order is taken as it is.
+/// Numbers of any shape; a contiguous array of double is used without a copy.
 /// @throws TypeError, ValueError naming the argument
 Numbers numbers_from(const py::handle& values, std::string_view name);
 /// Whole numbers. @throws as numbers_from()
@@ -65,10 +65,10 @@ std::string shape_text(const Shape& shape);
 std::string shape_text(const py::array& array);
 Shape shape_of(const py::array& array);
 
-/// The shape that arrays have together, as numpy broadcasts them.
-/// @throws InvalidArgument naming the first that does not go with those before it
+/// The common shape of arrays, as numpy broadcasts them.
+/// @throws InvalidArgument naming the first that is incompatible with those before it
 Shape broadcast_shape(const std::vector<std::pair<std::string, py::array>>& arrays);
-/// The array in that shape, in order; itself where it has it.
+/// The array in that shape, contiguous; itself if it has it.
 py::array broadcast_to(const py::array& array, const Shape& shape);
 
 inline std::span<const double> span_of(const Numbers& array) {

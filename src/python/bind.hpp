@@ -4,8 +4,8 @@
 
 #include <pybind11/pybind11.h>
 
-/// The module risley._risley: arguments of Python become those of the libraries, and what these
-/// give becomes objects and arrays of Python. There is one file for each layer of the libraries.
+/// The module risley._risley: converts Python arguments to those of the libraries, and their
+/// results to Python objects and arrays. There is one file for each layer of the libraries.
 namespace risley::python {
 
 namespace py = pybind11;

@@ -27,8 +27,8 @@ struct RunningCalls {
   std::thread::id ending_thread;
 };
 
-/// Threads that still run when the interpreter ends do nothing more of it: what they raised would
-/// be printed while its streams go away.
+/// Threads still running when the interpreter ends use no Python any more: their exceptions would
+/// be printed while its streams are being destroyed.
 [[noreturn]] void stand_still() {
   PyEval_SaveThread();
   for (;;) std::this_thread::sleep_for(std::chrono::hours(1));  // until the process ends
@@ -41,9 +41,9 @@ RunningCalls& running_calls() {
   return *calls;
 }
 
-/// Before the interpreter ends: stops what can be stopped and waits for the rest.
+/// Before the interpreter ends: stops all calls that can be stopped and waits for the rest.
 void end_calls() {
-  constexpr auto kPatience = std::chrono::seconds(30);  // after a fork nobody answers
+  constexpr auto kPatience = std::chrono::seconds(30);  // after a fork there is no thread to answer
   RunningCalls& calls = running_calls();
   const py::gil_scoped_release release;
   std::unique_lock lock(calls.mutex);
@@ -53,7 +53,7 @@ void end_calls() {
   calls.ended.wait_for(lock, kPatience, [&] { return calls.count == 0; });
 }
 
-/// What a job has to tell, from its thread to the one that asked for it.
+/// Progress messages of a job, from its thread to the calling one.
 class News {
  public:
   struct Item {
@@ -61,7 +61,7 @@ class News {
     double fraction = 0;
   };
 
-  void tell(std::string_view stage, double fraction) {
+  void add(std::string_view stage, double fraction) {
     const std::lock_guard lock(mutex_);
     if (items_.empty() || items_.back().stage != stage) {
       items_.push_back({std::string(stage), fraction});
@@ -76,7 +76,7 @@ class News {
     changed_.notify_one();
   }
 
-  /// Waits for the end, not longer than people wait for an answer to Ctrl-C.
+  /// Waits for the end, with a short response time to Ctrl-C.
   /// @return whether it has come
   bool wait(std::vector<Item>& items) {
     constexpr auto kStep = std::chrono::milliseconds(100);
@@ -94,11 +94,11 @@ class News {
   bool ended_ = false;
 };
 
-/// Signals and news, with the lock. @throws what Python raises
-void attend(const py::object& tell, const std::vector<News::Item>& items) {
+/// Handles signals and messages, with the lock. @throws what Python raises
+void attend(const py::object& on_progress, const std::vector<News::Item>& items) {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-  if (tell.is_none()) return;
-  for (const News::Item& item : items) tell(item.stage, item.fraction);
+  if (on_progress.is_none()) return;
+  for (const News::Item& item : items) on_progress(item.stage, item.fraction);
 }
 
 }  // namespace
@@ -134,8 +134,8 @@ RunningCall::~RunningCall() {
   }
 }
 
-void run_job(const py::object& tell, int threads, const std::function<void(const Progress&)>& job,
-             CancelFlag* cancel) {
+void run_job(const py::object& on_progress, int threads,
+             const std::function<void(const Progress&)>& job, CancelFlag* cancel) {
   require_at_least("threads", threads, 0);
   CancelFlag own_flag;
   if (cancel == nullptr) cancel = &own_flag;
@@ -144,16 +144,16 @@ void run_job(const py::object& tell, int threads, const std::function<void(const
   News news;
   std::exception_ptr failure;
   std::thread worker([&] {
-    // The first exception of a thread takes memory of its own, without which the process ends: here
-    // there still is some.
+    // The first exception of a thread allocates memory, without which the process ends: here there
+    // still is some.
     [[maybe_unused]] const volatile int none = std::uncaught_exceptions();
     try {
       const auto run = [&] {
-        job({[&news](double fraction, std::string_view stage) { news.tell(stage, fraction); },
+        job({[&news](double fraction, std::string_view stage) { news.add(stage, fraction); },
              cancel});
       };
-      // No global limit: to lift one starts threads, and ends the process where there is no memory
-      // for them.
+      // No global limit: lifting one starts threads, and ends the process if there is no memory for
+      // them.
       parallel::Threads(threads).run(run);
     } catch (...) {
       failure = std::current_exception();
@@ -170,7 +170,7 @@ void run_job(const py::object& tell, int threads, const std::function<void(const
     }
     if (raised) continue;
     try {
-      attend(tell, items);
+      attend(on_progress, items);
     } catch (const py::error_already_set& error) {
       raised.emplace(error);
       cancel->set();

@@ -12,10 +12,10 @@
 
 namespace risley::python {
 
-/// A call that may give the interpreter's lock away is noted as long as it runs: the interpreter,
-/// before it ends, stops it or waits for it, and stills its thread then, as well as threads that
-/// begin one afterwards. A thread that wants the lock later would be killed in the midst of C++. A
-/// call within another is part of it. Made and destroyed with the lock.
+/// A call that may release the interpreter's lock is registered as long as it runs: before the
+/// interpreter ends, it stops the call or waits for it, and then blocks its thread, as well as
+/// threads that begin one afterwards. A thread that requests the lock later would be killed in the
+/// middle of C++. A call within another is part of it. Made and destroyed with the lock.
 class RunningCall {
  public:
   /// @param cancel  stops it, if any
@@ -32,7 +32,7 @@ class RunningCall {
   bool may_unlock_ = true;
 };
 
-/// Calls a function that touches nothing of Python without the interpreter's lock.
+/// Calls a function that does not use Python without the interpreter's lock.
 template <class Function>
 decltype(auto) unlocked(Function&& function) {
   const RunningCall call;
@@ -41,13 +41,13 @@ decltype(auto) unlocked(Function&& function) {
   return std::forward<Function>(function)();
 }
 
-/// Runs a job in a thread of its own, while this one looks for signals and tells Python how far it
-/// is, ten times a second.
-/// @param tell     callable(stage, fraction), or None; an exception in it stops the job
+/// Runs a job in a separate thread, while this one checks for signals and reports progress to
+/// Python, ten times a second.
+/// @param on_progress  callable(stage, fraction), or None; an exception in it stops the job
 /// @param threads  that the job may use; 0: all cores
-/// @param cancel   stops the job; one of its own where there is none
-/// @throws what the job throws, what `tell` raises and, after Ctrl-C, KeyboardInterrupt
-void run_job(const py::object& tell, int threads, const std::function<void(const Progress&)>& job,
-             CancelFlag* cancel = nullptr);
+/// @param cancel  stops the job; a new one if there is none
+/// @throws exceptions of the job and of `on_progress` and, after Ctrl-C, KeyboardInterrupt
+void run_job(const py::object& on_progress, int threads,
+             const std::function<void(const Progress&)>& job, CancelFlag* cancel = nullptr);
 
 }  // namespace risley::python

@@ -59,14 +59,14 @@ void bind_errors(py::module_& module) {
                 "from 1.\nproblem : str\n    What was expected and what was found.\n",
                 PyExc_OSError);
   const py::tuple both = py::make_tuple(types.file, py::handle(PyExc_FileNotFoundError));
-  types.missing_file =
-      new_error(module, "MissingFileError", "A file is not there; also a FileNotFoundError.", both);
+  types.missing_file = new_error(module, "MissingFileError",
+                                 "A file does not exist; also a FileNotFoundError.", both);
   types.network =
       new_error(module, "NetworkError",
                 "No sensor answers, or the system refuses a socket or an address.", PyExc_OSError);
   types.estimation =
       new_error(module, "EstimationError",
-                "The data give no answer: too few of them, no convergence, or no valid shot.",
+                "The data give no result: too few data, no convergence, or no valid shot.",
                 PyExc_RuntimeError);
   types.cancelled =
       new_error(module, "Cancelled", "A call was stopped because the interpreter is about to end.",

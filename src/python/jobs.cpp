@@ -18,6 +18,8 @@
 #include "risley/io/text_file.hpp"
 #include "risley/jobs/campaign.hpp"
 #include "risley/jobs/cloud_of_recording.hpp"
+#include "risley/jobs/cloud_of_stations.hpp"
+#include "risley/jobs/compare_clouds.hpp"
 #include "risley/jobs/compare_results.hpp"
 #include "risley/jobs/compare_units.hpp"
 #include "risley/jobs/identify_recording.hpp"
@@ -69,7 +71,7 @@ py::list list_of(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
-/// An array; where numpy is not installed, a list.
+/// An array; if numpy is not installed, a list.
 template <auto column>
 py::object numbers_of(const ValueTable& table) {
   try {
@@ -94,7 +96,7 @@ ValueTable table_with_covariance(const Found& found) {
   return table;
 }
 
-/// The page of a result and the numbers behind it, as `-o DIR` of the command writes them.
+/// The page of a result and its numbers, as written by `-o DIR` of the command.
 template <class Found>
 std::vector<NamedText> texts_of(const Found& found) {
   const report::Report report = report::report_of(found);
@@ -102,13 +104,13 @@ std::vector<NamedText> texts_of(const Found& found) {
           {"report.html", report::report_page(report)}};
 }
 
-/// What a page shows beyond the estimate takes its time; calibrations always have it.
+/// A page's details of an estimate take time; calibrations always have them.
 template <class Found>
-void make_details(Found& found, const py::object& tell) {
+void make_details(Found& found, const py::object& on_progress) {
   if constexpr (std::is_same_v<Found, EstimatedRecording>) {
     if (found.details) return;
     std::optional<jobs::EstimateDetails> details;
-    run_job(tell, 0, [&](const Progress& progress) {
+    run_job(on_progress, 0, [&](const Progress& progress) {
       details = jobs::estimate_details(found.estimate, found.nominal, found.head, found.evaluation,
                                        progress.stage("judging"));
     });
@@ -116,7 +118,7 @@ void make_details(Found& found, const py::object& tell) {
   }
 }
 
-/// What all results share: the face of Python makes its objects of these.
+/// Common members of all results: the Python interface builds its objects from these.
 template <class Found>
 py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const char* name) {
   py::class_<Found, std::shared_ptr<Found>> type(module, name);
@@ -128,11 +130,11 @@ py::class_<Found, std::shared_ptr<Found>> bind_found(py::module_& module, const 
   type.def("to_dict", [](const Found& found) { return dict_of(json::of(found)); });
   type.def(
       "report_text",
-      [](Found& found, const py::object& tell) {
-        make_details(found, tell);
+      [](Found& found, const py::object& on_progress) {
+        make_details(found, on_progress);
         return unlocked([&] { return report::report_text(report::report_of(found)); });
       },
-      py::arg("tell"));
+      py::arg("on_progress"));
   return type;
 }
 
@@ -143,18 +145,18 @@ void write_page(const std::string& report, const std::string& path) {
   });
 }
 
-/// Runs a job and gives what it found to Python.
+/// Runs a job and returns its result to Python.
 template <class Job>
-auto found_by(const py::object& tell, int threads, const Job& job) {
+auto found_by(const py::object& on_progress, int threads, const Job& job) {
   using Found = std::invoke_result_t<const Job&, const Progress&>;
   auto found = std::make_shared<Found>();
-  run_job(tell, threads, [&](const Progress& progress) { *found = job(progress); });
+  run_job(on_progress, threads, [&](const Progress& progress) { *found = job(progress); });
   return found;
 }
 /// The same as a dictionary.
 template <class Job>
-py::object told_by(const py::object& tell, int threads, const Job& job) {
-  return dict_of(json::of(*found_by(tell, threads, job)));
+py::object answer_of(const py::object& on_progress, int threads, const Job& job) {
+  return dict_of(json::of(*found_by(on_progress, threads, job)));
 }
 
 /// 'auto', 'paper', 'none', or the random walk of the speeds, (rad/s) / sqrt(s).
@@ -184,6 +186,7 @@ jobs::EstimateRecordingOptions estimate_options(const Options& options) {
   job.fixed = held_parameters(options);
   job.additional = parameter_names(options, "free");
   job.rotor_process = rotor_process(options);
+  options.take("noise_model", job.noise_model);
   options.take("mirror", job.mirrored);
   options.take("truth", job.truth);
   job.files = result_files(options, "estimate");
@@ -193,8 +196,8 @@ jobs::EstimateRecordingOptions estimate_options(const Options& options) {
 }
 
 std::shared_ptr<EstimatedRecording> estimate(const py::dict& values, int threads,
-                                             const py::object& tell) {
-  return found_by(tell, threads,
+                                             const py::object& on_progress) {
+  return found_by(on_progress, threads,
                   [job = estimate_options(Options(values))](const Progress& progress) {
                     return jobs::estimate_recording(job, progress);
                   });
@@ -212,7 +215,7 @@ void take_model(const Options& options, Job& job) {
   options.take("range_offset_sigma", job.range_offset_sigma);
 }
 
-/// What calibrations on walls and in flight share.
+/// Common options of calibrations on walls and in flight.
 template <class Job>
 void take_recordings(const Options& options, Job& job) {
   take_model(options, job);
@@ -259,15 +262,15 @@ jobs::CalibrateRecordingsOptions calibrate_options(const Options& options) {
 }
 
 std::shared_ptr<CalibratedRecordings> calibrate(const py::dict& values, int threads,
-                                                const py::object& tell) {
-  return found_by(tell, threads,
+                                                const py::object& on_progress) {
+  return found_by(on_progress, threads,
                   [job = calibrate_options(Options(values))](const Progress& progress) {
                     return jobs::calibrate_recordings(job, progress);
                   });
 }
 
 std::shared_ptr<CalibratedFlight> calibrate_flight(const py::dict& values, int threads,
-                                                   const py::object& tell) {
+                                                   const py::object& on_progress) {
   const Options options(values);
   jobs::CalibrateFlightOptions job;
   take_recordings(options, job);
@@ -275,11 +278,12 @@ std::shared_ptr<CalibratedFlight> calibrate_flight(const py::dict& values, int t
   job.platform = platform_files(options);
   options.take("control", job.control);
   job.texts = [](const CalibratedFlight& found) { return texts_of(found); };
-  return found_by(tell, threads,
+  return found_by(on_progress, threads,
                   [&](const Progress& progress) { return jobs::calibrate_flight(job, progress); });
 }
 
-std::shared_ptr<jobs::PlannedCalibration> plan(const py::dict& values, const py::object& tell) {
+std::shared_ptr<jobs::PlannedCalibration> plan(const py::dict& values,
+                                               const py::object& on_progress) {
   const Options options(values);
   jobs::PlanCalibrationOptions job;
   take_model(options, job);
@@ -289,12 +293,12 @@ std::shared_ptr<jobs::PlannedCalibration> plan(const py::dict& values, const py:
   options.take("duration", job.duration);
   job.flat_walls = options.choice("walls", {"uneven", "flat"}) == 1;
   options.take("beam_origin", job.beam_origin);
-  return found_by(tell, 0,
+  return found_by(on_progress, 0,
                   [&](const Progress& progress) { return jobs::plan_calibration(job, progress); });
 }
 
 std::shared_ptr<jobs::PlannedFlightResult> plan_flight(const py::dict& values,
-                                                       const py::object& tell) {
+                                                       const py::object& on_progress) {
   const Options options(values);
   jobs::PlanFlightOptions job;
   take_model(options, job);
@@ -308,7 +312,7 @@ std::shared_ptr<jobs::PlannedFlightResult> plan_flight(const py::dict& values,
   options.take("trajectory_errors", files.errors);
   options.take("scene", files.scene);
   jobs::load_flight_plan(files, job);
-  return found_by(tell, 0,
+  return found_by(on_progress, 0,
                   [&](const Progress& progress) { return jobs::plan_flight(job, progress); });
 }
 
@@ -320,13 +324,31 @@ void bind_planned(py::module_& module, const char* name) {
       .def("to_dict", [](const Planned& planned) { return dict_of(json::of(planned)); });
 }
 
-py::object cloud(const py::dict& values, int threads, const py::object& tell) {
-  return told_by(tell, threads, [job = cloud_options(Options(values))](const Progress& progress) {
-    return jobs::cloud_of_recording(job, progress);
+py::object cloud(const py::dict& values, int threads, const py::object& on_progress) {
+  return answer_of(on_progress, threads,
+                   [job = cloud_options(Options(values))](const Progress& progress) {
+                     return jobs::cloud_of_recording(job, progress);
+                   });
+}
+
+py::object cloud_of_stations(const py::dict& values, int threads, const py::object& on_progress) {
+  const Options options(values);
+  jobs::CloudOfStationsOptions job;
+  options.take("station", job.stations);
+  const jobs::CloudOfRecordingOptions one = cloud_options(options);
+  job.recordings = recording_sources(options, "recordings");
+  job.reading = one.reading;
+  job.calibration = one.calibration;
+  job.crs = one.platform.crs;
+  job.datum = one.platform.datum;
+  job.output = one.output;
+  job.cloud = one.cloud;
+  return answer_of(on_progress, threads, [&](const Progress& progress) {
+    return jobs::cloud_of_stations(job, progress);
   });
 }
 
-py::object simulate(const py::dict& values, int threads, const py::object& tell) {
+py::object simulate(const py::dict& values, int threads, const py::object& on_progress) {
   const Options options(values);
   jobs::SimulationOptions job = simulation_options(options, threads);
   std::string output;
@@ -344,13 +366,16 @@ py::object simulate(const py::dict& values, int threads, const py::object& tell)
   }
   options.take("start", job.start);
   options.take("clock_drift", job.clock_drift);
-  return told_by(tell, threads, [&](const Progress& progress) {
-    return simulation::simulate_to_file(jobs::simulation_settings(job), output,
-                                        provenance_of("simulate"), progress);
+  bags::LidarTopicOptions messages;
+  take_messages(options, messages);
+  return answer_of(on_progress, threads, [&](const Progress& progress) {
+    simulation::SimulationSettings settings = jobs::simulation_settings(job);
+    settings.writing.messages = messages;
+    return simulation::simulate_to_file(settings, output, provenance_of("simulate"), progress);
   });
 }
 
-py::object identify(const py::dict& values, int threads, const py::object& tell) {
+py::object identify(const py::dict& values, int threads, const py::object& on_progress) {
   const Options options(values);
   jobs::IdentifyRecordingOptions job;
   job.recording = recording_source(options, "recording");
@@ -361,7 +386,7 @@ py::object identify(const py::dict& values, int threads, const py::object& tell)
   options.take("output", job.output);
   options.take("force", job.undecided);
   job.provenance = provenance_of("identify");
-  const auto found = found_by(tell, threads, [&](const Progress& progress) {
+  const auto found = found_by(on_progress, threads, [&](const Progress& progress) {
     return jobs::identify_recording(job, progress);
   });
   return py::make_tuple(found->sensor.sensor, dict_of(json::of(*found)));
@@ -380,7 +405,7 @@ sensors::ScanPatternOptions scan_options(const Options& options) {
   return scan;
 }
 
-py::object pattern(const py::dict& values, int threads, const py::object& tell) {
+py::object pattern(const py::dict& values, int threads, const py::object& on_progress) {
   const Options options(values);
   jobs::WritePatternOptions job;
   options.take("sensor", job.sensor);
@@ -389,17 +414,18 @@ py::object pattern(const py::dict& values, int threads, const py::object& tell) 
   options.take("duration", job.duration);
   require_positive(kSetting.duration, job.duration);
   job.scan = scan_options(options);
-  return told_by(tell, threads,
-                 [&](const Progress& progress) { return jobs::write_pattern(job, progress); });
+  return answer_of(on_progress, threads,
+                   [&](const Progress& progress) { return jobs::write_pattern(job, progress); });
 }
 
-/// Directions of a scan [rows, 3] in the precision that is asked for.
+/// Directions of a scan [rows, 3] in the requested precision.
 template <class Number>
 py::array directions(const sensors::Sensor& sensor, const jobs::PatternRows& rows,
-                     const sensors::ScanPatternOptions& scan, int threads, const py::object& tell) {
+                     const sensors::ScanPatternOptions& scan, int threads,
+                     const py::object& on_progress) {
   py::array_t<Number> array({static_cast<py::ssize_t>(rows.count), py::ssize_t{3}});
   const std::span<Number> out(array.mutable_data(), 3 * rows.count);
-  run_job(tell, threads, [&](const Progress& progress) {
+  run_job(on_progress, threads, [&](const Progress& progress) {
     jobs::pattern_directions(sensor, rows.first, out, scan, progress);
   });
   return array;
@@ -421,12 +447,12 @@ struct Scan {
   }
 };
 
-py::array pattern_directions(const py::dict& values, int threads, const py::object& tell) {
+py::array pattern_directions(const py::dict& values, int threads, const py::object& on_progress) {
   const Options options(values);
   const Scan scan(options);
   return options.choice("dtype", {"float64", "float32"}) == 0
-             ? directions<double>(scan.sensor, scan.rows, scan.options, threads, tell)
-             : directions<float>(scan.sensor, scan.rows, scan.options, threads, tell);
+             ? directions<double>(scan.sensor, scan.rows, scan.options, threads, on_progress)
+             : directions<float>(scan.sensor, scan.rows, scan.options, threads, on_progress);
 }
 
 /// Times, s, and emitters of the same rows.
@@ -438,7 +464,7 @@ py::tuple pattern_times(const py::dict& values) {
   return py::make_tuple(array_of(std::move(found.time)), array_of(std::move(found.emitter)));
 }
 
-py::object coverage(const py::dict& values, int threads, const py::object& tell) {
+py::object coverage(const py::dict& values, int threads, const py::object& on_progress) {
   const Options options(values);
   jobs::GivenSensor sensor;
   options.take("sensor", sensor);
@@ -446,13 +472,13 @@ py::object coverage(const py::dict& values, int threads, const py::object& tell)
   options.take("after", settings.after);
   options.take("cell", settings.cell);
   const sensors::ScanPatternOptions scan = scan_options(options);
-  const auto found = found_by(tell, threads, [&](const Progress& progress) {
+  const auto found = found_by(on_progress, threads, [&](const Progress& progress) {
     return jobs::pattern_details(sensor, scan, settings, progress);
   });
   return dict_of(json::of(found->coverage));
 }
 
-py::object observability(const py::dict& values, int threads, const py::object& tell) {
+py::object observability(const py::dict& values, int threads, const py::object& on_progress) {
   const Options options(values);
   jobs::ObservabilityOptions job;
   job.recording = recording_source(options, "recording");
@@ -464,23 +490,34 @@ py::object observability(const py::dict& values, int threads, const py::object& 
   options.take("rounding", job.rounding);
   job.fixed = held_parameters(options);
   job.additional = parameter_names(options, "free");
-  return told_by(tell, threads, [&](const Progress& progress) {
+  return answer_of(on_progress, threads, [&](const Progress& progress) {
     return jobs::judge_observability(job, progress);
   });
 }
 
-py::object compare(const py::dict& values, const py::object& tell) {
+py::object compare(const py::dict& values, const py::object& on_progress) {
   const Options options(values);
   jobs::CompareUnitsOptions job;
   options.take("results", job.results);
+  std::vector<std::string> names;
+  for (const jobs::GivenSensor& result : job.results) names.push_back(result.name());
+  if (jobs::are_clouds(names)) {
+    jobs::CompareCloudsOptions clouds{names[0], names[1], {}};
+    options.take("cell_size", clouds.change.cell);
+    options.take("reach", clouds.change.reach);
+    options.take("false_alarm", clouds.change.false_alarm);
+    return answer_of(on_progress, 0, [&](const Progress& progress) {
+      return jobs::compare_clouds(clouds, progress);
+    });
+  }
   options.take("false_alarm", job.false_alarm);
   options.take("anywhere", job.anywhere);
   options.take("unlike", job.unlike);
-  return told_by(tell, 0,
-                 [&](const Progress& progress) { return jobs::compare_units(job, progress); });
+  return answer_of(on_progress, 0,
+                   [&](const Progress& progress) { return jobs::compare_units(job, progress); });
 }
 
-py::object campaign(const py::dict& values, int threads, const py::object& tell) {
+py::object campaign(const py::dict& values, int threads, const py::object& on_progress) {
   const Options options(values);
   std::string path, table;
   options.take("plan", path);
@@ -495,11 +532,11 @@ py::object campaign(const py::dict& values, int threads, const py::object& tell)
     jobs::ChunkNumber which;
     options.take("chunk", which.number);
     options.take("chunks", which.count);
-    return told_by(tell, threads, [&](const Progress& progress) {
+    return answer_of(on_progress, threads, [&](const Progress& progress) {
       return jobs::run_chunk(jobs::load_campaign_plan(path, seed), which, job, progress);
     });
   }
-  return told_by(tell, threads, [&](const Progress& progress) {
+  return answer_of(on_progress, threads, [&](const Progress& progress) {
     const jobs::CampaignPlan plan = jobs::load_campaign_plan(path, seed);
     return merge ? jobs::merge_chunks(plan, table, job, progress)
                  : jobs::run_campaign(plan, table, job, progress);
@@ -514,12 +551,12 @@ json::InspectEachOptions inspect_options(const Options& options) {
   return job;
 }
 
-py::object info(const py::dict& values, const py::object& tell) {
+py::object info(const py::dict& values, const py::object& on_progress) {
   const Options options(values);
   const recordings::Source input = recording_source(options, "recording");
   json::InspectEachOptions job = inspect_options(options);
   json::Json found;
-  run_job(tell, 0, [&](const Progress& progress) {
+  run_job(on_progress, 0, [&](const Progress& progress) {
     const jobs::InspectTrajectoryOptions poses{input.name(), job.accuracy, job.topic};
     found = !input.recording() && jobs::is_trajectory(poses, job.reading, progress)
                 ? json::of(jobs::inspect_trajectory(poses, progress))
@@ -528,7 +565,7 @@ py::object info(const py::dict& values, const py::object& tell) {
   return dict_of(found);
 }
 
-/// How a job of the command is done for each of many inputs.
+/// How a job of the command is run for each of many inputs.
 jobs::InputWork work_of(const std::string& verb, const Options& options) {
   const auto untold = [](const std::string&, bool) {};  // results have their warnings
   if (verb == "estimate") return json::estimate_each(estimate_options(options), untold);
@@ -540,12 +577,12 @@ jobs::InputWork work_of(const std::string& verb, const Options& options) {
   return json::convert_each(convert, untold);
 }
 
-/// Settings as text, for results that were made with the same ones.
+/// Settings as text, to compare with those of earlier results.
 std::vector<std::pair<std::string, std::vector<std::string>>> settings_of(const py::dict& values) {
   std::vector<std::pair<std::string, std::vector<std::string>>> settings;
   for (const auto& [name, value] : values) {
     if (py::str(name).equal(py::str("output"))) continue;
-    const bool in_memory = py::hasattr(value, "to_text");  // whose repr does not tell its content
+    const bool in_memory = py::hasattr(value, "to_text");  // its repr omits the content
     settings.push_back({py::str(name), {py::str(in_memory ? value.attr("to_text")() : value)}});
   }
   return settings;
@@ -553,7 +590,7 @@ std::vector<std::pair<std::string, std::vector<std::string>>> settings_of(const 
 
 /// @param many  inputs, list, table, resume
 py::object run_many(const std::string& verb, const py::dict& values, const py::dict& many,
-                    int threads, const py::object& tell) {
+                    int threads, const py::object& on_progress) {
   const Options options(many);
   jobs::ManyInputsOptions wanted;
   options.take("inputs", wanted.names);
@@ -564,8 +601,8 @@ py::object run_many(const std::string& verb, const py::dict& values, const py::d
   wanted.into_folder = true;
   const jobs::InputWork work = work_of(verb, Options(values));
   const auto settings = settings_of(values);
-  json::Json told;
-  run_job(tell, threads, [&](const Progress& progress) {
+  json::Json answer;
+  run_job(on_progress, threads, [&](const Progress& progress) {
     const jobs::InputPlan plan = jobs::plan_inputs(wanted, work, progress.silent());
     jobs::InputRun run(
         plan, work,
@@ -575,14 +612,14 @@ py::object run_many(const std::string& verb, const py::dict& values, const py::d
     if (!wanted.table.empty())
       json::write_table(wanted.table, run, provenance_of(work.verb.c_str()));
     if (!whole) throw Cancelled();
-    told = json::counts_of(run, work);
-    told["results"] = json::Json::array();
+    answer = json::counts_of(run, work);
+    answer["results"] = json::Json::array();
     run.for_each([&](const jobs::InputJob& job, const jobs::InputResult& result) {
-      told["results"].push_back(json::one_of_several(job, result));
+      answer["results"].push_back(json::one_of_several(job, result));
     });
-    told["rows"] = json::rows_of(run, RISLEY_VERSION);
+    answer["rows"] = json::rows_of(run, RISLEY_VERSION);
   });
-  return dict_of(told);
+  return dict_of(answer);
 }
 
 }  // namespace
@@ -619,24 +656,26 @@ void bind_jobs(py::module_& module) {
   module.def("write_page", &write_page, py::arg("report"), py::arg("path"));
   const auto options = py::arg("options");
   const auto threads = py::arg("threads");
-  const auto tell = py::arg("tell");
-  module.def("estimate", &estimate, options, threads, tell);
-  module.def("calibrate", &calibrate, options, threads, tell);
-  module.def("calibrate_flight", &calibrate_flight, options, threads, tell);
-  module.def("plan", &plan, options, tell);
-  module.def("plan_flight", &plan_flight, options, tell);
-  module.def("cloud", &cloud, options, threads, tell);
-  module.def("simulate", &simulate, options, threads, tell);
-  module.def("identify", &identify, options, threads, tell);
-  module.def("pattern", &pattern, options, threads, tell);
-  module.def("pattern_directions", &pattern_directions, options, threads, tell);
+  const auto on_progress = py::arg("on_progress");
+  module.def("estimate", &estimate, options, threads, on_progress);
+  module.def("calibrate", &calibrate, options, threads, on_progress);
+  module.def("calibrate_flight", &calibrate_flight, options, threads, on_progress);
+  module.def("plan", &plan, options, on_progress);
+  module.def("plan_flight", &plan_flight, options, on_progress);
+  module.def("cloud", &cloud, options, threads, on_progress);
+  module.def("cloud_of_stations", &cloud_of_stations, options, threads, on_progress);
+  module.def("simulate", &simulate, options, threads, on_progress);
+  module.def("identify", &identify, options, threads, on_progress);
+  module.def("pattern", &pattern, options, threads, on_progress);
+  module.def("pattern_directions", &pattern_directions, options, threads, on_progress);
   module.def("pattern_times", &pattern_times, options);
-  module.def("coverage", &coverage, options, threads, tell);
-  module.def("observability", &observability, options, threads, tell);
-  module.def("compare", &compare, options, tell);
-  module.def("campaign", &campaign, options, threads, tell);
-  module.def("info", &info, options, tell);
-  module.def("run_many", &run_many, py::arg("verb"), options, py::arg("many"), threads, tell);
+  module.def("coverage", &coverage, options, threads, on_progress);
+  module.def("observability", &observability, options, threads, on_progress);
+  module.def("compare", &compare, options, on_progress);
+  module.def("campaign", &campaign, options, threads, on_progress);
+  module.def("info", &info, options, on_progress);
+  module.def("run_many", &run_many, py::arg("verb"), options, py::arg("many"), threads,
+             on_progress);
   module.def(
       "is_flight_plan",
       [](const std::string& path) { return unlocked([&] { return jobs::is_flight_plan(path); }); },

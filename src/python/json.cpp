@@ -41,7 +41,7 @@ py::object python_of(const json::Json& value) {
     case Kind::number_unsigned:
       return py::int_(value.get<std::uint64_t>());
     case Kind::number_float: {
-      // As in a file, where what is not finite has no place.
+      // As in a file, which cannot hold non-finite numbers.
       const double number = value.get<double>();
       if (!std::isfinite(number)) return py::none();
       return py::float_(number);

@@ -8,10 +8,10 @@
 
 namespace risley::python {
 
-/// Dictionaries, lists, texts, numbers and None; bytes of a text that are no UTF-8 are replaced.
+/// Dictionaries, lists, texts, numbers and None; invalid UTF-8 bytes of a text are replaced.
 py::object python_of(const json::Json& value);
 
-/// What a job found as a dictionary, behind the versions of the format and of risley.
+/// A job's result as a dictionary, after the versions of the format and of risley.
 py::object dict_of(const json::Json& found);
 
 }  // namespace risley::python

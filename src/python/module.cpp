@@ -16,8 +16,8 @@ PYBIND11_MODULE(_risley, module) {
   module.attr("__version__") = RISLEY_VERSION;
   module.def("radians", &risley::radians_from_degrees, py::arg("degrees"),
              "An angle in degrees as the libraries convert it, rad.");
-  // pybind11 looks for numpy once, at its first array; two threads that made theirs at a time would
-  // wait for each other for ever. Without numpy all works that makes no arrays.
+  // pybind11 imports numpy once, for its first array; two threads creating their first arrays at
+  // the same time would deadlock. Without numpy everything works that creates no arrays.
   try {
     py::dtype::of<double>();
   } catch (const py::error_already_set& error) {

@@ -9,11 +9,11 @@
 namespace risley::python {
 namespace {
 
-/// What the names of files end in beyond those in SI units.
+/// Endings of names in files, apart from those in SI units.
 constexpr std::array<std::string_view, 4> kUnits = {"_deg_per_s", "_deg", "_m", "_s"};
 
 /// A parameter by either name.
-/// @param find  gives the entry of a name in files, null where there is none
+/// @param find  returns the entry of a name in files, null if there is none
 template <class Find>
 NamedParameter find_by_either_name(const std::string& name, const Find& find) {
   if (const ParameterInfo* info = find(name)) return {info, info->si_per_unit};

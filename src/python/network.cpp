@@ -10,6 +10,7 @@
 #include <pybind11/stl.h>
 
 #include "risley/jobs/emulate_sensor.hpp"
+#include "risley/jobs/live_bags.hpp"
 #include "risley/jobs/record_sensors.hpp"
 #include "risley/json/results.hpp"
 
@@ -20,17 +21,17 @@
 namespace risley::python {
 namespace {
 
-/// What somebody sets to end a recording or a virtual sensor: both go on until then.
+/// Set by the user to end a recording or a virtual sensor: both run until then.
 using Stop = std::shared_ptr<CancelFlag>;
 
-/// Words of a job, told to Python while it runs.
+/// Passes messages of a running job to Python.
 /// @param note  callable(words, is_wrong)
-void tell_words(const py::object& note, const std::string& words, bool is_wrong) {
+void pass_words(const py::object& note, const std::string& words, bool is_wrong) {
   const py::gil_scoped_acquire lock;
   try {
     note(words, is_wrong);
   } catch (py::error_already_set& error) {
-    error.discard_as_unraisable("risley");  // a message lost must not end a recording
+    error.discard_as_unraisable("risley");  // losing a message must not end a recording
   }
 }
 
@@ -60,29 +61,45 @@ jobs::RecordOptions record_options(const Options& options) {
   options.take("optics", optics);
   job.watch_optics = !optics.empty();
   if (optics.path() != "own") job.optics_reference = optics;
+  if (options.has("publish")) {
+    jobs::LivePointsOptions& points = job.publish.emplace();
+    options.take("calibration", points.calibration);
+    take_messages(options, points.messages);
+  }
   return job;
 }
 
-py::object find_sensors(const py::dict& values, const py::object& tell) {
+py::object find_sensors(const py::dict& values, const py::object& on_progress) {
   const jobs::RecordOptions job = record_options(Options(values));
   std::vector<jobs::FoundSensor> found;
-  run_job(tell, 0, [&](const Progress& progress) { found = jobs::find_sensors(job, progress); });
+  run_job(on_progress, 0,
+          [&](const Progress& progress) { found = jobs::find_sensors(job, progress); });
   return dict_of(json::of(found));
 }
 
 py::object record(const py::dict& values, const py::object& note, const Stop& stop,
-                  const py::object& tell) {
-  const jobs::RecordOptions job = record_options(Options(values));
+                  const py::object& on_progress) {
+  const Options options(values);
+  jobs::RecordOptions job = record_options(options);
+  std::unique_ptr<jobs::LiveBag> points;
+  if (job.publish) {
+    std::string destination;
+    options.take("publish", destination);
+    points = jobs::open_live_bag(destination);
+    job.publish->bag = points.get();
+    pass_words(note, "points at " + points->place(), false);
+  }
   jobs::RecordedSensors recorded;
   run_job(
-      tell, 0,
+      on_progress, 0,
       [&](const Progress& progress) {
         recorded = jobs::record_sensors(
             job,
-            [&](const std::string& words, bool is_wrong) { tell_words(note, words, is_wrong); },
+            [&](const std::string& words, bool is_wrong) { pass_words(note, words, is_wrong); },
             progress);
       },
       stop.get());
+  if (points) recorded.viewers = points->viewers();
   return dict_of(json::of(recorded));
 }
 
@@ -117,7 +134,7 @@ jobs::EmulatedClock clock_of(const Options& options) {
 }
 
 py::object emulate(const py::dict& values, int threads, const py::object& note, const Stop& stop,
-                   const py::object& tell) {
+                   const py::object& on_progress) {
   const Options options(values);
   jobs::EmulateOptions job;
   options.take("interface", job.interface);
@@ -130,10 +147,10 @@ py::object emulate(const py::dict& values, int threads, const py::object& note, 
   job.faults = faults_of(options);
   jobs::EmulatedSensor truth;
   run_job(
-      tell, threads,
+      on_progress, threads,
       [&](const Progress& progress) {
         truth = jobs::emulate_sensor(
-            job, [&](const std::string& words) { tell_words(note, words, false); }, progress);
+            job, [&](const std::string& words) { pass_words(note, words, false); }, progress);
       },
       stop.get());
   return dict_of(json::of(truth));
@@ -144,17 +161,19 @@ py::object emulate(const py::dict& values, int threads, const py::object& note, 
 void bind_network(py::module_& module) {
   py::class_<CancelFlag, Stop>(module, "Stop",
                                "Ends a recording or a virtual sensor from another thread.\n\n"
-                               "Give it as ``stop`` and call `set`; it cannot be used again.")
+                               "Pass it as ``stop`` and call `set`; it cannot be used again.")
       .def(py::init<>())
-      .def("set", &CancelFlag::set, "set(self)\n--\n\nEnd what was given this, within a second.")
+      .def("set", &CancelFlag::set,
+           "set(self)\n--\n\nEnd the recording or virtual sensor that has this ``stop``, within a "
+           "second.")
       .def("is_set", &CancelFlag::is_set, "is_set(self)\n--\n\nWhether `set` was called.");
   const auto options = py::arg("options");
   const auto note = py::arg("note");
   const auto stop = py::arg("stop").none(true);
-  const auto tell = py::arg("tell");
-  module.def("find_sensors", &find_sensors, options, tell);
-  module.def("record", &record, options, note, stop, tell);
-  module.def("emulate", &emulate, options, py::arg("threads"), note, stop, tell);
+  const auto on_progress = py::arg("on_progress");
+  module.def("find_sensors", &find_sensors, options, on_progress);
+  module.def("record", &record, options, note, stop, on_progress);
+  module.def("emulate", &emulate, options, py::arg("threads"), note, stop, on_progress);
 }
 
 }  // namespace risley::python

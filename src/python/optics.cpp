@@ -77,7 +77,7 @@ Numbers result_array(const py::object& given, std::string_view name, const Shape
   return array;
 }
 
-/// Results of shape () as numbers, as numpy's own functions give them.
+/// Results of shape () as numbers, as numpy's own functions return them.
 py::object result_of(const py::array& array) {
   return array.ndim() == 0 ? array[py::tuple()] : py::object(array);
 }
@@ -195,16 +195,15 @@ void bind_optics(py::module_& module) {
   py::class_<PrismTrain>(
       module, "PrismTrain",
       "Prisms in beam order, the emitters in front of them, and all their parameters.\n\n"
-      "Parameters\n----------\n"
-      "face_order : str, default 'PA-AP'\n"
-      "    Face that the beam meets first, of every prism: PA the one perpendicular to the axis,\n"
+      "Parameters\n----------\nface_order : str, default 'PA-AP'\n    First face in beam order, of "
+      "every prism: PA the one perpendicular to the axis,\n"
       "    AP the angled one.\n"
       "emitters : int, default 1\n    Number of emitters.\n\n"
       "Notes\n-----\n"
       "A new train is ideal: no errors, air 1, glass 1.51, wedges of 18 degrees. Parameters are\n"
       "read and set by name, ``train['wedge_angle_a']`` in SI units and\n"
       "``train['wedge_angle_a_deg']`` in degrees.\n\n"
-      "Raises\n------\nValueError\n    For a number of prisms or emitters that no train has.")
+      "Raises\n------\nValueError\n    For an unsupported number of prisms or emitters.")
       .def(py::init([](const std::string& face_order, int emitters) {
              return PrismTrain(parse_face_order(face_order), emitters);
            }),
@@ -213,7 +212,7 @@ void bind_optics(py::module_& module) {
       .def_property_readonly("emitters", &PrismTrain::emitters, "Number of emitters.")
       .def_property_readonly(
           "face_order", [](const PrismTrain& train) { return to_string(train.face_order()); },
-          "Face that the beam meets first, of every prism, such as 'PA-AP'.")
+          "First face in beam order, of every prism, such as 'PA-AP'.")
       .def_property_readonly(
           "parameters", [](const PrismTrain& train) { return array_of(train.parameters()); },
           "The flat vector of all parameters, SI units; shape (n,).")
@@ -226,7 +225,7 @@ void bind_optics(py::module_& module) {
             }
             return names;
           },
-          "Names by which parameters are read and set, those that all prisms share first.")
+          "Names of the parameters, common ones first.")
       .def("__getitem__",
            [](const PrismTrain& train, const std::string& name) {
              const NamedParameter parameter = named_parameter(name, train.shape());

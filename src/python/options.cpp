@@ -18,7 +18,7 @@
 namespace risley::python {
 namespace {
 
-/// The name in files of a parameter of any train; an unknown name as it is, for the job to refuse.
+/// The name in files of a parameter of any train; an unknown name unchanged, for the job to reject.
 std::string file_name_of(const NamedParameter& parameter, const std::string& name) {
   return parameter.info != nullptr ? parameter.info->name : name;
 }
@@ -72,6 +72,18 @@ std::vector<recordings::Source> recording_sources(const Options& options, const 
     }
   }
   return sources;
+}
+
+void take_messages(const Options& options, bags::LidarTopicOptions& messages) {
+  options.take("topic", messages.topic);
+  options.take("frame_id", messages.frame_id);
+  options.take("frame_rate", messages.frame_rate);
+  if (options.has("message")) {
+    constexpr std::array kMessages = {bags::WrittenMessage::cloud,
+                                      bags::WrittenMessage::custom_driver,
+                                      bags::WrittenMessage::custom_driver2};
+    messages.message = kMessages.at(options.choice("message", {"points", "custom", "custom2"}));
+  }
 }
 
 recordings::ReadOptions read_options(const Options& options) {
@@ -178,6 +190,7 @@ jobs::CloudOfRecordingOptions cloud_options(const Options& options) {
   job.reading = read_options(options);
   options.take("calibration", job.calibration);
   options.take("output", job.output);
+  options.take("replace", job.replace);
   job.platform = platform_files(options);
   cloud::CloudOptions& settings = job.cloud;
   settings.pointing.reported_directions =
@@ -191,6 +204,7 @@ jobs::CloudOfRecordingOptions cloud_options(const Options& options) {
   options.take("noise_angle", settings.angle_noise);
   options.take("las_scale", settings.writer.las_scale);
   options.take("format", settings.writer.format);
+  take_messages(options, settings.writer.messages);
   settings.writer.gps_time = options.choice("time", {"gps", "recording"}) == 0;
   bool distribution = false;
   options.take("distribution", distribution);

@@ -26,9 +26,9 @@
 
 namespace risley::python {
 
-/// Keyword arguments of a job by name. None, and what is not there, leaves a default as it is. To
-/// be read with the interpreter's lock, which the threads of jobs do not have: all else is a
-/// mistake of ours that some versions of Python forgive.
+/// Keyword arguments of a job by name. None, and missing ones, leave a default unchanged. Requires
+/// the interpreter's lock, which the threads of jobs do not have: reading without it is a bug that
+/// some versions of Python tolerate.
 class Options {
  public:
   explicit Options(py::dict values) : values_(std::move(values)) {}
@@ -53,7 +53,7 @@ class Options {
       throw wrong_type(name, values_[name]);
     }
   }
-  /// What is in memory, or a path.
+  /// An object in memory, or a path.
   template <class T>
   void take(const char* name, jobs::Given<T>& to) const {
     if (!has(name)) return;
@@ -72,7 +72,7 @@ class Options {
     if (has(name)) take(name, to.emplace());
   }
 
-  /// A word among those allowed. @return its place; `usual` where it is not there
+  /// A word among those allowed. @return its place; `usual` if it is missing
   std::size_t choice(const char* name, const std::vector<std::string>& allowed,
                      std::size_t usual = 0) const;
 
@@ -104,16 +104,18 @@ std::vector<std::string> parameter_names(const Options& options, const char* nam
 jobs::ParameterValues parameter_values(const Options& options, const char* name);
 /// trajectory, topic, mount, accuracy, trajectory_errors, crs, datum: paths and names.
 jobs::PlatformFiles platform_files(const Options& options);
-/// What `simulate` and `emulate` share: sensor, set, reported, reported_nominal, noise_angle,
-/// noise_range, quantize, beam_origin, rotor, start_angles, scene, station, seed.
+/// Common options of `simulate` and `emulate`: sensor, set, reported, reported_nominal,
+/// noise_angle, noise_range, quantize, beam_origin, rotor, start_angles, scene, station, seed.
 jobs::SimulationOptions simulation_options(const Options& options, int threads);
 /// rate: shots per second to use, Hz, or 'full' for all.
 void take_rate(const Options& options, std::optional<double>& rate);
-/// What `cloud` and `points` share: all but where the points go.
+/// How points become messages of bags.
+void take_messages(const Options& options, bags::LidarTopicOptions& messages);
+/// Common options of `cloud` and `points`: all but the output.
 jobs::CloudOfRecordingOptions cloud_options(const Options& options);
 /// output: the folder of results; states: knots, all or none.
 jobs::ResultFiles result_files(const Options& options, const char* job);
-/// What a file says of the program that made it.
+/// Name and version of the program for files.
 jobs::Provenance provenance_of(const char* job);
 
 }  // namespace risley::python

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <memory>
 #include <new>
@@ -14,6 +15,8 @@
 
 #include <nlohmann/json.hpp>
 #include <pybind11/stl.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include "risley/jobs/cloud_of_recording.hpp"
 #include "risley/json/results.hpp"
@@ -31,8 +34,8 @@ using cloud::CloudHeader;
 using cloud::PointColumn;
 using cloud::Points;
 
-/// Memory that grows at its end: of much of it the system moves the pages and copies nothing. Large
-/// pages would take it longer to clear than to give small ones it has cleared lately.
+/// Memory that grows at its end: large blocks are remapped by the system without a copy. The system
+/// would take longer to clear large pages than to hand out small ones cleared recently.
 class GrowingMemory {
  public:
   std::byte* end_of(std::size_t more) {
@@ -45,9 +48,10 @@ class GrowingMemory {
     }
     std::byte* end = memory_.get() + used_;
     used_ += more;
+    if (capacity_ >= kMuch) ask_for_pages(end, more);
     return end;
   }
-  /// Gives it away, without what is not used.
+  /// Releases it, without the unused part.
   std::byte* release() {
     auto* memory = static_cast<std::byte*>(std::realloc(memory_.get(), std::max(used_, kLeast)));
     if (memory == nullptr) throw std::bad_alloc();
@@ -57,15 +61,26 @@ class GrowingMemory {
   }
 
  private:
-  static constexpr std::size_t kLeast = 1;
+  static constexpr std::size_t kLeast = 1, kMuch = std::size_t{1} << 22;
   struct Free {
     void operator()(std::byte* memory) const { std::free(memory); }
   };
+
+  /// All pages at once: faulting them in one by one takes the system half as long again. Older
+  /// systems do not support the hint, which is optional.
+  static void ask_for_pages(std::byte* begin, std::size_t bytes) {
+#ifdef MADV_POPULATE_WRITE
+    static const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
+    const auto from = reinterpret_cast<std::uintptr_t>(begin) / page * page;
+    const std::size_t length = reinterpret_cast<std::uintptr_t>(begin) + bytes - from;
+    ::madvise(reinterpret_cast<void*>(from), length, MADV_POPULATE_WRITE);
+#endif
+  }
   std::unique_ptr<std::byte, Free> memory_;
   std::size_t used_ = 0, capacity_ = 0;
 };
 
-/// An array in the making: so many numbers for each point.
+/// An array under construction: a fixed number of values per point.
 struct PointArray {
   std::string name;
   py::ssize_t number_size = 0;
@@ -85,12 +100,12 @@ std::string array_name(const PointColumn& entry) {
 constexpr std::size_t kSquare[] = {cloud::kXX, cloud::kXY, cloud::kXZ, cloud::kXY, cloud::kYY,
                                    cloud::kYZ, cloud::kXZ, cloud::kYZ, cloud::kZZ};
 
-/// Columns of points as arrays of which each point has a row: x, y and z together, and covariances
-/// as whole matrices.
+/// Columns of points as arrays with a row for each point: x, y and z together, and covariances as
+/// whole matrices.
 class PointArrays {
  public:
   void append(const Points& points) {
-    if (points.size() == 0) return;  // which does not tell columns that are not there
+    if (points.size() == 0) return;  // an empty block does not show which columns exist
     std::size_t place = 0;
     for_each_entry_of_points(points, [&](const PointColumn& entry, const auto& numbers,
                                          const std::vector<py::ssize_t>& shape) {
@@ -108,7 +123,7 @@ class PointArrays {
 
   std::size_t rows() const { return rows_; }
 
-  /// Gives them to Python, to be begun again.
+  /// Hands them to Python and starts new ones.
   py::dict release() {
     py::dict result;
     for (PointArray& array : arrays_) {
@@ -125,7 +140,7 @@ class PointArrays {
   }
 
  private:
-  /// Calls visit(entry, pointers to columns, shape of one point) for every array that there is.
+  /// Calls visit(entry, pointers to columns, shape of one point) for every existing array.
   template <class Visit>
   static void for_each_entry_of_points(const Points& points, const Visit& visit) {
     [&]<std::size_t... I>(std::index_sequence<I...>) { (visit_entry<I>(points, visit), ...); }
@@ -192,7 +207,7 @@ class PointArrays {
     }
   }
 
-  /// Memory is written once, from its begin to its end. @tparam width  0: known only at run time
+  /// Memory is written once, from its beginning to its end. @tparam width 0: known only at run time
   template <std::size_t width, class Number>
   static void interleave(const std::vector<const Number*>& columns, std::size_t rows, Number* to) {
     const std::size_t count = width == 0 ? columns.size() : width;
@@ -206,7 +221,7 @@ class PointArrays {
   std::size_t rows_ = 0;
 };
 
-/// A sink that keeps points in memory, with what the cloud's header says of them.
+/// A sink that keeps points in memory, with the cloud's header.
 class PointKeeper {
  public:
   cloud::CloudSink sink() {
@@ -237,12 +252,12 @@ class PointKeeper {
   CloudHeader header_;
 };
 
-/// What a job says of points that are in no file.
+/// A job's result for points without a file.
 py::object told_of(const jobs::RecordingCloud& made) {
-  json::Json told = json::of(made);
-  told.erase("format");
-  told.erase("output");
-  return dict_of(told);
+  json::Json summary = json::of(made);
+  summary.erase("format");
+  summary.erase("output");
+  return dict_of(summary);
 }
 
 jobs::CloudOfRecordingOptions point_options(const Options& options) {
@@ -251,12 +266,12 @@ jobs::CloudOfRecordingOptions point_options(const Options& options) {
   return job;
 }
 
-/// @return arrays and header, and what the job says
-py::tuple points(const py::dict& values, int threads, const py::object& tell) {
+/// @return arrays and header, and the job's result
+py::tuple points(const py::dict& values, int threads, const py::object& on_progress) {
   const jobs::CloudOfRecordingOptions job = point_options(Options(values));
   PointKeeper keeper;
   jobs::RecordingCloud made;
-  run_job(tell, threads, [&](const Progress& progress) {
+  run_job(on_progress, threads, [&](const Progress& progress) {
     jobs::PointsOfRecording whole(job, keeper.sink(), progress);
     while (whole.next()) {
     }
@@ -277,7 +292,7 @@ class PointReader {
     });
   }
 
-  /// Arrays and header of the next piece of at least so many points, but for the last one.
+  /// Arrays and header of the next piece of at least this many points, except for the last one.
   py::tuple next() {
     if (!made_) throw py::stop_iteration();
     try {
@@ -296,7 +311,7 @@ class PointReader {
     return keeper_.release();
   }
 
-  /// What the job says; None before the last piece.
+  /// The job's result; None before the last piece.
   py::object result() const { return result_; }
 
   void close() { made_.reset(); }
@@ -337,8 +352,8 @@ void bind_points(py::module_& module) {
       .def("close", &PointReader::close,
            "close(self)\n--\n\nCloses the recording; there are no further points.")
       .def_property_readonly("result", &PointReader::result,
-                             "What is known of all points, behind the last of them.");
-  module.def("points", &points, py::arg("options"), py::arg("threads"), py::arg("tell"));
+                             "Properties of all points, available after the last of them.");
+  module.def("points", &points, py::arg("options"), py::arg("threads"), py::arg("on_progress"));
 }
 
 }  // namespace risley::python

@@ -13,7 +13,7 @@ namespace risley::python {
 
 using YawPitchRoll = std::optional<std::array<double, 3>>;
 
-/// How a recording is to be read. @param yaw_pitch_roll  rad  @param device  empty: all of them
+/// Settings for reading a recording. @param yaw_pitch_roll  rad @param device  empty: all of them
 inline recordings::ReadOptions read_options(std::optional<double> shot_rate,
                                             const YawPitchRoll& yaw_pitch_roll,
                                             std::string device) {

@@ -44,11 +44,11 @@ py::object warnings_of(const std::vector<Warning>& warnings) {
   return py::module_::import("risley._results").attr("warnings_of")(python_of(json::of(warnings)));
 }
 
-/// Pieces that nobody looks at any more, to be filled again: memory that is used for the first time
-/// costs more than reading.
+/// Pieces no longer in use, kept to be filled again: touching fresh memory costs more than
+/// reading.
 class SparePieces : public std::enable_shared_from_this<SparePieces> {
  public:
-  /// A piece of any content that comes back when its last owner lets it go.
+  /// A piece of any content that is returned when its last owner releases it.
   SharedRecording take() {
     std::unique_ptr<Recording> piece;
     {
@@ -74,7 +74,7 @@ class SparePieces : public std::enable_shared_from_this<SparePieces> {
   std::vector<std::unique_ptr<Recording>> spare_;
 };
 
-/// Reads on where the last piece ended.
+/// Continues reading after the last piece.
 class ChunkReader {
  public:
   ChunkReader(const std::string& path, std::size_t rows, const recordings::ReadOptions& options)
@@ -100,7 +100,7 @@ class ChunkReader {
     if (may_wait_) {
       run_job(
           py::none(), 0, [&](const Progress&) { read(); }, &cancel_);
-    } else {  // to another thread and back takes half as long as reading
+    } else {  // switching to another thread and back takes half as long as reading
       unlocked(read);
     }
     if (!more) throw py::stop_iteration();
@@ -132,8 +132,8 @@ class ChunkReader {
   }
 
  private:
-  /// While a piece is read, without the lock, neither another thread nor a signal handler may come
-  /// between.
+  /// While a piece is read, without the lock, neither another thread nor a signal handler may
+  /// interfere.
   class Turn {
    public:
     explicit Turn(bool& busy) : busy_(busy) {
@@ -150,7 +150,7 @@ class ChunkReader {
 
   std::size_t rows_;
   static constexpr std::size_t kQuickRows = 1'000'000;  // read in a fraction of a second
-  bool may_wait_ = false;  ///< where only the flag stops a wait, for a library or for the next row
+  bool may_wait_ = false;  ///< if only the flag stops a wait, for a library or for the next row
   bool busy_ = false;
   std::shared_ptr<SparePieces> spare_ = std::make_shared<SparePieces>();
   CancelFlag cancel_;
@@ -242,7 +242,7 @@ SharedRecording recording_from_arrays(const py::object& time_ns, const py::objec
   return recording;
 }
 
-/// Some rows as a recording of their own. @param key  as numpy takes it of an array of all rows
+/// Some rows as a separate recording. @param key  as numpy accepts it for an array of all rows
 SharedRecording some_rows(const SharedRecording& recording, const py::object& key) {
   const Observations& all = recording->data.observations;
   const py::module_ numpy = py::module_::import("numpy");
@@ -305,8 +305,10 @@ void bind_header(py::module_& module) {
   using recordings::Device;
   py::class_<Device>(module, "Device", "One sensor of a recording.")
       .def_readonly("serial", &Device::serial, "Broadcast code; empty when it is not known.")
-      .def_readonly("topic", &Device::topic, "Of its messages in a bag; empty in other formats.")
-      .def_readonly("hub_serial", &Device::hub_serial, "That of the hub; empty without one.")
+      .def_readonly("topic", &Device::topic,
+                    "Topic of its messages in a bag; empty in other formats.")
+      .def_readonly("hub_serial", &Device::hub_serial,
+                    "Serial number of the hub; empty without one.")
       .def_readonly("address", &Device::address,
                     "IPv4 address, of the second generation; empty when it is not known.")
       .def_readonly("type", &Device::type, "Number of the Livox type; 255 when it is not known.")
@@ -319,13 +321,13 @@ void bind_header(py::module_& module) {
                            device.serial);
       });
   py::class_<RecordingHeader>(module, "RecordingHeader",
-                              "What is known of a recording before its first row.")
+                              "Properties of a recording known before its first row.")
       .def_readonly("format", &RecordingHeader::format, "Short name of the format.")
       .def_readonly("devices", &RecordingHeader::devices, "Its sensors, at least one.")
       .def_property_readonly(
           "time_reference",
           [](const RecordingHeader& header) { return to_string(header.time_reference); },
-          "What the origin of the times is, in words.")
+          "The origin of the times, in words.")
       .def_readonly("has_times", &RecordingHeader::has_times,
                     "False where ``time_ns`` holds the numbers of shots.")
       .def_readonly("has_range", &RecordingHeader::has_range, "Whether there are ranges.")
@@ -351,7 +353,7 @@ void bind_recordings(py::module_& module) {
       "cannot be written to, and stays valid after the recording is deleted. Where the header has "
       "no\ntimes, ``time_ns`` holds the numbers of shots; where it has no ranges, ``range`` is "
       "NaN.\n"
-      "`read` and `read_chunks` make recordings of files, `from_arrays` of numbers.");
+      "`read` and `read_chunks` make recordings from files, `from_arrays` from numbers.");
   type.def("__len__", [](const Recording& recording) { return recording.data.observations.size(); })
       .def("__getitem__", &some_rows, py::arg("key"))
       .def_property_readonly("xyz", &xyz_of,
@@ -373,7 +375,7 @@ void bind_recordings(py::module_& module) {
            [](const py::object& self) {
              return py::module_::import("risley._recordings").attr("reduced")(self);
            })
-      .def_readonly("header", &Recording::header, "What is known of the whole recording.")
+      .def_readonly("header", &Recording::header, "Properties of the whole recording.")
       .def_property_readonly(
           "warnings", [](const Recording& recording) { return warnings_of(recording.warnings); },
           "Problems that leave the recording usable.")
@@ -399,8 +401,7 @@ void bind_recordings(py::module_& module) {
       .def("__exit__", [](ChunkReader& self, const py::args&) { self.close(); })
       .def("close", &ChunkReader::close,
            "close(self)\n--\n\nCloses the file; there are no further pieces.")
-      .def_property_readonly("header", &ChunkReader::header,
-                             "What is known of the whole recording.")
+      .def_property_readonly("header", &ChunkReader::header, "Properties of the whole recording.")
       .def_property_readonly(
           "warnings", [](ChunkReader& reader) { return warnings_of(reader.warnings()); },
           "Problems found so far that leave the recording usable.")
@@ -410,17 +411,17 @@ void bind_recordings(py::module_& module) {
   module.def(
       "read",
       [](const std::string& path, std::optional<double> shot_rate, const YawPitchRoll& extrinsics,
-         std::string device, const py::object& tell) {
+         std::string device, const py::object& on_progress) {
         const recordings::ReadOptions options =
             read_options(shot_rate, extrinsics, std::move(device));
         auto recording = std::make_shared<Recording>();
-        run_job(tell, 0, [&](const Progress& progress) {
+        run_job(on_progress, 0, [&](const Progress& progress) {
           *recording = recordings::load_recording(path, progress.stage("reading"), options);
         });
         return recording;
       },
       py::arg("path"), py::arg("shot_rate"), py::arg("extrinsics"), py::arg("device"),
-      py::arg("tell"));
+      py::arg("on_progress"));
   module.def("recording_from_arrays", &recording_from_arrays, py::arg("time_ns"),
              py::arg("azimuth"), py::arg("zenith"), py::arg("range"), py::arg("others"),
              py::arg("serial"), py::arg("device_type"));

@@ -24,7 +24,7 @@ double number_of(const Json& object, const char* key) {
   return object.contains(key) && object[key].is_number() ? object[key].get<double>() : std::nan("");
 }
 
-/// Name, value, sigma, sigma given what is held, and unit, in the units of files.
+/// Name, value, sigma, sigma given the held values, and unit, in the units of files.
 using Row = std::array<std::string, 5>;
 
 std::vector<Row> rows_of(const ValueTable& table) {

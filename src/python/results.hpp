@@ -13,20 +13,20 @@
 
 namespace risley::python {
 
-/// What was found, as columns in SI units under names without a unit.
+/// The results, as columns in SI units under names without a unit.
 struct ValueTable {
   std::vector<std::string> names, units;
   std::vector<double> values, sigmas, sigmas_given_held;
   std::vector<std::string> file_names;  ///< with the unit
-  /// What the covariance is of, and that of them if what was held is exact.
+  /// The quantities of the covariance, and their covariance if held values are exact.
   std::vector<std::string> covariance_names;
   Eigen::MatrixXd covariance;
 };
 
-/// Of what json::of() gives, without a covariance; NaN where it has no number, as values of a plan.
+/// From json::of(), without a covariance; NaN if it has no number, like the values of a plan.
 ValueTable table_of(const json::Json& result);
 
-/// The verdict and a table of what was found, in the units of files.
+/// The verdict and a table of the results, in the units of files.
 std::string html_of(const json::Json& result);
 /// The same as text, as the command prints them.
 std::string text_of(const json::Json& result);

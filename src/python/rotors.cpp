@@ -17,7 +17,7 @@ namespace {
 
 using estimation::RotorTrajectory;
 
-/// The nearest knot, at most so far away that its parabola describes the rotors.
+/// The nearest knot, if its parabola still describes the rotors at that distance.
 std::optional<std::size_t> knot_near(const RotorTrajectory& t, std::int64_t time_ns) {
   constexpr auto kReach = static_cast<std::int64_t>(1e9 * estimation::kKnotInterval);
   for (std::size_t stretch = 0; stretch < t.stretch_begin.size(); ++stretch) {
@@ -36,7 +36,7 @@ std::optional<std::size_t> knot_near(const RotorTrajectory& t, std::int64_t time
 }
 
 /// Rotation angles [times, prisms], their covariance [times, prisms, prisms], and speeds [times,
-/// prisms], SI units; NaN where there is no knot. @param knot_of  of the time of a row
+/// prisms], SI units; NaN if there is no knot. @param knot_of  of the time of a row
 template <class KnotOf>
 py::tuple angles_at(const RotorTrajectory& t, const std::int64_t* time_ns, std::size_t rows,
                     const KnotOf& knot_of) {

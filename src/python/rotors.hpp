@@ -12,11 +12,11 @@
 
 namespace risley::python {
 
-/// How the rotors of an estimate moved, apart from its recording.
+/// The motion of an estimate's rotors, without its recording.
 struct RotorMotion {
   estimation::RotorTrajectory trajectory;
-  std::vector<std::int64_t> shot_time_ns;  ///< of the shots that were used
-  std::vector<unsigned char> outlier;      ///< not 0 where such a shot was left out
+  std::vector<std::int64_t> shot_time_ns;  ///< of the used shots
+  std::vector<unsigned char> outlier;      ///< not 0 if such a shot was rejected
 };
 
 std::shared_ptr<RotorMotion> motion_of(const estimation::Estimate& estimate);

@@ -27,7 +27,7 @@ namespace {
 using sensors::Knowledge;
 using sensors::Sensor;
 
-/// Refuses what changes from shot to shot. @return the name in files
+/// Rejects parameters that change from shot to shot. @return the name in files
 NamedParameter constant_parameter(const std::string& name, const Sensor& sensor) {
   const NamedParameter parameter = named_parameter(name, sensor.shape());
   if (parameter.info->kind == ParameterKind::rotation_angle) {
@@ -87,10 +87,10 @@ void bind_sensors(py::module_& module) {
            "digit.")
       .def("write", &write_sensor, py::arg("path"),
            "write(self, path)\n--\n\nWrites its preset, which every command and `load_sensor` "
-           "take.\n\n"
+           "accept.\n\n"
            "Raises\n------\nFileError\n    When the file cannot be written.")
       .def_readwrite("name", &Sensor::name, "Name of the preset.")
-      .def_readonly("manufacturer", &Sensor::manufacturer, "Who makes it.")
+      .def_readonly("manufacturer", &Sensor::manufacturer, "Its maker.")
       .def_readonly("model", &Sensor::model, "Commercial name.")
       .def_readonly("device_type", &Sensor::device_type, "Livox number of its type.")
       .def_readwrite("serial", &Sensor::serial, "Serial number; empty for a type.")
@@ -105,7 +105,7 @@ void bind_sensors(py::module_& module) {
       .def("with_combination", &sensors::with_combination, py::arg("combination"),
            "with_combination(self, combination)\n--\n\nThe same sensor in another speed "
            "combination.\n\n"
-           "Raises\n------\nValueError\n    When there is none of that number.")
+           "Raises\n------\nValueError\n    If there is no combination with that number.")
       .def_property_readonly("parameters", &values_of,
                              "All parameters and speeds by name, SI units.")
       .def("sigma", &sigma_of, py::arg("name"),
@@ -113,10 +113,10 @@ void bind_sensors(py::module_& module) {
            "name; None if it is "
            "not known.")
       .def("source", &source_of, py::arg("name"),
-           "source(self, name)\n--\n\nWho says how large a parameter is.")
+           "source(self, name)\n--\n\nThe source of a parameter's value.")
       .def_property_readonly(
           "reference", [](const Sensor& sensor) { return sensors::to_string(sensor.reference); },
-          "What it was calibrated against: none, directions or planes.")
+          "Reference of its calibration: none, directions or planes.")
       .def_property_readonly(
           "covariance_names", &covariance_names,
           "Names of the values that the covariance belongs to; empty for a sensor type.")
@@ -127,7 +127,7 @@ void bind_sensors(py::module_& module) {
                     "1 sigma of azimuth and zenith before rounding, rad.")
       .def_readonly("range_noise", &Sensor::range_noise, "1 sigma of a range, m.")
       .def_readonly("range_offset", &Sensor::range_offset,
-                    "What the sensor adds to a true range, m.")
+                    "Offset that the sensor adds to the true range, m.")
       .def_readonly("angle_resolution", &Sensor::angle_resolution, "Rounding step of angles, rad.")
       .def_readonly("range_resolution", &Sensor::range_resolution, "Rounding step of ranges, m.")
       .def_readonly("range_minimum", &Sensor::range_minimum, "No return below, m.")
@@ -144,7 +144,7 @@ void bind_sensors(py::module_& module) {
           "prism_spacing", [](const Sensor& sensor) { return sensor.geometry.spacing; },
           "Spacing of the prisms, m.")
       .def_readonly("provenance", &Sensor::provenance,
-                    "Name and value pairs that say how it was computed.")
+                    "Name and value pairs that record how it was computed.")
       .def("__getitem__",
            [](const Sensor& sensor, const std::string& name) {
              const NamedParameter parameter = constant_parameter(name, sensor);

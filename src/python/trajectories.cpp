@@ -76,7 +76,8 @@ SharedTrajectory trajectory_from_arrays(const py::object& time_ns, const py::obj
   return trajectory;
 }
 
-/// What copies of a trajectory need: the text that keeps every digit does not keep how it was read.
+/// State for copies of a trajectory: the text that keeps every digit does not record how it was
+/// read.
 py::tuple trajectory_state(const Trajectory& t) {
   py::list accuracy;
   for (const trajectories::PoseAccuracy& one : t.accuracy) {
@@ -107,9 +108,10 @@ SharedTrajectory trajectory_from(const py::tuple& state) {
 }
 
 void bind_mount(py::module_& module) {
-  py::class_<Mount>(module, "Mount",
-                    "How a sensor sits on a moving platform: axes, lever arm, boresight, clock.\n\n"
-                    "`load_mount` reads one; the calibration of a flight has one.")
+  py::class_<Mount>(
+      module, "Mount",
+      "Mounting of a sensor on a moving platform: axes, lever arm, boresight, clock.\n\n"
+      "`load_mount` reads one; the calibration of a flight has one.")
       .def_static(
           "from_text",
           [](const std::string& text) { return trajectories::parse_mount(text, "the text"); },
@@ -132,7 +134,7 @@ void bind_mount(py::module_& module) {
           [](const Mount& mount) {
             return array_of(numbers_of(mount.boresight, &StatedValue::value));
           },
-          "What the real rotation has on top: a vector along the sensor's axes, rad; shape (3,).")
+          "Correction of the real rotation: a vector along the sensor's axes, rad; shape (3,).")
       .def_property_readonly(
           "boresight_sigma",
           [](const Mount& mount) {
@@ -153,7 +155,7 @@ void bind_mount(py::module_& module) {
           "Its standard deviations, m; shape (3,).")
       .def_property_readonly(
           "clock_offset", [](const Mount& mount) { return mount.clock_offset.value; },
-          "What is added to the recording's clock to get the trajectory's time, s.")
+          "Offset added to the recording's clock to get the trajectory's time, s.")
       .def_property_readonly(
           "clock_offset_sigma", [](const Mount& mount) { return mount.clock_offset.sigma; },
           "Its standard deviation, s.")
@@ -190,12 +192,12 @@ void bind_trajectories(py::module_& module) {
   py::class_<Trajectory, SharedTrajectory>(
       module, "Trajectory",
       "The poses of a moving platform as columns, ordered by time.\n\n"
-      "`load_trajectory` reads one, `from_arrays` makes one of numbers, and the calibration of a\n"
+      "`load_trajectory` reads one, `from_arrays` makes one from numbers, and the calibration of a "
       "flight has one.")
       .def_static(
           "from_arrays", &trajectory_from_arrays, py::arg("time_ns"), py::arg("position"),
           py::arg("attitude"),
-          "from_arrays(time_ns, position, attitude)\n--\n\nPoses on a map of their own: x east, y "
+          "from_arrays(time_ns, position, attitude)\n--\n\nPoses in a local map frame: x east, y "
           "north, z up.\n\n"
           "Parameters\n----------\ntime_ns : array_like of int, shape (rows,)\n    Ascending "
           "times, ns.\nposition : array_like, shape (rows, 3)\n    Of the reference point, "
@@ -231,9 +233,9 @@ void bind_trajectories(py::module_& module) {
                 [&] { return trajectories::write_trajectory(path.string(), t, format); });
           },
           py::arg("path"), py::arg("format") = "",
-          "write(self, path, format='')\n--\n\nWrites it; the ending chooses the format unless "
-          "`format` does.\n\nReturns what the "
-          "format has no place for, in words.")
+          "write(self, path, format='')\n--\n\nWrites the trajectory; the ending chooses the "
+          "format unless `format` is given.\n\nReturns "
+          "descriptions of the data that the format cannot hold.")
       .def("__repr__",
            [](const Trajectory& t) {
              return fmt::format("<risley.Trajectory {}: {} poses over {:.1f} s>",
@@ -243,14 +245,14 @@ void bind_trajectories(py::module_& module) {
       .def(py::pickle(&trajectory_state, &trajectory_from));
   module.def(
       "load_trajectory",
-      [](const std::string& path, const std::string& topic, const py::object& tell) {
+      [](const std::string& path, const std::string& topic, const py::object& on_progress) {
         auto trajectory = std::make_shared<Trajectory>();
-        run_job(tell, 0, [&](const Progress& progress) {
+        run_job(on_progress, 0, [&](const Progress& progress) {
           *trajectory = trajectories::load_trajectory(path, progress.stage("reading"), topic);
         });
         return trajectory;
       },
-      py::arg("path"), py::arg("topic"), py::arg("tell"));
+      py::arg("path"), py::arg("topic"), py::arg("on_progress"));
 }
 
 }  // namespace risley::python

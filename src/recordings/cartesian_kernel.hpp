@@ -9,7 +9,7 @@
 
 namespace risley::recordings {
 
-/// Points on their way into columns, which have room for them from their first entry on.
+/// Points being written to columns, which have room for them from their first entry on.
 struct CartesianArguments {
   std::size_t points = 0;
   double step = 0;                                                 ///< of the coordinates, m

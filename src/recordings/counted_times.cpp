@@ -18,7 +18,7 @@ namespace {
 
 constexpr auto kUnknownGap_ns = static_cast<std::int64_t>(kUnknownGap * 1e9);
 
-/// Gives every row the time that counting its shot gives.
+/// Gives every row the time from counting its shot.
 class CountingReader final : public DecoratingReader {
  public:
   CountingReader(std::unique_ptr<Reader> inner, std::string path, const ReadOptions& options)
@@ -42,8 +42,8 @@ class CountingReader final : public DecoratingReader {
     clock_wraps_ = 0;
     if (lost_samples_ == 0) return;
     warnings_.push_back({kWarning.content_left_out,
-                         "inertial samples were left out: their times cannot be compared with "
-                         "those of counted shots",
+                         "inertial samples were dropped: their times cannot be compared with those "
+                         "of counted shots",
                          {},
                          lost_samples_});
   }

@@ -20,15 +20,15 @@
 namespace risley::recordings {
 namespace {
 
-/// A stretch begins and ends at one of so many parts of its length.
+/// A stretch begins and ends at one of this many parts of its length.
 constexpr std::int64_t kParts = 16;
-/// Packets that come late by less are no reset of the clock.
+/// Packets late by less are not a reset of the clock.
 constexpr double kLate_ns = 10e6;
-/// Angles that came from coordinates are rounded to this part of their resolution.
+/// Angles derived from coordinates are rounded to this part of their resolution.
 constexpr double kAnglePart = 0.25;
 constexpr const char* kEnding = ".nc";
 
-/// Rows of one device that stand together, counted among its own.
+/// Consecutive rows of one device, counted among its own.
 struct Stretch {
   std::uint8_t device = 0;
   std::uint64_t first_row = 0, rows = 0;
@@ -39,7 +39,7 @@ struct Stretch {
 class StretchSearch {
  public:
   /// @param part_ns  a kParts-th of the length, in the unit of the times
-  /// @param late_ns  times that go back by more begin anew
+  /// @param late_ns  after a larger step back times restart
   StretchSearch(std::uint8_t device, double part_ns, double late_ns, std::uint64_t most_shots)
       : part_ns_(part_ns), late_ns_(late_ns), most_shots_(most_shots) {
     best_.device = device;
@@ -51,7 +51,7 @@ class StretchSearch {
     const bool same_shot = begun && time == last_time_ && rows.return_number[row] > last_return_;
     last_return_ = rows.return_number[row];
     if (!same_shot) {
-      // Doubles, because times of damaged files may lie as far apart as no integer can tell.
+      // Doubles, because times of damaged files may lie too far apart for any integer.
       const double step = begun ? static_cast<double>(time) - static_cast<double>(last_time_) : 0;
       if (!begun || step < -late_ns_) restart(time);
       begin_shot(time);
@@ -133,8 +133,8 @@ double rounded(double angle, double step, double low, double high) {
   return step > 0.0 ? std::clamp(std::round(angle / step) * step, low, high) : angle;
 }
 
-/// Whether the angles of a row came from coordinates in whole steps, whatever the header says of
-/// the others.
+/// Whether the angles of a row were derived from coordinates in whole steps, whatever the header
+/// says of the others.
 bool is_cartesian(const Observations& rows, std::size_t row) {
   constexpr double kSame = 1e-5;
   const double step = rows.range_resolution[row], range = rows.range[row];
@@ -158,7 +158,7 @@ class ExcerptWriter {
     }
     excerpt_.device_type = header.devices[0].type;
     header.format = kNetcdfFormat.name;
-    for (const Format* format : all_formats()) {  // any other text may tell of a person
+    for (const Format* format : all_formats()) {  // any other text may identify a person
       if (format->name == source_format(source)) header.format = format->name;
     }
     header.has_times = source.has_times;
@@ -166,10 +166,10 @@ class ExcerptWriter {
     header.has_intensity = false;
     header.cartesian = source.cartesian;
     header.returns_per_shot = source.returns_per_shot;
-    writer_ = kNetcdfFormat.create(path, header);
+    writer_ = kNetcdfFormat.create(path, header, {});
   }
 
-  /// Takes those of the rows that belong to the stretch. @return whether there is more to come
+  /// Copies the rows that belong to the stretch. @return whether more follows
   bool take(const Observations& rows) {
     Observations& to = chunk_.observations;
     to.clear();
@@ -260,7 +260,7 @@ void check(const Source& recording, const std::string& path, const ExcerptOption
   require_shots("ExcerptOptions::most_shots_without_times", options.most_shots_without_times);
 }
 
-/// Searches all sound rows. @param damage  gets what ends them before the file's end
+/// Searches all sound rows. @param damage  receives the reason if they end before the file
 Stretch best_stretch(Reader& reader, const ExcerptOptions& options, const Progress& progress,
                      std::optional<FileError>& damage) {
   const bool has_times = reader.header().has_times;

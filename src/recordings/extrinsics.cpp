@@ -57,7 +57,7 @@ class SensorFrameReader final : public DecoratingReader {
     if (not_moved_ == 0) return;
     warn(kWarning.pose_unused,
          "{} directions without a range were turned into the sensor's frame but not moved: the "
-         "translation of {:.6g} {:.6g} {:.6g} m is left out",
+         "translation of {:.6g} {:.6g} {:.6g} m was not applied",
          not_moved_, translation_.x, translation_.y, translation_.z);
   }
 
@@ -75,7 +75,7 @@ class SensorFrameReader final : public DecoratingReader {
     const double range = rows.range[row];
     const bool has_point = range > 0.0 && std::isfinite(range);
     if (moves_ && std::isnan(range) && rows.valid[row] != 0) ++not_moved_;
-    // Width of the rounding across and along the beam as it was recorded: rad, or m with a point.
+    // Width of the rounding across and along the beam as recorded: rad, or m with a point.
     const double step = std::max(static_cast<double>(rows.azimuth_resolution[row]) * sine,
                                  static_cast<double>(rows.zenith_resolution[row])) *
                         (has_point ? range : 1.0);
@@ -110,7 +110,7 @@ class SensorFrameReader final : public DecoratingReader {
     rows.zenith_resolution[row] = static_cast<float>(std::min(across, kPi));
   }
 
-  /// A shot without return, whose origin was moved to the sensor's place.
+  /// A shot without return, whose origin was moved to the sensor's position.
   static void make_null(Observations& rows, std::size_t row) {
     rows.azimuth[row] = rows.zenith[row] = std::numeric_limits<double>::quiet_NaN();
     rows.azimuth_resolution[row] = rows.zenith_resolution[row] = 0.0F;

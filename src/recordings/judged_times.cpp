@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Times are judged before anybody trusts them: whether the rows stand in their order, whether times
-// tell more than the order within a message, and how they are rounded.
+// Times are checked before use: whether the rows are in order, whether times are valid beyond a
+// message, and how they are rounded.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -22,14 +22,14 @@
 namespace risley::recordings {
 namespace {
 
-/// So many rows are judged: a second of the fastest sensor, and more.
+/// Number of rows judged: a second of the fastest sensor, and more.
 constexpr std::size_t kRowsJudged = 1 << 18;
-/// Packets have a grid of their own.
+/// Packets have their own grid.
 constexpr std::size_t kRowsOfPacketsJudged = 1 << 15;
-/// Rows that are put on a grid together; as many stay behind, so that no part is a short one.
+/// Rows put on a grid together; as many are held back, so that no part is a short one.
 constexpr std::size_t kRowsTogether = 1 << 17;
 
-/// Rows of each device, as they stand.
+/// Rows of each device, in file order.
 std::vector<std::vector<std::size_t>> rows_by_device(const Observations& rows) {
   std::vector<std::vector<std::size_t>> which;
   for (std::size_t row = 0; row < rows.size(); ++row) {
@@ -39,7 +39,7 @@ std::vector<std::vector<std::size_t>> rows_by_device(const Observations& rows) {
   return which;
 }
 
-/// What is done about one device's times.
+/// Corrections of one device's times.
 struct DeviceTimes {
   OrderJudgement order;
   std::int64_t window_ns = 0;  ///< within which rows are mixed
@@ -51,7 +51,7 @@ struct DeviceTimes {
 struct TimesJudgement {
   std::vector<DeviceTimes> devices;
   bool counted = false, in_packets = false;
-  bool changes = false;  ///< there is anything to put right, or to tell
+  bool changes = false;  ///< there is something to correct or to report
   bool none = false;     ///< all times are the same
   double counted_rate = 0;
   std::size_t rows = 0;  ///< that were judged
@@ -92,7 +92,7 @@ class TimesJudge {
   }
 
   void judge(const Observations& rows, std::vector<std::size_t> which, DeviceTimes& device) {
-    if (result_.in_packets) {  // writers fill packets up with records without a return
+    if (result_.in_packets) {  // writers pad packets with records without a return
       std::erase_if(which, [&rows](std::size_t row) { return rows.valid[row] == 0; });
     }
     device.order = judge_order(rows, which, result_.in_packets);
@@ -118,14 +118,14 @@ class TimesJudge {
         if (!result_.none) result_.counted_rate = 1e9 / device.order.step_ns;
         return;
       case RowOrder::overlapping:
-        result_.changes = true;  // which is told
+        result_.changes = true;  // it is reported
         break;
       case RowOrder::ascending:
         break;
     }
     if (result_.in_packets || result_.counted) return;
     device.grid.emplace(rows, which);
-    result_.changes = result_.changes || !device.grid->words().empty();
+    result_.changes = result_.changes || device.grid->warning().has_value();
   }
 
   Reader& reader_;
@@ -133,7 +133,7 @@ class TimesJudge {
   bool ended_ = false;
 };
 
-/// Reads a recording with its times put right.
+/// Reads a recording with corrected times.
 class JudgedReader final : public Reader {
  public:
   JudgedReader(std::unique_ptr<Reader> inner, std::shared_ptr<const TimesJudgement> judgement)
@@ -202,7 +202,7 @@ class JudgedReader final : public Reader {
     return false;
   }
 
-  /// Takes rows of the inner reader into hand.
+  /// Takes over rows of the inner reader.
   void take(Chunk&& chunk) {
     for (std::size_t row = 0; row < chunk.observations.size(); ++row) {
       Device& device = devices_[chunk.observations.device[row]];
@@ -225,7 +225,7 @@ class JudgedReader final : public Reader {
     put_on_grid();
   }
 
-  /// Counts a shot whose time says little.
+  /// Counts a shot whose time is uninformative.
   void count(Observations& rows, std::size_t row, Device& device) const {
     std::int64_t& time_ns = rows.time_ns[row];
     const RowOrder order = device.order.order;
@@ -253,7 +253,7 @@ class JudgedReader final : public Reader {
     time_ns = std::llround(static_cast<double>(device.last_shot) * device.order.step_ns);
   }
 
-  /// Moves on rows before which no other can come.
+  /// Releases rows before which no other can come.
   void order() {
     const bool all = is_at_end();
     std::vector<std::size_t> kept;
@@ -304,48 +304,48 @@ class JudgedReader final : public Reader {
     ready_.append(rows);
   }
 
-  /// Warnings of the inner reader, and what was found here.
+  /// Warnings of the inner reader, and those added here.
   void describe() {
     warnings_ = inner_->warnings();
     clock_wraps_ = inner_->clock_wraps();
     if (mixed_rows_ > 0) {
       warn(kWarning.rows_sorted,
-           "{} rows are earlier than one before them: the rows do not stand in the order in which "
-           "the shots were fired, and were sorted by their times",
+           "{} rows are earlier than one before them: the rows are not in firing order, and were "
+           "sorted by their times",
            mixed_rows_);
     }
     for (const Device& device : devices_) {
       if (device.order.order == RowOrder::begins_anew && !judgement_->counted) {
         warn(kWarning.times_corrected,
-             "times begin anew with every message or packet and tell nothing beyond one: shots "
-             "were counted in the order of the file, at the {:.6g} shots per second within "
-             "messages; {} names another rate",
+             "times restart with every message or packet and are valid only within one: shots were "
+             "counted in the order of the file, at the {:.6g} shots per second within messages; {} "
+             "names another rate",
              1e9 / device.order.step_ns, name_of(kSetting.shot_rate));
       } else if (device.order.order == RowOrder::constant && !judgement_->counted) {
         warn(kWarning.no_shot_times,
-             "all times are the same, and tell nothing: shots are numbered in the order of the "
+             "all times are the same and carry no information: shots are numbered in the order of "
+             "the "
              "file; {} counts their times",
              name_of(kSetting.shot_rate));
       } else if (device.order.order == RowOrder::overlapping) {
         warn(kWarning.devices_unclear,
              "pieces of the recording begin within the time of those before them: several sensors "
-             "seem to share one stream, and nothing in the file tells them apart");
+             "seem to share one stream, and nothing in the file distinguishes them");
       } else if (device.grid) {
-        if (const std::string words = device.grid->words(); !words.empty())
-          warnings_.push_back({kWarning.times_corrected, words});
+        if (auto warning = device.grid->warning()) warnings_.push_back(std::move(*warning));
       }
     }
     if (off_grid_ > 0) {
       warn(kWarning.times_corrected,
-           "{} shots do not stand on that grid, and their times were left as they are", off_grid_);
+           "{} shots are not on that grid, and their times were left unchanged", off_grid_);
     }
     if (judgement_->in_packets) {
       warn(kWarning.content_left_out,
-           "packet headers hold the times that were put right, and were left out");
+           "packet headers hold the uncorrected times, and were dropped");
     }
     if (lost_samples_ > 0) {
       warn(kWarning.content_left_out,
-           "inertial samples were left out: their times cannot be compared with those of counted "
+           "inertial samples were dropped: their times cannot be compared with those of counted "
            "shots")
           .lost_records = lost_samples_;
     }

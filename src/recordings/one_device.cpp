@@ -39,7 +39,7 @@ std::uint8_t place_of(const RecordingHeader& header, const std::string& path,
       devices_words(header)));
 }
 
-/// Leaves the rows of one device.
+/// Keeps only the rows of one device.
 class OneDeviceReader final : public Reader {
  public:
   OneDeviceReader(std::unique_ptr<Reader> inner, const std::string& path, const std::string& wanted)
@@ -73,7 +73,7 @@ class OneDeviceReader final : public Reader {
     clock_wraps_ = inner_->clock_wraps();
   }
 
-  /// What of all belongs to the device.
+  /// The device's part of all.
   void take(Chunk& chunk) {
     chunk.clear();
     const Observations& rows = all_.observations;

@@ -21,10 +21,10 @@
 namespace risley::recordings {
 namespace {
 
-/// The narrowest field of view, that of a Tele-15, has seven times this radius; far points that lie
-/// within the second are those of a map.
+/// The narrowest field of view, that of a Tele-15, has seven times this radius; far points within
+/// the second are those of a map.
 constexpr double kNarrowest = radians_from_degrees(1.0), kNarrowestFar = radians_from_degrees(5.0);
-/// Ranges of so many shots may be anything.
+/// Ranges of fewer shots are not judged.
 constexpr double kFewFar = 0.01;
 constexpr std::size_t kFewestRanges = 20;
 
@@ -35,7 +35,7 @@ std::vector<double> finite(std::span<const double> values) {
   return result;
 }
 
-/// The smallest arc that holds all azimuths but for the widest gap between them.
+/// The smallest arc that contains all azimuths: all but the widest gap between them.
 void find_arc(std::vector<double> azimuth, DirectionSpread& spread) {
   std::sort(azimuth.begin(), azimuth.end());
   double widest = azimuth.front() + kTwoPi - azimuth.back();
@@ -56,8 +56,8 @@ struct LengthUnit {
 constexpr std::array kLengthUnits{LengthUnit{"millimetres", "x_mm", 1000.0},
                                   LengthUnit{"centimetres", "x_cm", 100.0}};
 
-/// The units in which ranges would be within reach, first that in which they are most like those of
-/// rooms and streets.
+/// The units in which ranges would be within reach, beginning with the one in which they are most
+/// like those of rooms and streets.
 std::vector<LengthUnit> likely_units(double median, double high, double reach) {
   constexpr double kUsual = 10.0;  // m
   std::vector<LengthUnit> units;
@@ -133,7 +133,7 @@ std::optional<std::string> not_a_scan(double radius, std::size_t directions,
       "other, and the narrowest field of view is one of 14 deg{}",
       span_deg,
       as_radians > kLeast && as_radians < kMost
-          ? "; they may be angles in radians that are called degrees"
+          ? "; they may be angles in radians labelled as degrees"
           : "; the coordinates may not be those of a sensor frame");
 }
 
@@ -148,11 +148,10 @@ std::optional<std::string> beyond_reach(std::span<const double> range, double re
   const double low = quantile(ranges, 0.005), high = quantile(ranges, 0.995),
                median = quantile(ranges, 0.5);
   std::string text = fmt::format(
-      "{:.3g} % of the ranges are beyond the {:.0f} m that {} can reach: they are {:.5g} to {:.5g} "
-      "m",
+      "{:.3g} % of the ranges are beyond the reach of {:.0f} m of {}: they are {:.5g} to {:.5g} m",
       100.0 * share, reach, whose, low, high);
   const std::vector<LengthUnit> units = likely_units(median, high, reach);
-  // A few far ones are no other unit.
+  // A few far ones do not indicate another unit.
   constexpr double kMostAreFar = 0.1;
   if (units.empty() || share < kMostAreFar) return text;
   for (const LengthUnit& unit : units) {
@@ -166,7 +165,7 @@ std::optional<std::string> beyond_reach(std::span<const double> range, double re
 
 namespace {
 
-/// Says once, of the first shots, what is wrong with them.
+/// Reports once the defects of the first shots.
 class PlausibilityReader final : public DecoratingReader {
  public:
   explicit PlausibilityReader(std::unique_ptr<Reader> inner) : DecoratingReader(std::move(inner)) {
@@ -196,7 +195,8 @@ class PlausibilityReader final : public DecoratingReader {
     judged_ = true;
     std::vector<double> ranges = finite(range_);
     const bool far = !ranges.empty() && quantile(ranges, 0.5) > kFarthestReach;
-    // A sensor's own packets, and what names it, are in its units; they may have been put on a map.
+    // A sensor's own packets, and files that name it, are in its units; they may have been put on a
+    // map.
     const bool own = has_packets_ || header_.devices.front().type != kUnknownDeviceType;
     const auto problem = own && !far ? std::nullopt : not_a_scan(azimuth_, zenith_, range_);
     if (problem) {

@@ -13,7 +13,7 @@
 
 namespace risley::recordings {
 
-/// A reader that changes what another one reads.
+/// A reader that modifies the rows of another one.
 class DecoratingReader : public Reader {
  public:
   bool read(Chunk& chunk, std::size_t max_rows) final;
@@ -24,14 +24,14 @@ class DecoratingReader : public Reader {
 
   const Reader& inner() const { return *inner_; }
 
-  /// Takes over what the inner reader knows by now; also the last step of a constructor.
+  /// Copies the inner reader's state; also the last step of a constructor.
   void take_over();
 
-  /// Changes header, warnings and clock wraps, which were just taken over.
+  /// Changes header, warnings and clock wraps, which were just copied.
   virtual void describe() = 0;
 
   /// Changes a chunk.
-  /// @return what stops the reading: the chunk then has only what stood before it
+  /// @return reason to stop the reading: the chunk then has only the rows before it
   virtual std::optional<FileError> change(Chunk& chunk) = 0;
 
  private:
@@ -39,29 +39,28 @@ class DecoratingReader : public Reader {
   std::optional<FileError> failure_;
 };
 
-/// What the first rows say of a recording's times.
+/// Findings from the first rows on a recording's times.
 struct TimesJudgement;
 
-/// Judges times before anybody trusts them, by the first rows of each device.
-/// @param counted  whoever reads counts the shots
+/// Judges times before use, from the first rows of each device.
+/// @param counted  the reader counts the shots
 std::shared_ptr<const TimesJudgement> judge_times(Reader& reader, bool counted,
                                                   const Progress& progress);
 
-/// Rows that do not stand in the order of firing are sorted by their times; times that begin anew
-/// with every message are counted; times that are all the same are none; rounded ones, also where
-/// shots share them, are put on the even grid that they show together. Each is told as a warning.
-/// Sound times are left as they are.
-/// @param open  gives the rows from the first one on
+/// Rows that are not in firing order are sorted by their times; times that restart with every
+/// message are counted; constant times are none; rounded ones, also if shots share them, are put on
+/// their common even grid. Each gives a warning. Correct times are left unchanged.
+/// @param open  returns the rows from the first one on
 std::unique_ptr<Reader> with_judged_times(const std::function<std::unique_ptr<Reader>()>& open,
                                           std::shared_ptr<const TimesJudgement> judgement);
 
-/// Leaves the rows of one sensor, see ReadOptions::device.
+/// Keeps only the rows of one sensor, see ReadOptions::device.
 /// @param path  for errors
 /// @throws InvalidArgument as open_recording()
 std::unique_ptr<Reader> of_one_device(std::unique_ptr<Reader> reader, const std::string& path,
                                       const std::string& device);
 
-/// Gives every row the time that counting its shot gives, see ReadOptions::shot_rate.
+/// Gives every row the time from counting its shot, see ReadOptions::shot_rate.
 /// @param path  for errors
 /// @throws InvalidArgument as open_recording()
 std::unique_ptr<Reader> with_counted_times(std::unique_ptr<Reader> reader, const std::string& path,
@@ -76,8 +75,8 @@ std::unique_ptr<Reader> with_packet_places(std::unique_ptr<Reader> reader,
 /// @throws InvalidArgument when a number of the pose is not finite, or for several sensors
 std::unique_ptr<Reader> in_sensor_frame(std::unique_ptr<Reader> reader, const Extrinsics& pose);
 
-/// Refuses times further than kLongestTimeSpan_ns from the first one as damage, so that nobody
-/// behind it has to fear that the difference of two times does not fit 64 bits.
+/// Rejects times further than kLongestTimeSpan_ns from the first one as damage, so that the
+/// difference of two times always fits 64 bits in later readers.
 /// @param path  for errors
 std::unique_ptr<Reader> within_time_span(std::unique_ptr<Reader> reader, const std::string& path);
 

@@ -17,8 +17,8 @@
 namespace risley::recordings {
 namespace {
 
-/// So many rows are kept, a second of a Mid-40 and more; without packets, whose times have to be
-/// judged first, as many as that takes.
+/// Number of rows kept, a second of a Mid-40 and more; more without packets, because their times
+/// must be judged first.
 constexpr std::size_t kFirstRows = 1 << 17, kFirstRowsWithoutPackets = 1 << 18;
 
 std::string known_formats() {
@@ -29,7 +29,7 @@ std::string known_formats() {
   return names;
 }
 
-/// The first bytes of an unknown file, as text where they are text.
+/// The first bytes of an unknown file, as text if they are text.
 std::string shown(std::string_view head) {
   constexpr std::size_t kShown = 16;
   head = head.substr(0, kShown);
@@ -46,8 +46,8 @@ std::string shown(std::string_view head) {
 
 }  // namespace
 
-/// Reads first rows that others have decoded, or columns in memory, packets whole as a file would
-/// be read, and goes on behind them.
+/// Reads first rows that were already decoded, or columns in memory, packets complete as a file
+/// would be read, and continues after them.
 class SharedReader final : public Reader {
  public:
   SharedReader(std::shared_ptr<SharedInput> input, const Progress& progress)
@@ -59,7 +59,7 @@ class SharedReader final : public Reader {
 
   bool read(Chunk& chunk, std::size_t max_rows) override {
     progress_.check();
-    if (input_.use_count() == 1) input_->first_.reset();  // nobody else asks any more
+    if (input_.use_count() == 1) input_->first_.reset();  // this is the last reader
     // Only the format knows where smaller chunks may end.
     if (!rest_ && first_.are_decoded && given_ == 0 && max_rows < kDefaultChunkRows) {
       rest_ = input_->behind({}, progress_);
@@ -95,7 +95,7 @@ class SharedReader final : public Reader {
   }
 
  private:
-  /// The next rows of the present chunk. A decoder's own chunks are given as they came.
+  /// The next rows of the current chunk. A decoder's own chunks are returned unchanged.
   bool read_held(Chunk& chunk, std::size_t max_rows) {
     chunk.clear();
     if (chunk_ == first_.chunks.size()) return false;
@@ -136,7 +136,7 @@ class SharedReader final : public Reader {
     return some || read_held(chunk, max_rows);
   }
 
-  /// Up to the last beginning of a packet within max_rows, or the first one behind.
+  /// Up to the last beginning of a packet within max_rows, or the first one after it.
   std::size_t rows_of_whole_packets(const Chunk& all, std::size_t max_rows) const {
     const auto& begins = all.packet_begins;
     const std::size_t left = all.observations.size() - row_;

@@ -18,7 +18,7 @@ namespace risley::recordings {
 
 struct TimesJudgement;  // judged_times.cpp
 
-/// The first rows of a recording, and what was known behind them.
+/// The first rows of a recording, and the state after them.
 struct FirstRows {
   RecordingHeader header;
   std::vector<Warning> warnings;
@@ -26,13 +26,13 @@ struct FirstRows {
   std::size_t rows = 0;
   bool are_decoded = false;  ///< in chunks of kDefaultChunkRows, and not columns in memory
   std::uint64_t clock_wraps = 0;
-  double fraction = 1;  ///< of the file that they are
-  bool ended = true;    ///< there are no more sound ones
+  double fraction = 1;  ///< of their file
+  bool ended = true;    ///< there are no more undamaged ones
 };
 
-/// What the copies of a Source share: a file that is opened once and the first rows of it, which
-/// are decoded and judged once. Whoever reads on behind them has them dropped, and what is asked
-/// for afterwards is decoded again from the open file. For any number of threads.
+/// Data shared by the copies of a Source: a file that is opened once and its first rows, which are
+/// decoded and judged once. Reading beyond them drops them, and later requests are decoded again
+/// from the open file. For any number of threads.
 class SharedInput : public std::enable_shared_from_this<SharedInput> {
  public:
   explicit SharedInput(std::string path) : path_(std::move(path)) {}
@@ -41,15 +41,15 @@ class SharedInput : public std::enable_shared_from_this<SharedInput> {
   const std::string& path() const { return path_; }
   /// The open file. @throws FileError; for a folder, too
   io::InputFile file();
-  /// All rows as the file has them.
+  /// All rows as in the file.
   std::unique_ptr<Reader> read(const Progress& progress);
-  /// What ended a pass over the rows before all were read.
+  /// Reason why a pass over the rows ended before all were read.
   std::optional<FileError> damage() const {
     const std::lock_guard lock(damaging_);
     return damage_;
   }
-  /// What was judged of the times of a device's first rows.
-  /// @param judge  does it where nobody has
+  /// Judgement of the times of a device's first rows.
+  /// @param judge  called if they have not been judged yet
   template <class Judge>
   std::shared_ptr<const TimesJudgement> judgement(const std::string& device, bool counted,
                                                   Judge&& judge) {
@@ -75,8 +75,8 @@ class SharedInput : public std::enable_shared_from_this<SharedInput> {
   std::optional<FileError> damage_;  ///< of the file; the same for every pass
   std::optional<io::InputFile> file_;
   std::shared_ptr<const FirstRows> first_;
-  std::unique_ptr<Reader> rest_;   ///< behind the first rows, until somebody reads on
-  std::unique_ptr<Reader> again_;  ///< for the next one, where the format has one
+  std::unique_ptr<Reader> rest_;   ///< after the first rows, until a reader goes beyond them
+  std::unique_ptr<Reader> again_;  ///< for the next one, if the format has one
   std::map<std::pair<std::string, bool>, std::shared_ptr<const TimesJudgement>> judgements_;
 };
 

@@ -28,7 +28,7 @@ void require_devices(const Recording& recording) {
   }
 }
 
-/// Packets, where there are any, own all rows and inertial samples.
+/// Packets, if there are any, own all rows and inertial samples.
 void require_packets(const Chunk& data) {
   if (data.packets.empty()) return;
   std::size_t rows = 0, samples = 0;
@@ -82,7 +82,7 @@ std::shared_ptr<SharedInput> Source::shared() const {
 
 namespace {
 
-/// What SQLite reads with a database: messages that are not in it yet.
+/// SQLite's files beside a database: messages not in it yet.
 void add_with_journals(const std::string& file, std::vector<std::string>& files) {
   files.push_back(file);
   for (const char* ending : {"-wal", "-journal"}) {
@@ -106,7 +106,7 @@ std::vector<std::string> recording_files(const Source& source) {
     files.push_back((std::filesystem::path(path) / "metadata.yaml").string());
     for (const std::string& file : bags::files_of_bag_folder(path)) add_with_journals(file, files);
     return files;
-  } catch (const FileError&) {  // who reads it is told of it
+  } catch (const FileError&) {  // reading it reports the error
     return {path};
   }
 }

@@ -9,7 +9,7 @@
 
 namespace risley::recordings::livox {
 
-/// Spherical records on their way into columns, which have room for them from their first entry on.
+/// Spherical records being written to columns, which have room for them from their first entry on.
 struct SphericalArguments {
   std::size_t records = 0;
   int returns = 1;      ///< per record, 1 to 3
@@ -20,7 +20,7 @@ struct SphericalArguments {
   std::uint8_t *intensity = nullptr, *tag = nullptr, *valid = nullptr;
 };
 
-/// @return number of the first record that no sensor can have sent; records where there is none
+/// @return number of the first record that no sensor can have sent; records if there is none
 RISLEY_DECLARE_KERNEL(std::size_t decode_spherical(const SphericalArguments& arguments))
 
 }  // namespace risley::recordings::livox

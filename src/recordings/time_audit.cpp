@@ -39,7 +39,7 @@ bool is_gap(std::int64_t step_ns, std::int64_t nominal_ns) {
   return static_cast<double>(step_ns) > kGapFactor * static_cast<double>(nominal_ns);
 }
 
-/// Counts what rows hold, whatever their order.
+/// Counts the contents of rows, in any order.
 void count_columns(const Observations& o, TimeAuditResult& totals) {
   Extremes azimuth, zenith, range;
   for (std::size_t row = 0; row < o.size(); ++row) {
@@ -68,7 +68,7 @@ TimeAudit::TimeAudit(const RecordingHeader& header) {
   }
 }
 
-/// Counts what only sensors of the second generation tell.
+/// Counts data reported only by sensors of the second generation.
 void TimeAudit::add_numbered(const Chunk& chunk) {
   auto& devices = totals_.numbered_by_device;
   const Observations& o = chunk.observations;
@@ -144,7 +144,7 @@ void TimeAudit::add_row(const Observations& o, std::size_t row) {
   state.last_return = o.return_number[row];
   if (same_shot) return;
   ++totals_.shots;
-  // Shots of a late packet fill a hole that was passed already.
+  // Shots of a late packet fill an earlier hole.
   if (state.late_packet && time <= state.last_shot_ns) return;
   if (state.started) {
     add_step(state, {saturating_difference(time, state.last_shot_ns), state.last_shot_ns,
@@ -187,7 +187,7 @@ void TimeAudit::add_step(DeviceState& state, const TimeStep& step) {
   }
 }
 
-/// Takes the median of the steps kept so far as the nominal step and judges them by it.
+/// Uses the median of the steps so far as the nominal step and judges them by it.
 void TimeAudit::settle(DeviceState& state) {
   std::vector<TimeStep> steps;
   steps.swap(state.first_steps);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <set>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -18,14 +19,14 @@
 namespace risley::recordings {
 namespace {
 
-constexpr std::size_t kFewestShots = 40;      // fewer tell no grid
-constexpr std::size_t kFewestOfPart = 256;    // shots that are put on a grid by themselves
-constexpr std::size_t kMostOfPart = 1 << 16;  // over so many a clock keeps its rate
+constexpr std::size_t kFewestShots = 40;      // fewer show no grid
+constexpr std::size_t kFewestOfPart = 256;    // shots put on a grid together
+constexpr std::size_t kMostOfPart = 1 << 16;  // over which a clock keeps its rate
 constexpr double kExact_ns = 2.0;             // what whole nanoseconds leave
-constexpr double kDouble_ns = 50.0;           // what seconds since 1970 leave as doubles
-constexpr double kRounded_ns = 10.0;          // smaller common divisors of times are accidents
+constexpr double kDouble_ns = 50.0;           // rounding of seconds since 1970 as doubles
+constexpr double kRounded_ns = 10.0;          // smaller common divisors of times are coincidences
 constexpr double kSlack = 1.02;               // of half a rounding step
-constexpr double kLargestOff = 0.3;           // of a step, where the rounding is not known
+constexpr double kLargestOff = 0.3;           // of a step, if the rounding is not known
 constexpr std::int64_t kLongestPause_ns = 500'000'000;
 
 /// Calls part(begin, end) for stretches without a pause or a step back.
@@ -75,7 +76,7 @@ TimeGrid::TimeGrid(const Observations& rows, std::span<const std::size_t> of_dev
   }
   if (equal == 0 && divisor == least) return;  // whole steps from shot to shot
   rounding_ns_ = static_cast<double>(divisor);
-  // Floating-point numbers are multiples of no decimal step.
+  // Floating-point numbers are not multiples of a decimal step.
   if (rounding_ns_ < kRounded_ns) rounding_ns_ = equal > 0 ? static_cast<double>(least) : 0.0;
   learn_emitters(shots);
   try_kinds(shots);
@@ -115,7 +116,7 @@ void TimeGrid::learn_emitters(const Shots& shots) {
 }
 
 void TimeGrid::try_kinds(const Shots& shots) {
-  // The longest stretch tells.
+  // The longest stretch decides.
   std::size_t begin = 0, end = 0;
   for_each_stretch(shots.time_ns, [&](std::size_t from, std::size_t to) {
     if (to - from > end - begin) {
@@ -162,7 +163,7 @@ void TimeGrid::try_kinds(const Shots& shots) {
     return;
   }
   if (rounding_ns_ > 0) return;
-  // Times of packets that are not quite even are no rounded ones: steps between shots are exact.
+  // Times of packets that are not quite even are not rounded: steps between shots are exact.
   std::size_t exact = 0;
   for (std::size_t i = begin + 1; i < end; ++i) {
     const auto step = static_cast<double>(shots.time_ns[i] - shots.time_ns[i - 1]);
@@ -185,7 +186,7 @@ void TimeGrid::number_shots(const Shots& shots, std::size_t begin, std::size_t e
       const auto step = static_cast<double>(shots.time_ns[i] - shots.time_ns[i - 1]);
       number = before + std::max<std::int64_t>(1, std::llround(step / fit.step_ns));
     } else {
-      // The number next to the time among those of the emitter.
+      // The number nearest to the time among those of the emitter.
       const double since = static_cast<double>(shots.time_ns[i] - fit.origin_ns) - fit.offset_ns;
       const int place = place_of_beam_[shots.beam[i]];
       const double rounds = (since / fit.step_ns - place) / emitters_;
@@ -268,7 +269,7 @@ std::size_t TimeGrid::apply(Observations& rows, std::span<const std::size_t> of_
   return left;
 }
 
-/// A stretch, or the halves of one in which a clock changed its rate or shots are missing.
+/// A stretch, or its halves if a clock changed its rate or shots are missing.
 std::size_t TimeGrid::snap(Observations& rows, std::span<const std::size_t> of_device,
                            const Shots& shots, std::size_t begin, std::size_t end) const {
   if (end - begin >= kFewestShots) {
@@ -290,34 +291,38 @@ std::size_t TimeGrid::snap(Observations& rows, std::span<const std::size_t> of_d
   return snap(rows, of_device, shots, begin, middle) + snap(rows, of_device, shots, middle, end);
 }
 
-std::string TimeGrid::words() const {
+std::optional<Warning> TimeGrid::warning() const {
   const std::string rounded =
       rounding_ns_ > 0 ? fmt::format("times are rounded to {}", duration_text(rounding_ns_))
                        : std::string("times are rounded");
+  const WarningCode code = kind_ == Kind::none ? kWarning.times_coarse : kWarning.times_corrected;
   if (kind_ == Kind::finer) {
-    return fmt::format(
-        "{}: they were put on the even grid of {:.8g} shots per second that they "
-        "show together",
-        rounded, 1e9 / step_ns_);
+    return Warning{
+        code,
+        fmt::format("{}: they were snapped to their common even grid of {:.8g} shots per second",
+                    rounded, 1e9 / step_ns_)};
   }
   if (kind_ != Kind::none) {
-    return fmt::format(
-        "{}, and {} of {} shots share that of the shot before: they were spread in the order of "
-        "the file over an even grid of {:.8g} shots per second, which explains all times",
-        rounded, equal_times_, shots_, 1e9 / step_ns_);
+    return Warning{
+        code,
+        fmt::format(
+            "{}, and {} of {} shots share that of the shot before: they were spread in the "
+            "order of the file over an even grid of {:.8g} shots per second, which explains all "
+            "times",
+            rounded, equal_times_, shots_, 1e9 / step_ns_)};
   }
-  if (!unexplained_) return {};
+  if (!unexplained_) return std::nullopt;
   if (equal_times_ == 0) {
-    return fmt::format(
-        "{} and show no even grid of shots: the rounding is not counted in any "
-        "sigma",
-        rounded);
+    return Warning{
+        code,
+        fmt::format("{} and show no even grid of shots: the rounding is not counted in any sigma",
+                    rounded)};
   }
-  return fmt::format(
-      "{}, and {} of {} shots share that of the shot before, which an estimation cannot use: no "
-      "even grid of shots explains the times, as where shots are missing. {} counts "
-      "shots, where none is missing",
-      rounded, equal_times_, shots_, name_of(kSetting.shot_rate));
+  return Warning{
+      code, fmt::format("{}, and {} of {} shots share that of the shot before, which an estimation "
+                        "cannot use: no even grid of shots explains the times, as where shots are "
+                        "missing. {} counts shots, where none is missing",
+                        rounded, equal_times_, shots_, name_of(kSetting.shot_rate))};
 }
 
 }  // namespace risley::recordings

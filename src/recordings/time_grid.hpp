@@ -5,42 +5,43 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "risley/core/warning.hpp"
 #include "risley/recordings/observations.hpp"
 
-// The even grid on which a sensor fires, found again from rounded times: a rounding that goes in
-// step with the shots is no noise, and moves parameters by many of their sigmas.
+// Reconstructs a sensor's even firing grid from rounded times: a rounding in step with the shots is
+// not noise, and moves parameters by many of their sigmas.
 namespace risley::recordings {
 
-/// How the times of one device's shots are rounded, and what they show of its clock.
+/// Rounding of the times of one device's shots, and their evidence on its clock.
 class TimeGrid {
  public:
   /// @param of_device  rows of one device in the order of firing
   TimeGrid(const Observations& rows, std::span<const std::size_t> of_device);
 
-  /// Whether there are times to put right.
+  /// Whether there are times to correct.
   bool is_needed() const { return kind_ != Kind::none; }
 
-  /// Gives rows, in the order of firing, the times of the grid where they agree with it.
-  /// @return shots that do not, whose times stay as they are
+  /// Gives rows, in firing order, the times of the grid if they agree with it.
+  /// @return shots that do not, whose times stay unchanged
   std::size_t apply(Observations& rows, std::span<const std::size_t> of_device) const;
 
-  /// What is wrong with the times, and what was done; empty where nothing is.
-  std::string words() const;
+  /// The defect of the times, and its correction; nothing if there is none.
+  std::optional<Warning> warning() const;
 
  private:
   enum class Kind : std::uint8_t {
     none,     ///< exact, or nothing can be done
     finer,    ///< the rounding is finer than the step of shots
     counted,  ///< coarser, and no shot is missing
-    emitters  ///< coarser, and the emitters tell the place of each shot
+    emitters  ///< coarser, and the emitters give the place of each shot
   };
   /// Shots of a device: their first rows, times and emitters.
   struct Shots {
-    std::vector<std::size_t> begin;  ///< places in of_device, and behind the last
+    std::vector<std::size_t> begin;  ///< places in of_device, and the end
     std::vector<std::int64_t> time_ns;
     std::vector<std::uint8_t> beam;
     std::size_t size() const { return time_ns.size(); }

@@ -14,7 +14,7 @@
 namespace risley::recordings {
 namespace {
 
-/// Rows that follow each other in ascending time, [begin, end) of those judged.
+/// Consecutive rows in ascending time, [begin, end) of those judged.
 struct Run {
   std::size_t begin, end;
   std::int64_t first_ns, last_ns;
@@ -23,13 +23,13 @@ struct Run {
   std::int64_t span_ns() const { return last_ns - first_ns; }
 };
 
-/// A clock is not reset more often; a disorder of rows has shorter runs.
+/// A clock is not reset more often; disordered rows have shorter runs.
 constexpr std::size_t kFewestBetweenResets = 1000;
 /// No message is longer, ns.
 constexpr std::int64_t kLongestMessage = 1'000'000'000;
 /// Blocks that changed places are of one recording, ns.
 constexpr std::int64_t kFarthestBlock = 10'000'000'000;
-/// Steps up to this multiple of the usual one are no gaps.
+/// Steps up to this multiple of the usual one are not gaps.
 constexpr double kLongestStep = 1.8;
 
 class Judge {
@@ -59,7 +59,7 @@ class Judge {
       if (!moves && which_.size() >= kFewest) result.order = RowOrder::constant;
       return result;
     }
-    if (depth_ >= kLongestTimeSpan_ns) return result;  // damage, of which others tell
+    if (depth_ >= kLongestTimeSpan_ns) return result;  // damage, which other checks report
     const bool sorted =
         is_sorted_by([](const Observations& o, std::size_t i) { return o.beam[i]; }) ||
         is_sorted_by([](const Observations& o, std::size_t i) { return o.return_number[i]; });
@@ -146,8 +146,8 @@ class Judge {
            static_cast<double>(close) < kFewClose * static_cast<double>(sorted.size());
   }
 
-  /// Whether the runs together are the even shots of emitters that fire in turn, whose lines no
-  /// column names.
+  /// Whether the runs together are the even shots of emitters that fire in turn, whose lines are
+  /// not in a column.
   bool interleave() const {
     constexpr double kStep_ns = 12'500.0 / 3.0, kSameRate = 0.01, kSameStep = 0.3, kMost = 0.9;
     std::vector<std::int64_t> sorted;

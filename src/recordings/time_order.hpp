@@ -9,23 +9,23 @@
 
 #include "risley/recordings/observations.hpp"
 
-// In which order the rows of a recording stand, told by their times.
+// The order of the rows of a recording, found from their times.
 namespace risley::recordings {
 
-/// What the times of the rows of one device say of their order.
+/// Conclusion from the times of the rows of one device about their order.
 enum class RowOrder : std::uint8_t {
-  ascending,    ///< but for clocks that were reset
-  mixed,        ///< the rows stand in another order than that of firing
-  begins_anew,  ///< times begin anew with every message or packet: they tell nothing beyond it
+  ascending,    ///< except for clocks that were reset
+  mixed,        ///< the rows are not in firing order
+  begins_anew,  ///< times restart with every message or packet: valid only within it
   constant,     ///< all times are the same
-  overlapping,  ///< pieces begin within the time of those before: of several sensors, it seems
+  overlapping,  ///< pieces begin within the time of those before: apparently of several sensors
 };
 
-/// How the rows of one device stand.
+/// Order of the rows of one device.
 struct OrderJudgement {
   RowOrder order = RowOrder::ascending;
-  std::int64_t depth_ns = 0;  ///< by which a row is earlier than one before it, at most
-  double step_ns = 0;         ///< where times begin anew: from shot to shot
+  std::int64_t depth_ns = 0;  ///< largest amount by which a row is earlier than one before it
+  double step_ns = 0;         ///< if times restart: from shot to shot
 };
 
 /// Judges the order of some rows, those of one device.
@@ -34,10 +34,10 @@ OrderJudgement judge_order(const Observations& rows, std::span<const std::size_t
                            bool in_packets);
 
 /// Orders rows by their times. Rows of one time are ordered by emitter and number of return, then
-/// as they stand.
+/// in file order.
 void order_by_time(const Observations& rows, std::vector<std::size_t>& which);
 
-/// The step of a known rate of shots, where a measured one is near it; the measured one otherwise.
+/// The step of a known shot rate, if a measured one is near it; otherwise the measured one.
 double known_step_or(double step_ns);
 
 /// From shot to shot at the rates of known sensors, ns.

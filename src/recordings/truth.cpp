@@ -22,14 +22,14 @@ constexpr const char* kDimension = "shot";
 constexpr std::size_t kBlockRows = 16384;
 constexpr int kMostPrisms = 26;  ///< one letter each
 
-/// A column, or one of each prism, whose letter stands for {} in names and words.
+/// A column, or one for each prism, whose letter replaces {} in names and words.
 struct TruthColumn {
   ColumnPlace<TruthColumns, std::vector<double>, std::vector<std::vector<double>>> place;
   std::string_view name, units, long_name;
   double si_per_unit = 1.0;  ///< turns the file's values into SI units
 };
 
-/// Those beside the time, in the file's order.
+/// Those other than the time, in the file's order.
 constexpr TruthColumn kTruthColumns[] = {
     {&TruthColumns::rotation_angle, "rotation_angle_{}_deg", "degree",
      "true rotation angle of prism {}, not wrapped", kRadiansPerDegree},
@@ -66,7 +66,7 @@ void require_prisms(int prisms, int least) {
   require_between("number of prisms", prisms, least, kMostPrisms);
 }
 
-/// The columns beside the time in the order of variables().
+/// The columns other than the time in the order of variables().
 template <class Truth>
 auto columns_of(Truth& rows) {
   std::vector<decltype(&rows.range)> columns;
@@ -177,7 +177,7 @@ class TruthFile {
   }
 
   int prisms() const { return prisms_; }
-  /// @throws FileError where the file cannot hold as many as it says
+  /// @throws FileError if the file cannot hold as many as it states
   std::size_t rows() const {
     file_.variable<double>(variables(prisms_).front().name, {&shot_});
     return shot_.length;

@@ -13,7 +13,7 @@
 namespace risley::recordings {
 namespace {
 
-/// One file name ending and the format it stands for.
+/// One file name ending and its format.
 struct Ending {
   std::string_view text;
   const Format* format;
@@ -46,9 +46,9 @@ const std::vector<Ending>& endings() {
 }
 
 std::unique_ptr<Writer> create(const Format& format, const std::string& path,
-                               const RecordingHeader& header) {
+                               const RecordingHeader& header, const WriteOptions& options) {
   if (!format.holds_shot_numbers) require_times(header);
-  return format.create(path, header);
+  return format.create(path, header, options);
 }
 
 }  // namespace
@@ -66,12 +66,12 @@ const std::vector<WritableFormat>& writable_formats() {
 }
 
 std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header,
-                                         const std::string& format) {
+                                         const std::string& format, const WriteOptions& options) {
   if (!format.empty()) {
     std::string known;
     for (const Format* one : all_formats()) {
       if (one->create == nullptr) continue;
-      if (one->name == format) return create(*one, path, header);
+      if (one->name == format) return create(*one, path, header, options);
       known += fmt::format("{}{}", known.empty() ? "" : ", ", one->name);
     }
     throw InvalidArgument(fmt::format("format = {}, allowed {}", format, known));
@@ -94,7 +94,7 @@ std::unique_ptr<Writer> create_recording(const std::string& path, const Recordin
     }
     throw InvalidArgument(fmt::format("{}: unknown ending, allowed {}", path, known));
   }
-  return create(*best->format, path, header);
+  return create(*best->format, path, header, options);
 }
 
 }  // namespace risley::recordings

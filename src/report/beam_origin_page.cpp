@@ -49,7 +49,7 @@ std::vector<double> difference(const std::vector<double>& greatest,
   return result;
 }
 
-/// Thicknesses or spacings of prisms in beam order, with what is known of them: "7 ± 1".
+/// Thicknesses or spacings of prisms in beam order, with their uncertainty: "7 ± 1".
 std::string millimetres_text(const sensors::Sensor& sensor, bool thickness) {
   const std::vector<double>& values =
       thickness ? sensor.geometry.thickness : sensor.geometry.spacing;
@@ -73,7 +73,7 @@ std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& se
   const std::string head = fmt::format(
       "<p>Prisms {} mm thick with perpendicular faces {} mm apart shift the beam sideways. {} "
       "beams, cells of {} degree.</p>\n",
-      millimetres_text(sensor, true), millimetres_text(sensor, false), map.beams,
+      millimetres_text(sensor, true), millimetres_text(sensor, false), count_text(map.beams),
       degrees_from_radians(map.cell));
   Sections sections;
   if (map.size() > 0) {
@@ -93,11 +93,10 @@ std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& se
                  Sections::Shown::unfolded);
   }
   sections.add(kHowToRepeat, provenance_html(provenance));
-  return page_html(
-      "Where beams start: " + sensor.name,
-      "How far the point where the beam leaves the last prism lies from the origin of the "
-      "sensor's frame, across the optical axis, over the field of view.",
-      head, sections, figures);
+  return page_html("Where beams start: " + sensor.name,
+                   "Distance across the optical axis from the origin of the sensor's frame to the "
+                   "point where the beam leaves the last prism, over the field of view.",
+                   head, sections, figures);
 }
 
 }  // namespace risley::report

@@ -35,7 +35,7 @@ constexpr std::array<const char*, 5> kPlaneColours = {"a", "b", "c", "d", "bad"}
 constexpr const char* kClutterColour = "ink";
 
 /// Values of the free parameters by name, in the units of files.
-/// @param values  what has them: a sensor, a train
+/// @param values  the object that has them: a sensor, a train
 template <class Values>
 Json values_json(const Calibration& c, const Values& values) {
   Json object = Json::object();
@@ -70,7 +70,7 @@ double zenith_degrees(const SamplePoint& p) { return degrees_from_radians(p.zeni
 double before_millimetres(const SamplePoint& p) { return kMillimetres * p.before; }
 double after_millimetres(const SamplePoint& p) { return kMillimetres * p.after; }
 
-/// Cells of the field of view, coloured by values in the unit of the reader.
+/// Cells of the field of view, coloured by values in the displayed unit.
 Chart map_of_cells(std::string title, std::string note, const jobs::FieldCells& cells,
                    const std::vector<double>& values, double unit, bool all_around) {
   Series series{"", "ink", SeriesKind::cells, {}, {}};
@@ -125,18 +125,18 @@ class CalibrationCharts {
     return charts;
   }
 
-  /// How wrong reported directions are over the field of view.
+  /// Errors of reported directions over the field of view.
   std::vector<Chart> pointing() const {
     if (!input_.details->pointing) return {};
     const jobs::PointingField& field = *input_.details->pointing;
     const auto chart = [&](std::string title, const std::vector<double>& errors,
                            const std::string& note) {
-      Chart result = map_of_cells(
-          std::move(title),
-          fmt::format("Angle between the direction that the sensor reports and the one of this "
-                      "calibration, {}; means over cells of {:.3g} degree.",
-                      note, degrees_from_radians(field.cells.side)),
-          field.cells, errors, degrees_from_radians(1.0), all_around());
+      Chart result =
+          map_of_cells(std::move(title),
+                       fmt::format("Angle between the direction that the sensor reports and that "
+                                   "of this calibration, {}; means over cells of {:.3g} degree.",
+                                   note, degrees_from_radians(field.cells.side)),
+                       field.cells, errors, degrees_from_radians(1.0), all_around());
       result.value_label = "error, deg";
       const double largest = *std::max_element(errors.begin(), errors.end());
       result.value_range = {0.0, degrees_from_radians(largest)};
@@ -144,8 +144,8 @@ class CalibrationCharts {
     };
     return {chart("Error of reported directions over the field of view", field.total,
                   "everything included"),
-            chart("The same without the rotation that all beams share", field.shape,
-                  "after turning all beams together as well as they can be turned")};
+            chart("The same without the rotation common to all beams", field.shape,
+                  "after the best common rotation of all beams")};
   }
 
   /// The walls in space, before and after, with their thickness enlarged.
@@ -157,7 +157,7 @@ class CalibrationCharts {
     return charts;
   }
 
-  /// Errors of beams whose truth is known.                                          [B21 Fig. 12]
+  /// Errors of beams with known truth. [B21 Fig. 12]
   std::vector<Chart> truth() const {
     if (!input_.truth || !input_.details->beam_errors) return {};
     const jobs::BeamComparison& t = *input_.truth;
@@ -295,8 +295,8 @@ class CalibrationCharts {
             {line("RMS after", "a", profile.rms_after), line("RMS before", "b", profile.rms_before),
              line("mean after", "c", profile.mean_after),
              line("mean before", "d", profile.mean_before)},
-            fmt::format("All points in {} bins, which hold {} to {} points; empty bins leave a "
-                        "gap. Distances are positive beyond the plane as seen from the sensor; a "
+            fmt::format("All points in {} bins of {} to {} points each; empty bins leave a gap. "
+                        "Distances are positive beyond the plane as seen from the sensor; a "
                         "calibrated sensor has means near 0.",
                         bins.size(), count_text(fewest), count_text(most)),
             turn ? ChartKind::full_turn : ChartKind::plain};
@@ -313,7 +313,7 @@ class CalibrationCharts {
       before.push_back(point->before);
       after.push_back(point->after);
     }
-    // Both share their bins, or their heights could not be compared.
+    // Both share their bins, so that their heights can be compared.
     const estimation::Moments& moments_before = input_.details->distances_before;
     const estimation::Moments& moments_after = input_.details->distances_after;
     estimation::Moments both;
@@ -324,7 +324,7 @@ class CalibrationCharts {
                 {histogram("after", "a", after, {}, both, kMillimetres).front(),
                  histogram("before", "b", before, {}, both, kMillimetres).front()},
                 sample_note() + fmt::format("Root mean square {} mm before, {} mm after. The "
-                                            "outermost bins hold everything beyond.",
+                                            "outermost bins hold all larger distances.",
                                             millimetres(moments_before.rms),
                                             millimetres(moments_after.rms))};
     return chart;
@@ -350,7 +350,7 @@ class CalibrationCharts {
             every_nth_note(on_walls_.size(), kMostWallPoints, "sample points on planes")};
   }
 
-  /// Where in the field of view points lie beyond their planes, and where before them.
+  /// Distances of points from their planes over the field of view, beyond or in front.
   std::vector<Chart> cell_means() const {
     if (!input_.details->field) return {};
     const jobs::WallField& field = *input_.details->field;
@@ -358,7 +358,7 @@ class CalibrationCharts {
       Chart result = map_of_cells(
           fmt::format("Mean distance from the planes over the field of view, {}", when),
           fmt::format("Means of {} sample points over cells of {:.3g} degree, all recordings "
-                      "together; cells with fewer than {} points are left out. The {} means have "
+                      "together; cells with fewer than {} points are omitted. The {} means have "
                       "a root mean square of {:.2f} mm, where noise alone would leave about "
                       "{:.2f} mm. Red: beyond the plane as seen from the sensor, blue: in front "
                       "of it. Patches of one colour are walls that are not flat, or beams that "
@@ -403,7 +403,7 @@ class CalibrationCharts {
                    "Y (left), m",
                    {series},
                    fmt::format("Each dot is the mean of the {} sample points of a wall within one "
-                               "degree, {} dots; cells with fewer than {} points are left out. "
+                               "degree, {} dots; cells with fewer than {} points are omitted. "
                                "Distances from the planes are drawn {:.0f} times as large; red is "
                                "beyond the plane as seen from the sensor, blue in front of it. "
                                "Drag to rotate.",

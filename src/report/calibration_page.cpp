@@ -29,7 +29,7 @@ std::string sigma_text(double sigma) {
   return is_sigma(sigma) ? number_text(sigma, sigma).sigma : "–";
 }
 
-/// Pitch and yaw together: what moves where the sensor looks.
+/// Pitch and yaw together: they move the sensor's line of sight.
 double boresight_sigma(const View& r) {
   return std::hypot(r["datum"]["sigma_pitch_deg"].number(), r["datum"]["sigma_yaw_deg"].number());
 }
@@ -46,18 +46,17 @@ const char* datum_text(const View& r) {
   if (kind == to_string(DatumKind::both)) {
     return "known normals of walls and known rotations between recordings fix the sensor's frame";
   }
-  return "no outside reference fixes the sensor's frame, only the shape of the bundle that its "
-         "beams form";
+  return "no external reference fixes the sensor's frame; only the shape of the beam bundle does";
 }
 
 std::string boresight_advice_html(const View& r) {
   return fmt::format(
-      "<p><b>The absolute boresight from these walls must not be trusted:</b> pitch and yaw, "
-      "which all beams share, have a combined standard uncertainty of {}°, and more than {:.2g}° "
-      "is poor. The shape of the bundle, and with it the flatness of point clouds, is not "
-      "affected. Set-ups that help:</p>{}",
+      "<p><b>Do not trust the absolute boresight from these walls:</b> pitch and yaw, common to "
+      "all beams, have a combined standard uncertainty of {}°, and more than {:.2g}° is poor. This "
+      "does not affect the shape of the bundle, and so the flatness of point clouds. Set-ups that "
+      "help:</p>{}",
       sigma_text(boresight_sigma(r)), degrees_from_radians(calibration::kPoorDatum),
-      list_html({"a wall that is steeply tilted against the axis of view, 50 to 65 degrees, and "
+      list_html({"a wall that is tilted steeply against the optical axis, by 50 to 65 degrees, and "
                  "fills the whole field of view",
                  "a longer range to the walls",
                  fmt::format("the body turned upside down against a stop between two recordings, "
@@ -87,9 +86,9 @@ Verdict calibration_verdict(const View& r) {
                 count_text(r["points"].count()), planes, planes == 1 ? "" : "s", datum_text(r),
                 sigma("sigma_roll_deg"), sigma("sigma_pitch_deg"), sigma("sigma_yaw_deg"));
   verdict.mend = fmt::format(
-      "check in the views below that what was taken for walls really is walls; record more walls "
-      "that fill the field of view, near and far and steeply tilted; hold parameters that these "
-      "walls do not determine ({}); and check known normals and stations, if any were given",
+      "check in the views below that all walls found are real; record more walls that fill the "
+      "field of view, near and far and steeply tilted; hold parameters that these walls do not "
+      "determine ({}); and check known normals and stations, if any were given",
       name_of(kSetting.fix));
   const bool poor = !(radians_from_degrees(boresight_sigma(r)) <= calibration::kPoorDatum);
   if (verdict.converged && poor) verdict.care_html = boresight_advice_html(r);
@@ -102,18 +101,18 @@ std::string calibration_subject(const View& r) {
       "{}{}{} observations, {} of them used. Sensor {}{} with {} prisms, from the preset {}{}.",
       names, names.empty() ? "" : ": ", count_text(observations_of(r)),
       count_text(r["points"].count()), r["preset"].text(), serial.empty() ? "" : " " + serial,
-      shape_of(r).prisms, r["preset"].text(),
-      r["method"].text() == "paper" ? "; by the paper's unweighted distances from planes"
+      shape_of(r).prisms.elements, r["preset"].text(),
+      r["method"].text() == "paper" ? "; by the paper's method, unweighted distances from planes"
                                     : "; by an adjustment of all recordings together");
 }
 
 std::vector<KeyNumber> calibration_numbers(const View& r) {
+  if (!r["converged"].flag()) return {};
   const View total = r["pointing_error"]["total_deg"], shape = r["pointing_error"]["shape_deg"];
   return {{angle_text(total),
            "error of the reported directions: " + offset_of(total["value"].number())},
           {angle_text(shape),
-           "of this is in the shape of the bundle of beams, which no alignment "
-           "removes: " +
+           "of this is in the shape of the beam bundle, which no alignment removes: " +
                offset_of(shape["value"].number())},
           {fmt::format("{} mm", thickness_text(r, "after")),
            fmt::format("thickness of the walls after the calibration, {} mm before",
@@ -163,22 +162,23 @@ std::string calibration_parameters_html(const View& r) {
     html += parameter_row(r, name, one, any_held);
   }
   return html +
-         "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation, everything "
+         "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation, all error sources "
          "included" +
-         (any_held ? ", also the uncertainty of the parameters that were held, which the second σ "
-                     "leaves out: if a held parameter is wrong, the others change so that the "
-                     "beams still point the same way. Nominal"
+         (any_held ? ", also the uncertainty of the held parameters, which the second σ excludes: "
+                     "if a held parameter is wrong, the others change so that the beams still "
+                     "point the same way. Nominal"
                    : ". Nominal") +
-         ": the preset. Believed: what the sensor used to compute its directions. Difference: "
+         ": the preset. Believed: the values from which the sensor computed its directions. "
+         "Difference: "
          "value minus believed.</p>\n";
 }
 
-/// What a row of the table of range errors and sizes says, for readers.
+/// Description of a row in the table of range errors and sizes.
 std::string number_words(const std::string& name) {
   if (name == "constant_m") return "every range is longer by";
-  if (name == "near_m") return "at 1 m from the sensor, ranges are longer by";
-  if (name == "incidence") return "part of a tilted footprint's depth that ranges are longer by";
-  if (name == "per_decade_m") return "ranges are longer for each tenth of the intensity by";
+  if (name == "near_m") return "range excess at 1 m from the sensor";
+  if (name == "incidence") return "range excess as a fraction of the depth of a tilted footprint";
+  if (name == "per_decade_m") return "range excess per tenth of the intensity";
   constexpr std::string_view kEmitter = "emitter_", kThickness = "prism_thickness_",
                              kSpacing = "prism_spacing_";
   const auto part = [&](std::string_view prefix) {
@@ -211,9 +211,9 @@ std::string numbers_html(const View& r) {
       rows;
   return html +
          "</tbody></table></div>\n<p class=\"note\">σ before: what was assumed. A σ that hardly "
-         "changed means that these walls do not determine the value: boards of one material and "
-         "known thickness, or dark and light patches on one wall, determine the error that depends "
-         "on intensity.</p>\n";
+         "changed means that these walls do not determine the value; to determine the "
+         "intensity-dependent error, scan boards of one material and known thickness, or dark and "
+         "light patches on one wall.</p>\n";
 }
 
 std::string formal_datum_row(const char* name, const View& datum) {
@@ -238,7 +238,7 @@ std::string direction_errors_row(const char* name, const View& errors) {
   return html + "</tr>\n";
 }
 
-/// What reported directions are off by, and what of it all beams share.
+/// Errors of reported directions, and the part common to all beams.
 std::string pointing_html(const View& r) {
   const View pointing = r["pointing_error"];
   std::string html = fmt::format(
@@ -264,7 +264,7 @@ std::string pointing_html(const View& r) {
              "</tbody></table></div>\n<p class=\"note\">Root mean squares over the beams of the "
              "recordings: reported directions against those of this calibration, σ from the "
              "calibration's covariance. The shared rotation is roll {}°, pitch {}° and yaw {}°; "
-             "aligning the mount by its point clouds removes it, but not the shape.</p>\n",
+             "aligning the mount by means of point clouds removes it, but not the shape.</p>\n",
              turn("roll"), turn("pitch"), turn("yaw"));
 }
 
@@ -277,7 +277,7 @@ std::string prior_tests_html(const View& r) {
       "deg</th><th>χ²</th><th>degrees of freedom</th><th>critical "
       "χ²</th><th>verdict</th></tr></thead><tbody>\n";
   for (const View& test : tests) {
-    // Without a degree of freedom the data say nothing of it.
+    // Without a degree of freedom it is not determined by the data.
     const double chi2 = test["chi2"].number(), critical = test["critical"].number();
     const std::uint64_t freedom = test["degrees_of_freedom"].count();
     const bool tested = freedom > 0 && std::isfinite(chi2 + critical), fits = chi2 <= critical;
@@ -293,8 +293,8 @@ std::string prior_tests_html(const View& r) {
                 : "contradicts the data");
   }
   return html +
-         "</tbody></table></div>\n<p class=\"note\">Misfit: the rotation between what was stated "
-         "and what the adjustment found. A correct station or normal exceeds the critical value "
+         "</tbody></table></div>\n<p class=\"note\">Misfit: the rotation between the stated value "
+         "and the adjusted one. A correct station or normal exceeds the critical value "
          "once in 10,000 times. Not tested: the data do not determine it.</p>\n";
 }
 
@@ -316,9 +316,9 @@ std::string datum_html(const View& r) {
   html += formal_datum_row("without the common errors of the rotation angles",
                            r["page"]["datum_without_common"]);
   html +=
-      "</tbody></table></div>\n<p class=\"note\">Shape: distortion of the bundle of beams, which "
-      "walls reveal. Gauge: the rotation that all beams share, roll, pitch and yaw about X, Y and "
-      "Z, which only an outside reference, or the bundle's shape, determines. Both are root mean "
+      "</tbody></table></div>\n<p class=\"note\">Shape: distortion of the beam bundle, which walls "
+      "reveal. Gauge: the rotation common to all beams, roll, pitch and yaw about X, Y and Z, "
+      "which only an external reference, or the bundle's shape, determines. Both are root mean "
       "squares over the beams.</p>\n";
   if (r.has("truth")) {
     html +=
@@ -335,7 +335,7 @@ std::string datum_html(const View& r) {
   return html + calibration_unobservable_html(r) + prior_tests_html(r);
 }
 
-/// A floor or a ceiling has no azimuth to speak of: the cosine of 2.6 degrees.
+/// A floor or a ceiling has no meaningful azimuth: the cosine of 2.6 degrees.
 constexpr double kSteep = 0.999;
 
 std::string planes_html(const View& r) {
@@ -364,7 +364,8 @@ std::string planes_html(const View& r) {
       "</tbody></table></div>\n<p class=\"note\">Normals and distances are seen from the sensor "
       "(X forward, Y left, Z up). RMS: root mean square distance of the points from the plane, "
       "before with the believed parameters and a plane fitted to them. Outliers: shots near the "
-      "plane that were not used. Range σ: noise of one range that the residuals show.</p>\n";
+      "plane that were not used. Range σ: noise of a single range, estimated from the "
+      "residuals.</p>\n";
   html += fmt::format(
       "<p>The residuals scatter {} times as much as the stated range noise "
       "predicts.</p>\n",
@@ -372,8 +373,8 @@ std::string planes_html(const View& r) {
   const View shape = r["shape"];
   if (shape["sigma_m"].number() > 0) {
     html += fmt::format(
-        "<p>The walls wave by {} mm (one standard deviation) over {} m. Every sigma on this page "
-        "includes what this may do to the result.</p>\n",
+        "<p>The walls have a waviness of {} mm (one standard deviation) over {} m. Every sigma on "
+        "this page includes its effect on the result.</p>\n",
         finite_text("{:.2g}", kMillimetres * shape["sigma_m"].number()),
         finite_text("{:.2g}", shape["length_m"].number()));
   }
@@ -394,8 +395,8 @@ std::string steps_html(const View& r) {
         height < 0 ? "towards" : "away from", angle("size_deg"), angle("azimuth_deg"),
         angle("zenith_deg"), step["points"].count()));
   }
-  return "<h3>Steps on the walls</h3>\n<p>These regions stand off their wall, as a door frame or "
-         "a picture does; their shots were left out of the adjustment.</p>\n" +
+  return "<h3>Steps on the walls</h3>\n<p>These regions stand out from or behind their wall, as a "
+         "door frame or a picture does; the adjustment did not use their shots.</p>\n" +
          list_html(items) + "\n";
 }
 

@@ -55,15 +55,17 @@ Json column_json(const std::vector<double>& values) {
 }
 
 Json series_json(const Series& series) {
-  return {{"label", series.label},
-          {"colour", series.colour},
-          {"kind", kSeriesKinds[static_cast<std::size_t>(series.kind)]},
-          {"x", column_json(series.x)},
-          {"y", column_json(series.y)},
-          {"z", column_json(series.z)},
-          {"value", column_json(series.value)},
-          {"cell_width", series.cell_width},
-          {"cell_height", series.cell_height}};
+  Json object = {{"label", series.label},
+                 {"colour", series.colour},
+                 {"kind", kSeriesKinds[static_cast<std::size_t>(series.kind)]},
+                 {"x", column_json(series.x)},
+                 {"y", column_json(series.y)},
+                 {"z", column_json(series.z)},
+                 {"value", column_json(series.value)},
+                 {"cell_width", series.cell_width},
+                 {"cell_height", series.cell_height}};
+  if (!series.sigma.empty()) object["sigma"] = column_json(series.sigma);
+  return object;
 }
 
 template <class Value>
@@ -94,17 +96,9 @@ Json chart_json(const Chart& chart) {
                  {"palette", kPalettes[static_cast<std::size_t>(chart.palette)]},
                  {"value_range", if_any(chart.value_range)},
                  {"grows_for", if_any(chart.grows_for)},
-                 {"colourings", nullptr},
                  {"note", chart.note},
                  {"series", Json::array()}};
-  if (chart.colourings) {
-    object["colourings"] = Json::array();
-    for (const Colouring& one : *chart.colourings) {
-      object["colourings"].push_back({{"label", one.label},
-                                      {"value", column_json(one.value)},
-                                      {"value_range", if_any(one.value_range)}});
-    }
-  }
+  if (chart.dates) object["dates"] = true;
   for (const Series& series : chart.series) object["series"].push_back(series_json(series));
   return object;
 }
@@ -125,17 +119,21 @@ std::string figure_html(const Json& chart, std::size_t number) {
   return html + "</figure>\n";
 }
 
-std::string script_text(Json chart, std::size_t number) {
-  chart["id"] = fmt::format("chart-{}", number);
+std::string json_in_script(const Json& json) {
   std::string safe;
-  for (const char c : chart.dump(-1, ' ', false, Json::error_handler_t::replace)) {
-    if (c == '<') {  // only texts hold it, and "</script>" must not end the element
+  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+    if (c == '<') {  // only texts contain it, and "</script>" must not end the element
       safe += "\\u003c";
     } else {
       safe += c;
     }
   }
   return safe;
+}
+
+std::string script_text(Json chart, std::size_t number) {
+  chart["id"] = fmt::format("chart-{}", number);
+  return json_in_script(chart);
 }
 
 std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most) {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,6 +14,7 @@
 #include "risley/core/error.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
+#include "risley/report/point_viewer.hpp"
 
 namespace risley::report {
 namespace {
@@ -20,77 +23,64 @@ using cloud::CloudSummary;
 using cloud::PointSample;
 using cloud::RangeClass;
 
-constexpr double kLowShare = 0.02, kHighShare = 0.98;  // where colours end
-
-/// Values as a page draws them: digits beyond a step are invisible.
-std::vector<double> stepped(const std::vector<double>& values, double scale, double step) {
-  std::vector<double> result(values.size());
-  std::transform(values.begin(), values.end(), result.begin(),
-                 [&](double value) { return std::round(scale * value / step) * step; });
-  return result;
+std::vector<float> scaled(std::vector<float> values, double scale) {
+  for (float& one : values) one = static_cast<float>(scale * one);
+  return values;
 }
 
-/// Where most values lie; nothing when none is known.
-std::optional<std::pair<double, double>> usual_range(std::vector<double> values) {
-  values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return std::isnan(v); }),
-               values.end());
-  if (values.empty()) return std::nullopt;
-  std::sort(values.begin(), values.end());
-  const auto at = [&](double share) {
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+std::vector<float> sigma_mm(const PointSample& sample) {
+  return scaled(sample.total_sigma, kMillimetres);
+}
+
+std::vector<float> incidence_deg(const PointSample& sample) {
+  return scaled(sample.incidence, degrees_from_radians(1.0));
+}
+
+/// The result in a sentence or two.
+std::string cloud_words(const CloudSummary& cloud) {
+  std::string words = fmt::format("{} points", count_text(cloud.points));
+  if (!cloud.sample->total_sigma.empty()) {
+    const RangeClass all = cloud::whole_range(*cloud.sample);
+    words += fmt::format(
+        "; standard uncertainty of a position: {} mm for half of them, {} mm for 95\u00a0%",
+        millimetres(all.median_sigma), millimetres(all.high_sigma));
+  }
+  words += ".";
+  if (!cloud.warnings.empty())
+    words +=
+        fmt::format(" With care: {} below.", cloud.warnings.size() == 1 ? "a warning" : "warnings");
+  return words;
+}
+
+PointViewer viewer_of(const CloudSummary& cloud) {
+  const PointSample& sample = *cloud.sample;
+  PointsToView view{sample.frame.axes, sample.frame.offset, sample.x, sample.y, sample.z};
+  const auto add = [&](std::optional<PointColouring> colouring) {
+    if (colouring) view.colourings.push_back(std::move(*colouring));
   };
-  const double low = at(kLowShare), high = at(kHighShare);
-  return std::pair{low, high > low ? high : low + 1};
-}
-
-std::vector<double> sigma_mm(const PointSample& sample) {
-  return stepped(sample.total_sigma, kMillimetres, 0.01);
-}
-
-std::vector<double> incidence_deg(const PointSample& sample) {
-  return stepped(sample.incidence, degrees_from_radians(1.0), 0.1);
-}
-
-Chart points_chart(const PointSample& sample) {
-  const auto label = [&](std::size_t axis) {
-    const double offset = sample.frame.offset[axis];
-    return offset == 0 ? fmt::format("{}, m", sample.frame.axes[axis])
-                       : fmt::format("{} − {:.0f} m, m", sample.frame.axes[axis], offset);
-  };
-  Series points{"", "a", SeriesKind::points, stepped(sample.x, 1, 1e-3),
-                stepped(sample.y, 1, 1e-3)};
-  points.z = stepped(sample.z, 1, 1e-3);
-  Chart chart{"The points", label(0), label(1), {}, "", ChartKind::space};
-  chart.z_label = label(2);
-  chart.note = fmt::format("{} The colours leave out the lowest and the highest 2 % of the values.",
-                           sample.size() == sample.points
-                               ? fmt::format("All {} points are drawn.", count_text(sample.points))
-                               : fmt::format("{1} of the {0} points are drawn, chosen at random.",
-                                             count_text(sample.points), count_text(sample.size())));
-  std::vector<Colouring>& colourings = chart.colourings.emplace();
-  const auto add = [&](std::string name, std::vector<double> values) {
-    if (values.empty()) return;
-    auto range = usual_range(values);
-    if (range) colourings.push_back({std::move(name), std::move(values), range});
-  };
-  add("standard uncertainty of the position, mm", sigma_mm(sample));
-  add(chart.z_label, points.z);
-  add("intensity", std::vector<double>(sample.intensity.begin(), sample.intensity.end()));
-  add("angle of incidence, deg", incidence_deg(sample));
-  chart.series.push_back(std::move(points));
-  return chart;
+  add(usual_colouring("standard uncertainty of the position, mm", sigma_mm(sample)));
+  view.height_at = view.colourings.size();
+  add(colouring_between(
+      "intensity", std::vector<float>(sample.intensity.begin(), sample.intensity.end()), {0, 254}));
+  add(usual_colouring("angle of incidence, deg", incidence_deg(sample)));
+  view.words = cloud_words(cloud);
+  view.note = sample.size() == sample.points
+                  ? fmt::format("All {} points are here.", count_text(sample.points))
+                  : fmt::format("{1} of the {0} points are here, chosen at random.",
+                                count_text(sample.points), count_text(sample.size()));
+  return PointViewer(view);
 }
 
 /// @param x  of every point of the sample
 Chart sigma_chart(const PointSample& sample, std::string title, std::string x_label,
-                  const std::vector<double>& x) {
+                  const std::vector<float>& x) {
   constexpr std::size_t kMostDots = 6000;
-  const std::vector<double> sigma = sigma_mm(sample);
+  const auto stepped = [](double value, double step) { return std::round(value / step) * step; };
   Series dots{"", "a", SeriesKind::points, {}, {}};
   for (const std::size_t row : every_nth(sample.size(), kMostDots)) {
     if (std::isnan(x[row])) continue;
-    dots.x.push_back(x[row]);
-    dots.y.push_back(sigma[row]);
+    dots.x.push_back(stepped(x[row], 0.01));
+    dots.y.push_back(stepped(kMillimetres * sample.total_sigma[row], 0.01));
   }
   return {std::move(title),
           std::move(x_label),
@@ -123,8 +113,7 @@ std::string uncertainty_html(const PointSample& sample, Figures& figures) {
          "square root of the sum of the variances of the three coordinates. It includes the noise "
          "of the ranges and rotation angles, the width of the beam, and the uncertainty of the "
          "calibration and, if the sensor moves, of its mount and trajectory.</p>\n" +
-         charts_html({sigma_chart(sample, "Uncertainty against range", "range, m",
-                                  stepped(sample.range, 1, 1e-3)),
+         charts_html({sigma_chart(sample, "Uncertainty against range", "range, m", sample.range),
                       sigma_chart(sample, "Uncertainty against the angle of incidence",
                                   "angle of incidence, deg", incidence_deg(sample))},
                      figures);
@@ -139,11 +128,11 @@ std::string counts_html(const CloudSummary& cloud) {
   return "<div class=\"wide\"><table><thead><tr><th></th><th>observations</th>"
          "<th class=\"text\">why</th></tr></thead><tbody>\n" +
          row("points", cloud.points, "in the cloud") +
-         row("without return", cloud.no_return, "sky, glass or water: nothing came back") +
+         row("without return", cloud.no_return, "sky, glass or water: no return") +
          row("outliers", cloud.outliers,
              "the reported direction contradicts the motion of the rotors") +
          row("without rotation angles", cloud.without_rotation_angle,
-             "the motion of the rotors was not found at that time") +
+             "no rotor motion found for that time") +
          row("without pose", cloud.without_pose, "the trajectory does not cover that time") +
          row("all", cloud.observations, "of the recording") + "</tbody></table></div>\n";
 }
@@ -164,10 +153,10 @@ std::vector<KeyNumber> key_numbers(const CloudSummary& cloud) {
 std::string cloud_page(const CloudSummary& cloud, const std::string& recording,
                        const jobs::Provenance& provenance) {
   if (!cloud.sample || cloud.sample->size() == 0) {
-    throw InvalidArgument("a page of a cloud needs a sample of its points, and there is none");
+    throw InvalidArgument("a cloud's page needs a sample of its points, and there is none");
   }
   Figures figures;
-  std::string head = overview_html(key_numbers(cloud), {points_chart(*cloud.sample)}, figures);
+  std::string head = overview_html(key_numbers(cloud), std::vector<Chart>{}, figures);
   if (!cloud.warnings.empty()) {
     std::vector<std::string> texts;
     std::ranges::transform(cloud.warnings, std::back_inserter(texts), warning_text);
@@ -177,10 +166,11 @@ std::string cloud_page(const CloudSummary& cloud, const std::string& recording,
   Sections sections;
   sections.add("Uncertainty of the points", uncertainty_html(*cloud.sample, figures),
                Sections::Shown::unfolded);
-  sections.add("What is not in the cloud", counts_html(cloud));
+  sections.add("Shots without a point in the cloud", counts_html(cloud));
   sections.add(kHowToRepeat, provenance_html(provenance));
+  const PointViewer viewer = viewer_of(cloud);
   return page_html("Point cloud: " + recording, fmt::format("Coordinates are {}.", cloud.frame),
-                   head, sections, figures);
+                   head, sections, figures, &viewer);
 }
 
 }  // namespace risley::report

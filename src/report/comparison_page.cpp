@@ -30,7 +30,7 @@ std::vector<KeyNumber> key_numbers(const PointingError& beams) {
           {angle_with_sigma(beams.errors.gauge, beams.gauge_sigma),
            "of that is a rotation of all beams together"},
           {angle_with_sigma(beams.errors.shape, beams.shape_sigma),
-           "of that is the beams against each other: their shape"}};
+           "of that is between the beams: their shape"}};
 }
 
 /// Results of one converged run look alike on every page.
@@ -99,17 +99,18 @@ std::string parameters_html(const ResultComparison& c, const ComparedResult& a,
                           plain_text(units.factor * one.difference, 4));
     }
   }
-  return html +
-         fmt::format(
-             "</tbody></table></div>\n<p class=\"note\">{} The two results count as independent. "
-             "Differences beyond {:g} standard uncertainties stand out. Parameters may differ "
-             "together in ways that leave the directions unchanged: what matters is how much the "
-             "directions differ.</p>\n",
-             c.held_alike ? "Both results are of one unit and held the same parameters at the "
-                            "same values: any error of these is common to both, and the standard "
-                            "uncertainties leave it out."
-                          : "Standard uncertainties include that of the parameters that were held.",
-             kFarOff);
+  return html + fmt::format(
+                    "</tbody></table></div>\n<p class=\"note\">{} The two results are treated as "
+                    "independent. "
+                    "Differences beyond {:g} standard uncertainties stand out. Parameters may "
+                    "change together in ways that leave the directions unchanged, so judge by the "
+                    "difference in direction.</p>\n",
+                    c.held_alike
+                        ? "Both results are from one unit and held the same parameters at the same "
+                          "values: any error of these is common to both, so the standard "
+                          "uncertainties exclude it."
+                        : "Standard uncertainties include the uncertainty of the held parameters.",
+                    kFarOff);
 }
 
 std::string directions_html(const PointingError& beams) {
@@ -128,8 +129,8 @@ std::string directions_html(const PointingError& beams) {
   const Vector3<double>& turn = beams.errors.rotation;
   return html +
          fmt::format(
-             "</tbody></table>\n<p class=\"note\">The direction of a beam by the first result "
-             "against that by the second, over all rotation angles of the prisms. The shared "
+             "</tbody></table>\n<p class=\"note\">The direction of a beam according to the first "
+             "result minus that of the second, over all rotation angles of the prisms. The shared "
              "rotation has a roll of {}°, a pitch of {}° and a yaw of {}°.</p>\n",
              plain_text(degrees_from_radians(turn.x), 3),
              plain_text(degrees_from_radians(turn.y), 3),
@@ -141,7 +142,7 @@ Chart differences_chart(const ResultComparison& c) {
               "parameter, in the order of the table",
               "difference, sigmas",
               {},
-              "Parameters that both results held are left out."};
+              "Parameters held in both results are omitted."};
   Series bars{"", "a", SeriesKind::points, {}, {}};
   for (std::size_t i = 0; i < c.parameters.size(); ++i) {
     if (!is_sigma(c.parameters[i].sigma)) continue;

@@ -62,7 +62,7 @@ Chart strips_of(const PointDistributionSummary& d) {
               "x (east), m",
               "y (north), m",
               {std::move(squares)},
-              "Ground that only one strip sees says nothing about the mount.",
+              "Ground that only one strip covers carries no information about the mount.",
               ChartKind::ground};
   chart.value_label = "strips";
   return chart;
@@ -138,8 +138,8 @@ std::string swaths_html(const PointDistributionSummary& d) {
   }
   return html +
          fmt::format(
-             "</tbody></table></div>\n<p class=\"note\">R: half the swath that the sensor of a "
-             "level platform reaches. Dense: width about the middle with at least half the "
+             "</tbody></table></div>\n<p class=\"note\">R: half the swath width with a level "
+             "platform. Dense: width about the middle with at least half the "
              "density. In the middle: a stripe of 1 m. Variation: standard deviation of the counts "
              "in squares of {:g} m within 0.9 R, over their mean. Squares with a point: of twice "
              "the spacing, within 0.95 R; at least 90 % where points are spread evenly (USGS Lidar "
@@ -166,8 +166,8 @@ std::string distribution_page(const PointDistributionSummary& distribution,
   sections.add("Strip by strip", swaths_html(distribution));
   sections.add(kHowToRepeat, provenance_html(provenance));
   return page_html("Points on the ground: " + flight,
-                   "How densely and how evenly the points of a flight lie on the ground.", head,
-                   sections, figures);
+                   "Density and uniformity of a flight's points on the ground.", head, sections,
+                   figures);
 }
 
 }  // namespace risley::report

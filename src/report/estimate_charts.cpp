@@ -32,7 +32,7 @@ std::string colour_of(std::size_t rotor) {
   return std::string(1, prism_letter(static_cast<int>(rotor)));
 }
 
-/// The values an estimation started from by name, in the estimate's speed combination and the units
+/// The starting values of an estimation by name, in the estimate's speed combination and the units
 /// of files; none for angles.
 Json nominal_json(const EstimatedRecording& found) {
   const Estimate& e = found.estimate;
@@ -230,7 +230,7 @@ class EstimateCharts {
       used.x.push_back(shot_time(i));
       used.y.push_back(degrees_from_radians(residual[i]));
     }
-    // Outliers are few and matter: each is drawn as long as that is possible.
+    // Outliers are few and important: each is drawn as far as possible.
     std::vector<std::size_t> rows;
     for (std::size_t i = 0; i < shots; ++i) {
       if (input_.estimate.outlier[i] != 0 && std::isfinite(residual[i])) rows.push_back(i);
@@ -265,7 +265,7 @@ class EstimateCharts {
     const auto add = [&](const char* what, const std::vector<double>& mean, double noise) {
       Series cells{"", "ink", SeriesKind::cells, {}, {}};
       cells.cell_width = cells.cell_height = degrees_from_radians(map.cell);
-      double largest = 3.0 * degrees_from_radians(noise);  // a map of noise alone should look calm
+      double largest = 3.0 * degrees_from_radians(noise);  // a map of pure noise should look calm
       for (std::size_t i = 0; i < map.size(); ++i) {
         if (static_cast<double>(map.count[i]) < plane.fewest_shots) continue;
         cells.x.push_back(degrees_from_radians(map.x[i]));
@@ -279,7 +279,7 @@ class EstimateCharts {
           y_label,
           {cells},
           fmt::format("Means of all {} used shots over cells of {:.3g}°; cells with fewer than {} "
-                      "shots are left out. Red: observed above estimated, blue: below. Noise "
+                      "shots are omitted. Red: observed above estimated, blue: below. Noise "
                       "alone leaves about {}° in a cell.",
                       count_text(map.shots), degrees_from_radians(map.cell), plane.fewest_shots,
                       finite_text("{:.2g}", degrees_from_radians(noise)))};

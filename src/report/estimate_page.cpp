@@ -18,7 +18,7 @@ namespace {
 
 using json::Json;
 
-/// What is known of the noise, in sentences; ends with a space.
+/// Description of the noise, in sentences; ends with a space.
 std::string noise_words(const View& r) {
   const View noise = r["noise"];
   if (noise["held"].flag()) {
@@ -26,8 +26,8 @@ std::string noise_words(const View& r) {
                        plain_text(r["residuals"]["expected_rms_deg"].number(), 3));
   }
   return fmt::format(
-      "Apart from rounding, the directions have a noise of {} in azimuth and {} in zenith, found "
-      "in the data; a healthy unit of this kind has {}°. ",
+      "Apart from rounding, the noise of the directions is {} in azimuth and {} in zenith, "
+      "estimated from the data; a healthy unit of this kind has {}°. ",
       angle_text(noise["azimuth_deg"]), angle_text(noise["zenith_deg"]),
       plain_text(r["page"]["usual_noise_deg"].number(), 3));
 }
@@ -40,12 +40,12 @@ Verdict estimate_verdict(const View& r) {
   Verdict verdict = verdict_of(r);
   verdict.facts = fmt::format(
       "The residuals are {}° in azimuth and {}° in zenith (root mean square). {}{} of {} shots "
-      "were left out as outliers.",
+      "were rejected as outliers.",
       finite_text("{:.3g}", residual_rms(r, "azimuth_deg")),
       finite_text("{:.3g}", residual_rms(r, "zenith_deg")), noise_words(r),
       count_text(r["outliers"].count()), count_text(r["observations_used"].count()));
   verdict.mend = fmt::format(
-      "check that {} is the instrument that made the recording, that its times are right, and "
+      "check that {} is the instrument that made the recording, that its times are correct, and "
       "whether the elevation in the file has the opposite sign ({} yes); a longer recording, or {} "
       "full, gives the estimate more data",
       name_of(kSetting.sensor), name_of(kSetting.mirror), name_of(kSetting.rate));
@@ -63,9 +63,9 @@ std::vector<KeyNumber> estimate_numbers(const View& r) {
           "residuals of the directions in azimuth and zenith, root mean square: at most ")};
   const View noise = r["noise"];
   if (!noise["held"].flag()) {
-    numbers.push_back(add(noise["azimuth_deg"]["value"].number(),
-                          noise["zenith_deg"]["value"].number(),
-                          "noise found in the directions, one standard deviation: at most "));
+    numbers.push_back(
+        add(noise["azimuth_deg"]["value"].number(), noise["zenith_deg"]["value"].number(),
+            "noise of the directions, estimated from the data, one standard deviation: at most "));
   }
   numbers.push_back(
       {count_text(r["observations_used"].count()),
@@ -80,7 +80,7 @@ std::string estimate_subject(const View& r) {
       recording["name"].text(), recording["format"].text(),
       count_text(recording["observations"].count()),
       finite_text("{:.4g}", recording["duration_s"].number()),
-      count_text(r["observations_used"].count()), r["preset"].text(), shape_of(r).prisms);
+      count_text(r["observations_used"].count()), r["preset"].text(), shape_of(r).prisms.elements);
   if (r.has("combination")) {
     text += r["combination"].count() == 1 ? "; speed combination 1, the slow rotor first"
                                           : "; speed combination 2, the fast rotor first";
@@ -146,12 +146,13 @@ std::string estimate_parameters_html(const View& r) {
   html += fmt::format(
       "</tbody></table></div>\n<p class=\"note\">σ is one standard deviation. {}Angular velocities "
       "are means over the recording, rotation angles are those at the first used shot.</p>\n",
-      any_held ? "It includes the uncertainty of the parameters that were held; the second σ "
-                 "leaves that out and is for comparing recordings of one unit. "
+      any_held ? "It includes the uncertainty of the held parameters; the second σ excludes it, "
+                 "for comparing recordings of one unit. "
                : "");
   if (truth) {
     html += fmt::format(
-        "<p>Against the truth: the rotation angles are off by {} (root mean square). The squared "
+        "<p>Compared with the truth, the rotation angles are off by {} (root mean square). The "
+        "squared "
         "errors are {:.3g} times (parameters) and {:.3g} times (rotation angles) what the stated "
         "sigmas predict; near 1 the sigmas are right, far above 1 they are too small.</p>\n",
         by_prism_words(r["truth"]["rotation_angle_rmse_deg"], "{:.3g}", "°"),
@@ -216,13 +217,14 @@ std::string moments_html(const View& r) {
          row("zenith", r["residuals"]["zenith_deg"]) +
          fmt::format(
              "</tbody></table></div>\n<p class=\"note\">Residual: observed minus estimated. At "
-             "{:.0f} m: how far the root mean square moves a point there, at most. Outliers are "
-             "left out of this table, of the histograms and of the maps. Skewness and excess "
+             "{:.0f} m: the largest displacement of a point there that the root mean square "
+             "causes. This table, the histograms and the maps exclude outliers. Skewness and "
+             "excess "
              "kurtosis of a normal distribution are 0.</p>\n",
              kStatedDistance);
 }
 
-/// What the residuals did to the sigmas, and whether they hang on a prism's angle.
+/// Effect of the residuals on the sigmas, and their dependence on a prism's angle.
 std::string variance_html(const View& r) {
   const View residuals = r["residuals"];
   return fmt::format(
@@ -234,6 +236,36 @@ std::string variance_html(const View& r) {
       residuals["unit_variance"].number(), residuals["autocorrelation_factor"].number(),
       residuals["variance_factor"].number(),
       by_prism_words(r["residuals_over_angle_chi2_per_bin"], "{:.2f}", ""));
+}
+
+/// Inputs for programs of lidar odometry.
+std::string noise_model_html(const View& r) {
+  if (!r.has("noise_model")) return {};
+  const View model = r["noise_model"], shared = r["noise_model"]["shared"];
+  const auto number = [](const View& value) { return finite_text("{:.3g}", value.number()); };
+  const auto known = [&](const char* key, const char* unit, const char* source) {
+    return shared.has(key) ? fmt::format("{}{} ({})", number(shared[key]), unit,
+                                         escape_html(shared[source].text()))
+                           : std::string("not known");
+  };
+  std::string html = fmt::format(
+      "<p>One standard deviation of single points, rounding included: {} m in range ({}), and {}° "
+      "in "
+      "direction along either axis across the beam ({}° in azimuth, {}° in zenith); together a "
+      "variance of {} m² at {} m. All points share further errors, which do not average out: in "
+      "direction {}, in range {}.</p>\n<div class=\"wide\"><table><thead><tr><th>program</th>"
+      "<th>setting</th><th>value</th></tr></thead><tbody>\n",
+      number(model["range_m"]), escape_html(model["range_source"].text()),
+      number(model["direction_deg"]), number(model["azimuth_deg"]), number(model["zenith_deg"]),
+      number(model["point_variance_m2"]), number(model["range_distance_m"]),
+      known("direction_deg", "°", "direction_source"), known("range_m", " m", "range_source"));
+  for (const auto& [program, settings] : model["settings"].entries()) {
+    for (const auto& [name, value] : settings.entries()) {
+      html += fmt::format("<tr><th>{}</th><td>{}</td><td>{}</td></tr>\n", escape_html(program),
+                          escape_html(name), number(value));
+    }
+  }
+  return html + "</tbody></table></div>\n";
 }
 
 }  // namespace
@@ -251,6 +283,7 @@ std::string estimate_page(const View& r) {
   sections.add("Rotors", charts_html(charts["rotors"].json(), figures));
   sections.add("Residuals",
                moments_html(r) + variance_html(r) + charts_html(residuals, figures, 1));
+  sections.add("Numbers for lidar odometry", noise_model_html(r));
   sections.add("Scan pattern", charts_html(charts["pattern"].json(), figures));
   add_end(sections, r);
   return page_html("risley estimate" + title_of(r), estimate_subject(r), head, sections, figures);

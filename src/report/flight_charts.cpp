@@ -35,7 +35,7 @@ constexpr double kShownPart = 0.95;       // of the values of a map between the 
 constexpr double kLeastShown = 1e-4;      // m
 constexpr std::array<const char*, 5> kStripColours = {"a", "b", "c", "d", "bad"};
 
-/// How the correction of one error of the trajectory is drawn.
+/// Display of the correction of one error of the trajectory.
 struct DrawnCorrection {
   trajectories::PoseError error;
   const char *title, *label;
@@ -54,7 +54,7 @@ constexpr std::array<DrawnCorrection, trajectories::kPoseErrors> kDrawnCorrectio
      -kDegreesPerRadian},
 }};
 
-/// Row of the corrections that belongs to an error.
+/// Row of the corrections for an error.
 Eigen::Index row_of(trajectories::PoseError error) {
   int row = 0;
   while (calibration::error_of(row) != error) ++row;
@@ -67,7 +67,7 @@ double nominal_of(const sensors::Sensor& nominal, const std::string& name, std::
   return place < FlightUnknowns::parameter(0) ? kUnknown : nominal.get(name);
 }
 
-/// What the unknown truly was; a boresight after the mount as it was given.
+/// True value of the unknown; a boresight relative to the given mount.
 double true_value(const CalibratedFlight& input, const std::string& name, std::size_t unknown) {
   const jobs::FlightTruth& truth = *input.truth;
   const auto place = static_cast<int>(unknown);
@@ -100,7 +100,7 @@ double median_spacing(const TrajectoryKnots& knots) {
 
 std::string strip_name(std::size_t strip) { return fmt::format("strip {}", strip + 1); }
 
-/// Size that most of the values stay below, not 0.
+/// A size that most of the values do not exceed, not 0.
 double shown_size(std::vector<double> values) {
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
   if (values.empty()) return kLeastShown;
@@ -168,7 +168,7 @@ class FlightCharts {
         " Slopes in many directions reveal shifts of strips and a rotation about the vertical.";
     charts.push_back(std::move(slope));
     Chart strips = map("How many strips saw it", g.east, g.north, g.strips, "strips");
-    strips.note += " Only ground that two or more strips saw is used.";
+    strips.note += " Only ground that two or more strips cover is used.";
     charts.push_back(std::move(strips));
     return charts;
   }
@@ -250,15 +250,15 @@ class FlightCharts {
       add_break(above, above.x.back());
       above.x.insert(above.x.end(), below.x.begin(), below.x.end());
       above.y.insert(above.y.end(), below.y.begin(), below.y.end());
-      charts.push_back({drawn.title,
-                        "time, s",
-                        drawn.label,
-                        {above, value},
-                        kept.size() == knots.size()
-                            ? fmt::format("All {} knots are drawn.", count_text(knots.size()))
-                            : fmt::format("One in {1} of the {0} knots is drawn, and the ends of "
-                                          "strips.",
-                                          count_text(knots.size()), stride)});
+      charts.push_back(
+          {drawn.title,
+           "time, s",
+           drawn.label,
+           {above, value},
+           kept.size() == knots.size()
+               ? fmt::format("All {} knots are drawn.", count_text(knots.size()))
+               : fmt::format("One in {1} of the {0} knots is drawn, and the ends of strips.",
+                             count_text(knots.size()), stride)});
     }
     return charts;
   }
@@ -274,7 +274,7 @@ class FlightCharts {
     return values;
   }
 
-  /// Strip of a time since the first shot; that before it in a turn.
+  /// Strip at a time since the first shot; in a turn the previous one.
   std::size_t strip_at(double time) const {
     const TrajectoryKnots& knots = c_.model.knots;
     if (knots.size() == 0) return 0;
@@ -308,9 +308,9 @@ class FlightCharts {
     return chart;
   }
 
-  /// Before and after in the same colours, and after in colours of its own; on the same squares
-  /// where there are any.
-  void add_differences(std::vector<Chart>& charts, const std::string& who,
+  /// Before and after in the same colours, and after with a separate colour scale; on the same
+  /// squares if there are any.
+  void add_differences(std::vector<Chart>& charts, const std::string& name,
                        const std::vector<double>& east, const std::vector<double>& north,
                        std::vector<double> before, std::vector<double> after, bool signs) const {
     const auto known = [&](std::size_t i) { return std::isfinite(before[i] + after[i]); };
@@ -323,17 +323,19 @@ class FlightCharts {
     const double coarse = std::max(fine, kMillimetres * shown_size(before));
     const auto add = [&](const char* when, const std::vector<double>& values, double size,
                          const char* colours) {
-      Chart chart = map(fmt::format("{}, {}", who, when), east, north, scaled(values, kMillimetres),
-                        signs ? "difference, mm" : "RMS difference, mm");
+      Chart chart =
+          map(fmt::format("{}, {}", name, when), east, north, scaled(values, kMillimetres),
+              signs ? "difference, mm" : "RMS difference, mm");
       if (signs) chart.note += " Red: the first strip named lies above the other, blue: below.";
       chart.note += colours;
       chart.palette = signs ? Palette::diverging : Palette::sequential;
       chart.value_range = {signs ? -size : 0.0, size};
       charts.push_back(std::move(chart));
     };
-    add("before", before, coarse, " One square in twenty is beyond the ends of the colours.");
+    add("before", before, coarse, " One square in twenty exceeds the range of the colours.");
     add("after", after, coarse, " The same colours as before.");
-    add("after, finer colours", after, fine, " The same differences in colours of their own.");
+    add("after, finer colours", after, fine,
+        " The same differences, each with its own colour scale.");
   }
 
   const FlightCalibration& c_;

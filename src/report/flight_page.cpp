@@ -45,7 +45,7 @@ std::string angle_text(double angle) {
 
 double datum_of(const View& r, const char* key) { return r["datum"][key].number(); }
 
-/// What directions are known to, at the height flown.
+/// Accuracy of directions, at the flying height.
 std::string total_on_ground(const View& r) {
   return offset_text(radians_from_degrees(datum_of(r, "sigma_total_deg")), datum_of(r, "height_m"));
 }
@@ -65,7 +65,7 @@ double rms_of(const View& r, const char* when) { return r["strips"][when]["rms_m
 
 std::string poor_rotation_html(const View& r) {
   return fmt::format(
-      "<p><b>The directions of the beams are poorly known:</b> the rotation that all beams share "
+      "<p><b>The directions of the beams are poorly known:</b> the rotation common to all beams "
       "has a sigma of {}°, {}° and {}° about the sensor's X, Y and Z, and more than {:.2g}° "
       "together is poor. Flights that help:</p>{}",
       angle_text(datum_of(r, "sigma_x_deg")), angle_text(datum_of(r, "sigma_y_deg")),
@@ -84,11 +84,11 @@ Verdict flight_verdict(const View& r) {
           ? "Nothing was adjusted."
           : fmt::format(
                 "The strips, straight stretches of the flight, lie {} mm apart before and {} mm "
-                "after the calibration (root mean square over {} of them and all ground that they "
-                "share). The boresight, the sensor's actual rotation against the mount as "
+                "after the calibration (root mean square over {} of them and all common ground). "
+                "The boresight, the sensor's actual rotation against the mount as "
                 "designed, is X {}, Y {}, Z {} about the sensor's axes. Boresight and prisms "
-                "together give the directions of the beams to {}, root mean square over the field "
-                "of view.",
+                "together determine the directions of the beams to {}, root mean square over the "
+                "field of view.",
                 millimetres(rms_of(r, "before")), millimetres(rms_of(r, "after")),
                 pairs == 1 ? "one pair" : fmt::format("{} pairs", pairs),
                 boresight_text(r, "boresight_x_deg"), boresight_text(r, "boresight_y_deg"),
@@ -96,18 +96,18 @@ Verdict flight_verdict(const View& r) {
                 fmt::format("{}° ({})", angle_text(datum_of(r, "sigma_total_deg")),
                             total_on_ground(r)));
   verdict.mend = fmt::format(
-      "check in the differences between strips below that overlapping strips are of one flight; "
+      "check in the differences between strips below that overlapping strips are from one flight; "
       "check the axes of the mount, and that recording and trajectory use the same time; give "
-      "larger sigmas to what the mount states too precisely; and hold parameters that this flight "
-      "does not determine ({})",
+      "larger sigmas to mount values that are stated too precisely; and hold parameters that this "
+      "flight does not determine ({})",
       name_of(kSetting.fix));
   if (!verdict.converged) return verdict;
   const double rotation = radians_from_degrees(datum_of(r, "sigma_rotation_deg"));
   if (!(rotation <= calibration::kPoorDatum)) verdict.care_html = poor_rotation_html(r);
   if (!(rms_of(r, "after") < rms_of(r, "before"))) {
     verdict.care_html +=
-        "<p><b>The strips fit no better than before.</b> What was given may be as good as what "
-        "was found.</p>";
+        "<p><b>The strips fit no better than before.</b> The given values may be as good as the "
+        "adjusted ones.</p>";
   }
   return verdict;
 }
@@ -119,7 +119,7 @@ std::string flight_subject(const View& r) {
       "preset {}",
       names, names.empty() ? "" : ": ", r["strips"]["count"].count(),
       count_text(r["shots"]["on_strips"].count()), count_text(r["shots"]["used"].count()),
-      r["preset"].text(), serial.empty() ? "" : " " + serial, shape_of(r).prisms,
+      r["preset"].text(), serial.empty() ? "" : " " + serial, shape_of(r).prisms.elements,
       r["preset"].text());
   const std::string& mount = r["page"]["mount"]["name"].text();
   if (!mount.empty()) text += fmt::format(", on {}", mount);
@@ -127,7 +127,7 @@ std::string flight_subject(const View& r) {
 }
 
 std::vector<KeyNumber> flight_numbers(const View& r) {
-  if (r["unknowns"].size() == 0) return {};
+  if (r["unknowns"].size() == 0 || !r["converged"].flag()) return {};
   return {{fmt::format("{} mm", millimetres(rms_of(r, "after"))),
            fmt::format("between strips after the calibration, {} mm before",
                        millimetres(rms_of(r, "before")))},
@@ -235,20 +235,19 @@ std::string mount_html(const View& r) {
       reference.empty() ? "not named by the mount" : escape_html(reference));
   html += unknowns_table(r, false);
   return html +
-         "<p class=\"note\">σ is one standard deviation, everything included. Before: what was "
-         "given, with its σ. Share of σ before: (σ / σ before)², 100 % where the flight "
-         "determines nothing. Most correlated with: the unknown with the largest correlation, "
-         "which is in brackets, from ±0.1 on; near ±1 only the sum or the difference of the two "
-         "is well known. Lever arm: from the trajectory's reference point to the sensor, along "
+         "<p class=\"note\">σ is one standard deviation, all error sources included. Before: the "
+         "given values, with their σ. Share of σ before: (σ / σ before)², 100 % where the flight "
+         "determines nothing. Most correlated with: the unknown with the largest correlation (in "
+         "brackets), if at least ±0.1; near ±1 only the sum or the difference of the two is well "
+         "known. Lever arm: from the trajectory's reference point to the sensor, along "
          "the body's axes.</p>\n";
 }
 
 std::string prisms_html(const View& r) {
   return unknowns_table(r, true) +
-         "<p class=\"note\">Nominal: the preset. A pitch or yaw that all beams share can hardly "
-         "be separated from the boresight, so single angles may be known less well than the "
-         "directions "
-         "of the beams.</p>\n";
+         "<p class=\"note\">Nominal: the preset. A pitch or yaw common to all beams can hardly be "
+         "separated from the boresight, so single angles may be known less well than the "
+         "directions of the beams.</p>\n";
 }
 
 std::string datum_row(const char* name, double height, double total, double rotation, double shape,
@@ -287,24 +286,24 @@ std::string directions_html(const View& r) {
   }
   return html + fmt::format(
                     "</tbody></table></div>\n<p class=\"note\">Boresight and prisms together, root "
-                    "mean square over the field of view: the rotation that all beams share, about "
+                    "mean square over the field of view: the rotation common to all beams, about "
                     "the sensor's axes, and the shape, which no rotation explains. {} m is the "
                     "median range of the flight.</p>\n",
                     finite_text("{:.0f}", height));
 }
 
-/// What an undetermined combination means for a flight.
+/// Meaning of an undetermined combination for a flight.
 std::string advice_of(const Axes& axes, const std::string& combination) {
   const auto has = [&](std::string_view name) {
     return combination.find(name) != std::string::npos;
   };
   if (has("of the trajectory")) {
-    return "Only their sum is known. Points of this flight are not affected; on another flight "
+    return "Only their sum is known. This does not affect points of this flight; on another flight "
            "the boresight may be off by as much as the trajectory was on this one.";
   }
   if (has("lever_arm") && has("clock_offset")) {
-    return "At one speed, a sensor that sits further ahead and one whose clock is late look the "
-           "same. Strips at two speeds separate them.";
+    return "At a single speed, a sensor further ahead and a late clock have the same effect. "
+           "Strips at two speeds separate them.";
   }
   if (has("lever_arm_z") && has("range_offset")) {
     return "Both raise or lower all ground. Points of known height determine them.";
@@ -328,14 +327,15 @@ std::string advice_of(const Axes& axes, const std::string& combination) {
 }
 
 std::string not_told_html(const View& r) {
+  if (!r["converged"].flag()) return "<p>The adjustment did not converge.</p>\n";
   if (r["not_told"].size() == 0) {
-    return r["unknowns"].size() == 0 ? "<p>Nothing was adjusted.</p>\n"
-                                     : "<p>The flight adds to what was known of every free "
-                                       "unknown.</p>\n";
+    return r["unknowns"].size() == 0
+               ? "<p>Nothing was adjusted.</p>\n"
+               : "<p>The flight improves on the prior knowledge of every free unknown.</p>\n";
   }
   std::string html =
-      "<p>The flight says less about these than was known before, so what was given decides "
-      "(numbers are in units of the σ before).</p>\n<ul>";
+      "<p>The flight determines these less well than the prior knowledge, so the given values "
+      "dominate (numbers are in units of the σ before).</p>\n<ul>";
   for (const View& one : r["not_told"].list()) {
     const std::string& combination = one["combination"].text();
     html += fmt::format("<li>{}: {} of the σ before remains. {}</li>",
@@ -360,8 +360,8 @@ std::string control_html(const View& r) {
         !used ? "left out" : (seen["significant"].flag() ? "contradicts the flight" : ""));
   }
   return html +
-         "</tbody></table></div>\n<p class=\"note\">Known points and planes on the ground, which "
-         "the flight is tied to. Heights are along the ground's normal.</p>\n";
+         "</tbody></table></div>\n<p class=\"note\">Known points and planes on the ground to which "
+         "the flight is tied. Heights are along the ground's normal.</p>\n";
 }
 
 std::string shift_cell(const View& pair, const char* axis) {
@@ -386,7 +386,7 @@ std::string pair_cells(const View& pair, const char* when) {
 std::string pairs_html(const View& r) {
   std::vector<View> pairs = r["strips"]["pairs"].list();
   const std::size_t all = pairs.size();
-  if (all == 0) return "<p>No two strips saw the same ground.</p>\n";
+  if (all == 0) return "<p>No two strips cover the same ground.</p>\n";
   const auto cells = [](const View& pair) {
     return pair[pair.has("after") ? "after" : "before"]["cells"].count();
   };
@@ -415,10 +415,10 @@ std::string pairs_html(const View& r) {
     html += fmt::format("The {} pairs with the most ground in common, of {}. ", pairs.size(), all);
   }
   return html +
-         "Cells: squares of ground that both strips saw. Differences are along the ground's "
-         "normals, positive where the first strip named lies above the second; the shift is what "
-         "explains most of them, with its sigma, and a dash where the ground has no slope that "
-         "would determine it. After the calibration no mean or shift should stand out.</p>\n";
+         "Cells: squares of ground that both strips cover. Differences are along the ground's "
+         "normals, positive where the first strip named lies above the second; the shift is the "
+         "one that explains most of them, with its sigma, and a dash where the ground has no slope "
+         "that would determine it. After the calibration no mean or shift should stand out.</p>\n";
 }
 
 std::string strips_html(const View& r, Figures& figures) {
@@ -440,7 +440,7 @@ std::string strips_html(const View& r, Figures& figures) {
     }
     html +=
         "</tbody></table></div>\n<p class=\"note\">Strips are numbered from 1; they begin in "
-        "seconds since the first shot, and their course is that over ground. Sway: how much roll "
+        "seconds since the first shot, and their course is over ground. Sway: how much roll "
         "and pitch vary together; an aircraft that sways reveals more.</p>\n";
   }
   html += charts_html(r["charts"]["strips"].json(), figures);
@@ -451,9 +451,9 @@ std::string shots_html(const View& r) {
   const View shots = r["shots"];
   const std::uint64_t without_pose = shots["without_pose"].count();
   std::string html = fmt::format(
-      "<p>{} of {} shots were used, on {} cells of ground. {} were left out because they lie "
+      "<p>{} of {} shots were used, on {} cells of ground. {} were rejected because they lie "
       "beyond three sigmas of their cell{}; {} cells were too rough. The other shots hit such "
-      "cells, or ground that only one strip saw.</p>\n",
+      "cells, or ground that only one strip covers.</p>\n",
       count_text(shots["used"].count()), count_text(shots["on_strips"].count()),
       count_text(r["cells"].count()), count_text(shots["outliers"].count()),
       without_pose == 0 ? ""
@@ -466,8 +466,8 @@ std::string shots_html(const View& r) {
       finite_text("{:.3g}", r["sigma0"].number()), millimetres(r["range_sigma_m"].number()));
   if (r["roughness_m"].number() > 0) {
     html += fmt::format(
-        "<p>Of that, {} mm are the ground itself, which departs from a plane within each cell; all "
-        "strips see the same, and the uncertainties account for it.</p>\n",
+        "<p>Of that, {} mm are due to the ground itself, which departs from a plane within each "
+        "cell; it is the same for all strips, and the uncertainties account for it.</p>\n",
         millimetres(r["roughness_m"].number()));
   }
   return html;
@@ -476,14 +476,17 @@ std::string shots_html(const View& r) {
 std::string corrections_html(const View& r, Figures& figures) {
   const View late = r["attitude_delay_s"];
   const NumberText text = number_text(1e3 * late["value"].number(), 1e3 * late["sigma"].number());
-  const std::string delay = fmt::format(
-      "<p>According to the strips, attitudes are late against positions by {} ± {} ms.</p>\n",
-      text.value, text.sigma);
+  const std::string delay =
+      r["converged"].flag()
+          ? fmt::format(
+                "<p>According to the strips, attitudes are {} ± {} ms later than positions.</p>\n",
+                text.value, text.sigma)
+          : std::string();
   return fmt::format(
              "<p>Position and attitude are corrected at {} knots, points in time {} s apart, and "
              "linearly between. σ is their remaining uncertainty. Corrections should be about as "
-             "large as the errors stated for the trajectory; where they jump or are larger, a "
-             "warning says so, and the uncertainties account for it.</p>\n",
+             "large as the trajectory's stated errors; where they jump or are larger, a warning "
+             "appears and the uncertainties account for it.</p>\n",
              count_text(r["knots"].count()),
              finite_text("{:.3g}", r["page"]["knot_spacing_s"].number())) +
          delay + charts_html(r["charts"]["corrections"].json(), figures);

@@ -9,19 +9,19 @@
 
 namespace risley::report {
 
-/// How pages speak of an unknown of a flight.
+/// Names of a flight's unknowns on pages.
 struct UnknownInfo {
   std::string long_name, symbol, unit;
-  double scale = 1;  ///< of a number in the unit of files to the one shown
+  double scale = 1;  ///< from a number in the unit of files to the displayed one
 };
 
-/// Whether a name is none of mount, ranges and clock.
+/// Whether a name does not belong to mount, ranges or clock.
 bool is_of_train(std::string_view name);
 
-/// A name that is neither of the mount nor of the train stands for itself.
+/// A name that belongs neither to the mount nor to the train is shown unchanged.
 UnknownInfo unknown_info(const std::string& name, TrainShape shape);
 
-/// A sentence in which names of unknowns stand as words in place of names.
+/// A sentence with names of unknowns replaced by words.
 std::string words_of_unknowns(std::string_view text, TrainShape shape);
 
 }  // namespace risley::report

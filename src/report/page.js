@@ -1,13 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Draws the diagrams that stand as JSON in the element "page-data" with Apache ECharts.
+// Draws the diagrams in the JSON of the element "page-data" with Apache ECharts.
 // window.risley.charts: [{data, chart}] of the unfolded sections once <html data-drawn="N"> is set,
 // which counts them.
 (function () {
   'use strict';
   const page = document.documentElement;
   const data = JSON.parse(document.getElementById('page-data').textContent);
-  const sequential = ['#440154', '#414487', '#2a788e', '#22a884', '#7ad151', '#fde725'];
   const margins = { left: 74, right: 24, top: 36, bottom: 52 };
   const legendHeight = 18, scaleHeight = 36, narrow = 500, narrowSpace = 700; // pixels
   const barWidth = 64; // of the colour scale
@@ -15,11 +14,11 @@
   const thinnestBox = 8; // pixels
   const leastWidth = 100; // pixels of a figure, its margins included
   const longestPause = 200; // ms
-  const growth = 10_000; // ms, of what is shown as it came
+  const growth = 10_000; // ms, duration of the animation
   let drawn = [];
 
-  // ECharts takes the height of a line from the width of this character, which is nearly nothing
-  // where no font has it.
+  // ECharts derives the height of a line from the width of this character, which is almost zero if
+  // no font has it.
   const pen = document.createElement('canvas').getContext('2d');
   echarts.setPlatformAPI({
     measureText: (text, font) => {
@@ -30,10 +29,11 @@
   });
 
   const colour = (name) => getComputedStyle(page).getPropertyValue('--' + name).trim();
+  const sequential = colour('sequential').split(' ');
   const rounded = (value, digits) =>
     value === null || value === undefined ? '–' : String(Number(Number(value).toPrecision(digits)));
   const short = (value) => rounded(value, 6);
-  // 12345 as "12 345", with spaces that do not break, as in the text of the page.
+  // 12345 as "12 345", with non-breaking spaces, as in the text of the page.
   const grouped = (value) => {
     const [whole, part] = String(value).split('.');
     return whole.replace(/(?<=\d)(?=(\d{3})+$)/g, '\u202f') + (part ? '.' + part : '');
@@ -42,12 +42,13 @@
   const least = (values) => finite(values).reduce((a, b) => Math.min(a, b), Infinity);
   const most = (values) => finite(values).reduce((a, b) => Math.max(a, b), -Infinity);
   const every = (one, key) => one.series.flatMap((series) => series[key]);
-  // Digits that distinguish values: more than six where they differ little.
+  // Digits that distinguish values: more than six if they differ little.
   const digitsOf = (values) => {
     const from = least(values), to = most(values), size = Math.max(Math.abs(from), Math.abs(to));
     if (!(to > from) || !Number.isFinite(size)) return 6;
     return Math.min(6 + Math.max(0, Math.ceil(Math.log10(size / (to - from)))), 15);
   };
+  const dateText = (time) => new Date(time).toISOString().slice(0, 10);
   // Ticks of an axis. They stand at round numbers.
   const marks = (values) => {
     const tiny = Math.max(Math.abs(least(values)), Math.abs(most(values))) < 1e-6;
@@ -58,7 +59,7 @@
       return Math.abs(round) < 1e-6 ? round.toFixed(12).replace(/0+$/, '') : String(round);
     };
   };
-  // What the numbers of the upright axis need between it and its title.
+  // Width of the upright axis's numbers between it and its title.
   const titleGap = (one) => {
     const text = marks(every(one, 'y'));
     const ends = [least(every(one, 'y')), most(every(one, 'y'))].filter(Number.isFinite);
@@ -67,13 +68,6 @@
   const leftMargin = (one) => titleGap(one) + margins.left - 52;
   const legendRow = (one) => (one.series.length > 1 ? legendHeight : 0);
   const hasValues = (one) => one.series.some((series) => series.value.length > 0);
-
-  // Points take the colours that the reader chose.
-  function colourBy(one, { label, value, value_range }) {
-    one.series[0].value = value;
-    Object.assign(one, { value_label: label, value_range: value_range });
-  }
-  for (const one of data) if (one.colourings) colourBy(one, one.colourings[0]);
 
   // ---- two dimensions ----
 
@@ -101,7 +95,7 @@
     });
   }
 
-  // Half the width and height of what a diagram shows about its places.
+  // Half the width and height of a diagram's symbols about their places.
   const halfCell = (one, key) => Math.max(...one.series.map((series) => series[key])) / 2;
 
   // All around: equal scales, and limits at round numbers.
@@ -116,7 +110,7 @@
   function cells(series) {
     return {
       type: 'custom', name: series.label, clip: true,
-      progressive: 0, // whole at once: a picture for the printer cannot wait
+      progressive: 0, // complete at once: a picture for the printer cannot wait
       encode: { x: 0, y: 1 },
       data: series.x.map((x, i) => [x, series.y[i], series.value[i]]),
       renderItem: (params, api) => {
@@ -156,13 +150,40 @@
     };
   }
 
+  // One standard deviation down and up.
+  function bars(series) {
+    const stroke = colour(series.colour), half = 3; // pixels, of the ends
+    return {
+      type: 'custom', name: series.label, clip: true, silent: true, progressive: 0,
+      encode: { x: 0, y: [1, 2] },
+      data: series.x.map((x, i) =>
+        [x, series.y[i] - series.sigma[i], series.y[i] + series.sigma[i]]),
+      renderItem: (params, api) => {
+        const [low, high] = [1, 2].map((k) => api.coord([api.value(0), api.value(k)]));
+        const line = (x1, y1, x2, y2) => ({ type: 'line', shape: { x1, y1, x2, y2 }, style: { stroke } });
+        return {
+          type: 'group',
+          children: [
+            line(low[0], low[1], low[0], high[1]),
+            ...[low, high].map(([x, y]) => line(x - half, y, x + half, y)),
+          ],
+        };
+      },
+    };
+  }
+
   function tip(one) {
     const escaped = echarts.format.encodeHTML; // names come from files
     const row = (name, value) => escaped(name) + ': <b>' + value + '</b>';
     const digits = { x: digitsOf(every(one, 'x')), y: digitsOf(every(one, 'y')) };
-    const across = (item) => row(one.x_label, rounded(item.value[0], digits.x));
+    const across = (item) =>
+      row(one.x_label, one.dates ? dateText(item.value[0]) : rounded(item.value[0], digits.x));
+    const bar = (item) => {
+      const sigma = one.series[item.seriesIndex].sigma;
+      return sigma ? ' ± ' + rounded(sigma[item.dataIndex], 2) : '';
+    };
     const text = (item) => {
-      const rows = [across(item), row(one.y_label, rounded(item.value[1], digits.y))];
+      const rows = [across(item), row(one.y_label, rounded(item.value[1], digits.y) + bar(item))];
       if (one.z_label) rows.push(row(one.z_label, short(item.value[2])));
       const value = item.value[one.z_label ? 3 : 2];
       if (one.value_label && value !== undefined) rows.push(row(one.value_label, short(value)));
@@ -181,7 +202,7 @@
     };
   }
 
-  // below: beneath the diagram, where it is too narrow for a scale beside it.
+  // below: beneath the diagram, if it is too narrow for a scale beside it.
   function colourScale(one, dimension, below) {
     const values = every(one, 'value');
     const range = one.value_range || [least(values), most(values)];
@@ -201,13 +222,14 @@
     const square = one.kind === 'map' || one.kind === 'ground';
     const scaled = hasValues(one);
     const x = axis(one.x_label, 30, every(one, 'x'));
+    if (one.dates) Object.assign(x, { type: 'time', axisLabel: { color: colour('muted'), hideOverlap: true } });
     const y = axis(one.y_label, titleGap(one), every(one, 'y'));
     if (square) {
       const limits = mapLimits(one);
       const turned = one.kind === 'map'; // as one looks out
       Object.assign(x, limits[0], { inverse: turned, position: 'bottom' });
       Object.assign(y, limits[1], { inverse: turned, position: 'left' });
-      // The ends are no round numbers.
+      // The ends are not round numbers.
       for (const one of [x, y]) Object.assign(one.axisLabel, { showMinLabel: false, showMaxLabel: false });
     }
     if (one.kind === 'panorama') {
@@ -255,7 +277,8 @@
       },
       dataZoom: [zoom('xAxisIndex'), zoom('yAxisIndex')],
       visualMap: scaled ? [colourScale(one, 2, below)] : [],
-      series: one.series.map(flatSeries),
+      series: [...one.series.map(flatSeries),
+               ...one.series.filter((series) => series.sigma).map(bars)],
     };
   }
 
@@ -373,7 +396,7 @@
     chart.setOption({ grid3D: { viewControl: { distance: view.distance * factor } } });
   }
 
-  // Reads the values of one point after another aloud.
+  // Reads the values of the points aloud, one after another.
   function step(entry, forward) {
     const series = entry.data.series[0];
     if (!series || series.x.length === 0) return;
@@ -382,7 +405,9 @@
     entry.chart.dispatchAction({ type: 'showTip', seriesIndex: 0, dataIndex: entry.point });
     const value = series.value.length > 0 ? ', ' + short(series.value[entry.point]) : '';
     document.getElementById('spoken').textContent =
-      entry.data.x_label + ' ' + rounded(series.x[entry.point], digitsOf(series.x)) + ', ' +
+      entry.data.x_label + ' ' +
+      (entry.data.dates ? dateText(series.x[entry.point])
+                        : rounded(series.x[entry.point], digitsOf(series.x))) + ', ' +
       entry.data.y_label + ' ' + rounded(series.y[entry.point], digitsOf(series.y)) + value;
   }
 
@@ -446,31 +471,32 @@
     });
   }
 
-  // again: in other colours, as it is turned or zoomed now.
+  // again: in other colours, with the current rotation and zoom.
   function draw(entry, again) {
     const one = entry.data;
     entry.below = isNarrow(entry);
     if (one.kind === 'space') {
       const option = spaceOption(one, entry.below);
-      if (again) delete option.grid3D.viewControl; // a new camera would need a frame to stand right
+      if (again) delete option.grid3D.viewControl; // a new camera would need a frame to be set up
       entry.chart.setOption(option, !again);
       return;
     }
     const limits = again ? limitsNow(entry.chart) : null;
     const boxes = entry.boxes;
-    if (boxes) setBoxes(entry, false); // or the old toolbox goes on drawing beside the new
+    if (boxes) setBoxes(entry, false); // otherwise the old toolbox would continue drawing beside
+                                       // the new one
     entry.chart.setOption(flatOption(one, entry.below), true);
     if (boxes) setBoxes(entry, true);
     if (entry.grown && !page.dataset.printing) entry.grown.show(); // paper gets all
     if (limits && limits.some(([from, to]) => to - from < 100)) show(entry.chart, limits);
   }
 
-  // What ECharts leaves open: boxes and Shift exclude each other, a box that is hardly more than a
-  // line zooms along it alone, and without Ctrl the wheel belongs to the page.
+  // Behaviour missing in ECharts: boxes and Shift exclude each other, a box that is hardly more
+  // than a line zooms only along it, and without Ctrl the wheel belongs to the page.
   function guideMouse(entry) {
     const { chart, place } = entry;
     let from = null, to = null, limits = null;
-    // Not before a mouse comes: it would draw every diagram twice.
+    // Only when a mouse arrives: it would draw every diagram twice.
     place.addEventListener('pointerenter', () => setBoxes(entry, true));
     place.addEventListener('pointerdown', (event) => {
       setBoxes(entry, !event.shiftKey);
@@ -495,8 +521,8 @@
     chart.getZr().on('dblclick', () => showAll(chart));
   }
 
-  // A button and a slider that show the points of the first series as they came. It starts slowly,
-  // so that the first turns can be followed.
+  // A button and a slider that show the points of the first series in firing order. It starts
+  // slowly, so that the first turns can be followed.
   function addGrowth(entry) {
     const { chart, data: one, place } = entry;
     const all = flatSeries(one.series[0]).data;
@@ -543,22 +569,8 @@
     entry.grown = { show };
   }
 
-  function addColourings(entry) {
-    const { data: one, place } = entry;
-    const label = document.createElement('label');
-    const choice = document.createElement('select');
-    label.className = 'colouring';
-    label.append('Coloured by ', choice);
-    choice.append(...one.colourings.map((colouring) => new Option(colouring.label)));
-    place.before(label);
-    choice.addEventListener('change', () => {
-      colourBy(one, one.colourings[choice.selectedIndex]);
-      draw(entry, true);
-    });
-  }
-
-  // Thousands of small dots are painted on the canvas on which they were painted first, unless they
-  // are said to have changed: a picture to print or to save would lack them.
+  // Thousands of small dots are painted on their first canvas, unless they are marked as changed: a
+  // picture to print or to save would lack them.
   function paintAllOnPictures(chart) {
     const { painter, storage } = chart.getZr();
     const paint = painter.getRenderedCanvas;
@@ -581,7 +593,6 @@
     draw(entry);
     if (one.kind !== 'space') guideMouse(entry);
     if (one.grows_for && one.kind !== 'space') addGrowth(entry);
-    if (one.colourings) addColourings(entry);
     place.addEventListener('keydown', (event) => onKey(event, entry));
     return entry;
   }
@@ -635,14 +646,14 @@
     redraw();
   }
 
-  // In the order of the page, whenever they were unfolded.
+  // In page order, whenever they were unfolded.
   function keep(entry) {
     drawn.push(entry);
     drawn.sort((a, b) => data.indexOf(a.data) - data.indexOf(b.data));
     if (window.risley) page.dataset.drawn = String(drawn.length);
   }
 
-  // Folded diagrams have no room; they are made when they are unfolded.
+  // Folded diagrams have no room; they are made when unfolded.
   const isFolded = ({ id }) => document.getElementById(id).closest('details:not([open])') !== null;
   const isDrawn = (one) => drawn.some((entry) => entry.data === one);
 
@@ -700,7 +711,7 @@
 
   async function start() {
     const main = document.querySelector('main');
-    // A window that is not shown yet has no room, and diagrams cannot be made without any.
+    // A window that is not visible yet has no size, and diagrams cannot be made without one.
     const hasRoom = () => main.clientWidth > leastWidth;
     if (data.length > 0 && !hasRoom()) await new Promise((done) => {
       const watch = new ResizeObserver(() => {

@@ -13,6 +13,7 @@
 #include "risley/core/text.hpp"
 #include "risley/hashes/sha256.hpp"
 #include "risley/report/html.hpp"
+#include "risley/report/point_viewer.hpp"
 
 #include "report/page_assets.hpp"
 #include "report/view.hpp"
@@ -23,20 +24,21 @@ using json::Json;
 
 namespace {
 
-/// What stands largest on a page, and its colour.
+/// The largest text of a page, and its colour.
 struct Headline {
   const char *code, *kind, *words;
 };
 
 constexpr Headline kHeadlines[] = {
-    {"consistent", "ok", "The sensor's directions agree with what it believes of its optics."},
+    {"consistent", "ok", "The sensor's directions agree with its own optical parameters."},
     {"unusual", "care", "The model describes this recording, but something about it is unusual."},
-    {"as_believed", "ok", "The sensor points where it believes."},
+    {"as_believed", "ok", "The sensor's directions are correct."},
     {"off_within_tolerance", "ok",
-     "The sensor is off, but within the tolerance; this calibration makes its clouds better."},
-    {"bent", "care", "The sensor does not point where it believes: use this calibration."},
+     "The sensor's directions are off, but within the tolerance; this calibration improves its "
+     "clouds."},
+    {"bent", "care", "The sensor's directions are wrong: use this calibration."},
     {"not_better", "bad",
-     "This calibration is no better than what the sensor believes: do not use it."},
+     "This calibration is no better than the sensor's own parameters: do not use it."},
 };
 
 /// Before anything is drawn, so that a dark page never flashes.
@@ -45,7 +47,7 @@ constexpr std::string_view kFirstScript =
     "matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';";
 
 /// ECharts GL makes functions of texts such as "[width * 1.0 / 2, height / 2]", the sizes of its
-/// textures, which a page whose policy forbids to run texts must understand itself.
+/// textures, which a page with a policy against eval must interpret itself.
 constexpr std::string_view kSizesScript = R"js(
 (function () {
   'use strict';
@@ -69,18 +71,40 @@ constexpr std::string_view kSizesScript = R"js(
 })();
 )js";
 
-/// What the browser may do with a page: run the scripts and use the style sheet that are written in
-/// it, and nothing that a name in its texts could smuggle in. Widths and colours of cells are
-/// attributes; pictures are those that diagrams save.
-std::string policy(std::string_view style, const std::vector<std::string_view>& scripts) {
-  std::string text = "default-src 'none'; script-src";
-  for (const std::string_view script : scripts) {
-    text += fmt::format(" 'sha256-{}'", hashes::sha256_base64(script));
+/// Permissions of a page in the browser: run its own scripts and use its own style sheets, and
+/// nothing that a name in its texts could smuggle in. Widths and colours of cells are attributes;
+/// pictures are those saved by diagrams.
+std::string policy(const std::vector<std::string_view>& styles,
+                   const std::vector<std::string_view>& scripts) {
+  const auto hashes_of = [](const std::vector<std::string_view>& texts) {
+    std::string all;
+    for (const std::string_view text : texts) {
+      all += fmt::format(" 'sha256-{}'", hashes::sha256_base64(text));
+    }
+    return all;
+  };
+  return fmt::format(
+      "default-src 'none'; script-src{}; style-src-elem{}; style-src-attr 'unsafe-inline'; "
+      "img-src data: blob:; base-uri 'none'; form-action 'none'",
+      hashes_of(scripts), hashes_of(styles));
+}
+
+/// Adds texts to a page, each in a separate element.
+void add_elements(std::string& page, const char* name, const std::vector<std::string_view>& texts) {
+  for (const std::string_view text : texts) {
+    page += fmt::format("<{}>", name);
+    page += text;
+    page += fmt::format("</{}>\n", name);
   }
-  return text + fmt::format(
-                    "; style-src-elem 'sha256-{}'; style-src-attr 'unsafe-inline'; "
-                    "img-src data: blob:; base-uri 'none'; form-action 'none'",
-                    hashes::sha256_base64(style));
+}
+
+/// The points of some nodes. @param first, end  numbers of the nodes
+void add_nodes(std::string& page, const PointViewer& viewer, std::size_t first, std::size_t end) {
+  for (std::size_t i = first; i < end; ++i) {
+    page += fmt::format("<script type=\"text/plain\" id=\"node-{}\">", i);
+    page += viewer.nodes()[i];
+    page += "</script>\n";
+  }
 }
 
 }  // namespace
@@ -233,8 +257,7 @@ std::string charts_html(const Json& charts, Figures& figures, std::size_t first)
   };
   std::string html;
   for (std::size_t last = first; first < charts.size(); first = last) {
-    // Rows of one height: square diagrams stand among their own, three in a row if that leaves none
-    // over.
+    // Rows of one height: square diagrams are grouped, three in a row if that leaves none over.
     while (last < charts.size() && is_square(charts[last]) == is_square(charts[first])) ++last;
     const bool three = is_square(charts[first]) && (last - first) % 3 == 0;
     html += three ? "<div class=\"charts three\">\n" : "<div class=\"charts\">\n";
@@ -302,46 +325,69 @@ std::string Sections::html() const {
 
 std::string page_html(const std::string& title, const std::string& lead,
                       const std::string& head_html, const Sections& sections,
-                      const Figures& figures) {
-  std::vector<std::string_view> scripts = {kFirstScript, echarts_script()};
-  if (figures.has_space()) scripts.insert(scripts.end(), {kSizesScript, echarts_gl_script()});
-  scripts.push_back(page_script());
+                      const Figures& figures, const PointViewer* viewer) {
+  std::vector<std::string_view> styles = {page_style()};
+  std::vector<std::string_view> viewing, drawing = {echarts_script()};  // scripts in their order
+  std::string credits = "Diagrams by Apache ECharts (Apache License 2.0)";
+  if (viewer) {
+    styles.push_back(viewer_style());
+    viewing = {three_script(), viewer_script()};
+    credits += "; points by three.js (MIT License)";
+  }
+  if (figures.has_space()) {
+    drawing.insert(drawing.end(), {kSizesScript, echarts_gl_script()});
+    credits += " and ECharts GL (BSD 3-Clause License)";
+  }
+  drawing.push_back(page_script());
+  std::vector<std::string_view> scripts = {kFirstScript};
+  scripts.insert(scripts.end(), viewing.begin(), viewing.end());
+  scripts.insert(scripts.end(), drawing.begin(), drawing.end());
   std::string page = fmt::format(
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"{}\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<link rel=\"icon\" "
-      "href=\"data:,\">\n<title>{}</title>\n<style>{}</style>\n<script>{}</script>\n</head>\n"
-      "<body>\n<main>\n<button id=\"theme\" type=\"button\">Light / dark</button>\n<h1>{}</h1>\n"
+      "href=\"data:,\">\n<title>{}</title>\n",
+      policy(styles, scripts), escape_html(title));
+  add_elements(page, "style", styles);
+  add_elements(page, "script", {kFirstScript});
+  page += "</head>\n<body>\n";
+  if (viewer) page += viewer_stage();
+  page += fmt::format(
+      "<main{}>\n<button id=\"theme\" type=\"button\">Light / dark</button>\n<h1>{}</h1>\n"
       "<p class=\"lead\">{}</p>\n"
-      "<noscript><p class=\"verdict care\">The diagrams need JavaScript, which is off here. "
+      "<noscript><p class=\"verdict care\">The diagrams need JavaScript, which is disabled here. "
       "Texts and tables are complete.</p></noscript>\n",
-      policy(page_style(), scripts), escape_html(title), page_style(), kFirstScript,
-      escape_html(title), escape_html(lead));
+      viewer ? " id=\"words\"" : "", escape_html(title), escape_html(lead));
+  if (viewer) page += "<p><a href=\"#viewer\">↑ The points</a></p>\n";
   page += head_html;
   page +=
       "<details class=\"help\"><summary>How to use the diagrams, with mouse or "
       "keyboard</summary>\n<p>Point at a diagram to read values; drag a box to zoom in, "
       "double-click to show everything; <kbd>Ctrl</kbd> and the wheel zoom, <kbd>Shift</kbd> and "
-      "dragging pan. In three dimensions drag to rotate; the wheel moves nearer. With the "
+      "dragging pan. In three dimensions drag to rotate; the wheel moves closer. With the "
       "keyboard: <kbd>Tab</kbd> goes to a diagram, <kbd>+</kbd> and <kbd>-</kbd> zoom, the arrow "
       "keys pan or rotate, <kbd>0</kbd> shows everything, <kbd>n</kbd> and <kbd>p</kbd> step "
       "through the points of the first series.</p></details>\n";
   page += sections.html();
-  page +=
+  page += fmt::format(
       "<div id=\"spoken\" class=\"hidden\" aria-live=\"polite\"></div>\n"
-      "<footer>Diagrams by Apache ECharts (Apache License 2.0)";
-  page +=
-      figures.has_space() ? " and ECharts GL (BSD 3-Clause License).</footer>\n" : ".</footer>\n";
-  page += "</main>\n<script type=\"application/json\" id=\"page-data\">\n" + figures.data();
-  page += "\n</script>\n";
-  for (std::size_t i = 1; i < scripts.size(); ++i) {
-    page += "<script>";
-    page += scripts[i];
-    page += "</script>\n";
+      "<footer>{}.</footer>\n</main>\n",
+      credits);
+  // The first picture of the points waits only for the first of them, not for the rest.
+  if (viewer) {
+    constexpr std::size_t kFirstNodes = 9;  // the whole and its eighths
+    const std::size_t first = std::min(kFirstNodes, viewer->nodes().size());
+    page += "<script type=\"application/json\" id=\"viewer-data\">\n" + viewer->json() +
+            "\n</script>\n";
+    add_nodes(page, *viewer, 0, first);
+    add_elements(page, "script", viewing);
+    add_nodes(page, *viewer, first, viewer->nodes().size());
   }
-  page += "</body>\n</html>\n";
-  return page;
+  page +=
+      "<script type=\"application/json\" id=\"page-data\">\n" + figures.data() + "\n</script>\n";
+  add_elements(page, "script", drawing);
+  return page + "</body>\n</html>\n";
 }
 
 }  // namespace risley::report

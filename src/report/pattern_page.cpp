@@ -38,7 +38,7 @@ Chart rosette_chart(const jobs::PatternDetails& details) {
   return chart;
 }
 
-/// Density in cells of the map, larger ones where there are too many to draw.
+/// Density in cells of the map, larger ones if there are too many to draw.
 Chart density_chart(const sensors::PatternCoverage& coverage, const sensors::CoverageAfter& after) {
   constexpr double kMostCells = 12'000;
   // A panorama is drawn in azimuth and elevation, in which cells of the map become tall away from
@@ -111,12 +111,12 @@ Chart growth_chart(const sensors::PatternCoverage& coverage) {
   constexpr std::size_t kMostPoints = 500;
   std::vector<double> times = coverage.first_shot;
   std::sort(times.begin(), times.end());
-  Chart chart{
-      "Covered against time",
-      "time, s",
-      "covered, %",
-      {{"", "a", SeriesKind::line, {0.0}, {0.0}}},
-      fmt::format("Cells of {:.3g} degree that hold a shot.", degrees_from_radians(coverage.cell))};
+  Chart chart{"Covered against time",
+              "time, s",
+              "covered, %",
+              {{"", "a", SeriesKind::line, {0.0}, {0.0}}},
+              fmt::format("Cells of {:.3g} degree with at least one shot.",
+                          degrees_from_radians(coverage.cell))};
   const std::size_t step = (times.size() + kMostPoints - 1) / kMostPoints;
   for (std::size_t i = step - 1; i < times.size() && std::isfinite(times[i]); i += step) {
     chart.series[0].x.push_back(times[i]);
@@ -154,19 +154,19 @@ std::string coverage_html(const sensors::PatternCoverage& coverage) {
         finite_text("{:.2f}", degrees_from_radians(after.gap_azimuth)),
         finite_text("{:.2f}", degrees_from_radians(after.gap_zenith)));
   }
-  return html +
-         fmt::format(
-             "</tbody></table></div>\n<p class=\"note\">Covered: the share of cells of {:.3g} "
-             "degree that hold a shot, among those that {:.3g} s reach ({:.5g} square degrees). "
-             "Gap: the diameter of the largest circle that holds no shot, centred in this field "
-             "of view. Cells are squares of Lambert's {}.</p>\n",
-             degrees_from_radians(coverage.cell), coverage.field_after,
-             coverage.field_solid_angle / kSquareDegree,
-             coverage.all_around ? "cylindrical equal-area map about the Z axis"
-                                 : "equal-area map about the X axis");
+  return html + fmt::format(
+                    "</tbody></table></div>\n<p class=\"note\">Covered: the share of cells of "
+                    "{:.3g} degree with at least one shot, among those that {:.3g} s reach ({:.5g} "
+                    "square degrees). "
+                    "Gap: the diameter of the largest circle without a shot, centred in this field "
+                    "of view. Cells are squares of Lambert's {}.</p>\n",
+                    degrees_from_radians(coverage.cell), coverage.field_after,
+                    coverage.field_solid_angle / kSquareDegree,
+                    coverage.all_around ? "cylindrical equal-area map about the Z axis"
+                                        : "equal-area map about the X axis");
 }
 
-/// What a prism is and its angles, as two cells of a table.
+/// Kind and angles of a prism, as two cells of a table.
 std::string shape_cells(const PrismTrain& train, int prism) {
   const double angle = degrees_from_radians(train[place::wedge_angle(prism)]);
   switch (train.face_order()[static_cast<std::size_t>(prism)]) {
@@ -195,10 +195,10 @@ std::string prisms_html(const sensors::Sensor& sensor) {
                         60 * sensor.angular_velocity[k] / kTwoPi);
   }
   return html + fmt::format(
-                    "</tbody></table></div>\n<p class=\"note\">In the order of the beam; {} "
-                    "emitter{}, {:.10g} shots per second.</p>\n",
+                    "</tbody></table></div>\n<p class=\"note\">In firing order; {} emitter{}, "
+                    "{} shots per second.</p>\n",
                     sensor.train.emitters(), sensor.train.emitters() == 1 ? "" : "s",
-                    sensor.shot_rate);
+                    count_text(static_cast<std::uint64_t>(std::llround(sensor.shot_rate))));
 }
 
 }  // namespace
@@ -218,11 +218,10 @@ std::string pattern_page(const jobs::PatternDetails& details, const jobs::Proven
                Sections::Shown::unfolded);
   sections.add("Prisms", prisms_html(details.sensor));
   sections.add(kHowToRepeat, provenance_html(provenance));
-  return page_html(
-      "Scan pattern: " + details.sensor.name,
-      "Where the sensor sends its shots, without noise and with rotors at constant speed, and how "
-      "they fill its field of view.",
-      head, sections, figures);
+  return page_html("Scan pattern: " + details.sensor.name,
+                   "The sensor's shot directions, without noise and with rotors at constant speed, "
+                   "and how they fill its field of view.",
+                   head, sections, figures);
 }
 
 }  // namespace risley::report

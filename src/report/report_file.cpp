@@ -20,7 +20,7 @@ using json::Json;
 constexpr const char* kFormat = "risley report";
 constexpr int kFormatVersion = 2;
 
-/// What no schema says of a diagram: that its columns are of one length.
+/// A condition on diagrams not in the schema: their columns have one length.
 void check_columns(const View& chart) {
   for (const View& series : chart["series"].list()) {
     const std::size_t points = series["x"].size();
@@ -37,7 +37,7 @@ void check_columns(const View& chart) {
   }
 }
 
-/// Nor that a matrix has a row and a column for each of its names.
+/// Another one: a matrix has a row and a column for each of its names.
 void check_matrix(const View& correlation) {
   const std::size_t size = correlation["names"].size();
   const View matrix = correlation["matrix"];
@@ -68,7 +68,7 @@ Report finished_report(const char* verb, const Json& result, const Json& page, c
                        const jobs::Provenance& provenance) {
   Json report = {{"format", kFormat}, {"format_version", kFormatVersion}, {"verb", verb}};
   report.update(result);
-  report.erase("seconds");  // of the run, which has not ended
+  report.erase("seconds");  // of the unfinished run
   report["page"] = page;
   report["charts"] = charts;
   report["provenance"] = provenance;
@@ -88,7 +88,7 @@ Report parse_report(const std::string& text, const std::string& path) {
     report.json = Json::parse(text);
   } catch (const Json::parse_error& error) {
     throw FileError(path, {error.byte, {}}, "from here on, the text is not JSON");
-  } catch (const Json::exception& error) {  // a number beyond all that can be stored
+  } catch (const Json::exception& error) {  // a number beyond the range of doubles
     throw FileError(path, {}, fmt::format("the JSON cannot be read: {}", error.what()));
   }
   check_version(report.json, path);

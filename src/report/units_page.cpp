@@ -5,14 +5,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numeric>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "risley/core/number_text.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
+#include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::report {
 namespace {
@@ -37,7 +40,7 @@ std::string probability_text(bool tested, double p_value) {
   return tested ? fmt::format("{:.2g}", p_value) : "&ndash;";
 }
 
-/// Places of the pairs that are shown, in their order: all, or those that chance explains least.
+/// Places of the displayed pairs, in order: all, or those least explained by chance.
 std::vector<std::size_t> shown_pairs(const ComparedUnits& compared) {
   std::vector<std::size_t> places(compared.pairs.size());
   std::iota(places.begin(), places.end(), std::size_t{0});
@@ -73,15 +76,14 @@ std::string pairs_html(const ComparedUnits& compared) {
   }
   html += "</tbody></table></div>\n<p class=\"note\">";
   if (shown.size() < compared.pairs.size()) {
-    html += fmt::format("Of {} pairs, these {} are the ones that chance explains least. ",
+    html += fmt::format("Of {} pairs, these {} are the ones least explained by chance. ",
                         compared.pairs.size(), shown.size());
   }
   return html +
          fmt::format(
              "p is the probability that the differences of all parameters together are as large as "
              "these, or larger, by chance. A pair counts as changed where p is below {:.2g}, so "
-             "that results in which nothing changed are called changed with a probability of {:g} "
-             "at most.</p>\n",
+             "that unchanged results are called changed with a probability of at most {:g}.</p>\n",
              compared.least_p_value, compared.false_alarm);
 }
 
@@ -109,45 +111,42 @@ std::string fleet_html(const ComparedFleet& one, const ComparedUnits& compared) 
          fmt::format(
              "</tbody></table></div>\n<p class=\"note\">Each unit by its last result, against "
              "the median of all. Robust z is the distance of a parameter from its median over the "
-             "spread of the fleet and the standard uncertainty of the result together. p is the "
-             "probability that chance puts any of the {} units so far off in any of {} "
-             "parameters, or in any of {} combinations of them, at most.</p>\n",
+             "spread of the fleet and the standard uncertainty of the result together. p is an "
+             "upper limit of the probability that chance alone puts any of the {} units so far off "
+             "in any of {} parameters, or in any of {} combinations of them.</p>\n",
              one.units.size(), one.fleet.parameters.size(), one.fleet.combinations.cols());
 }
 
-/// One parameter over results, in the unit of files.
-class ParameterChart {
- public:
-  ParameterChart(std::string name, std::string x_label, TrainShape shape)
-      : unit_(jobs::file_unit_of(name, shape).si_per_unit) {
-    chart_.y_label = jobs::file_unit_of(name, shape).unit;
-    chart_.title = std::move(name);
-    chart_.x_label = std::move(x_label);
-  }
-  void add(std::size_t place, double value, double sigma) {
-    values_.x.push_back(static_cast<double>(place));
-    values_.y.push_back(value / unit_);
-    low_.x.push_back(values_.x.back());
-    low_.y.push_back((value - sigma) / unit_);
-    high_.x.push_back(values_.x.back());
-    high_.y.push_back((value + sigma) / unit_);
-  }
-  Chart chart() && {
-    chart_.series = {std::move(values_), std::move(low_), std::move(high_)};
-    return std::move(chart_);
-  }
+/// Least duration of a series, in days, for drawing it over dates.
+constexpr std::int64_t kDay_ms = 24 * 3600 * 1000;
 
- private:
-  Chart chart_;
-  double unit_;
-  Series values_{"value", "a", SeriesKind::points, {}, {}};
-  Series low_{"1 sigma", "ink", SeriesKind::line, {}, {}}, high_ = low_;
+bool has_dates(const ComparedUnits& compared) {
+  if (compared.written_ms.empty()) return false;
+  const auto [first, last] = std::ranges::minmax(compared.written_ms);
+  return last - first >= kDay_ms && std::ranges::is_sorted(compared.written_ms);
+}
+
+/// Glass does not change, but its mounting may.
+bool can_change(const std::string& name, TrainShape shape) {
+  return !name.starts_with("refractive_index") && !name.starts_with("wedge_angle") &&
+         !sensors::find_prism_size(name, shape.prisms);
+}
+
+/// One parameter over the results of a series, in the unit of files.
+struct ParameterOverResults {
+  Chart chart;
+  bool can_change = false;
+  double largest = 0;  ///< difference of two results, sigmas
+  std::string words;   ///< of that difference
 };
 
-/// Parameters over the results of a series.
-std::vector<Chart> charts_of_series(const ComparedUnits& compared) {
-  std::vector<Chart> charts;
+/// Parameters over the results of a series: first those that can change, ordered by the size of the
+/// change.
+std::vector<ParameterOverResults> parameters_over_results(const ComparedUnits& compared) {
+  std::vector<ParameterOverResults> found;
   const auto& parameters = compared.pairs.front().comparison.parameters;
+  const TrainShape shape = compared.pairs.front().comparison.b.shape();
+  const bool dates = has_dates(compared);
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const auto is_known = [&](const ComparedPair& pair) {
       const auto& own = pair.comparison.parameters;
@@ -155,16 +154,39 @@ std::vector<Chart> charts_of_series(const ComparedUnits& compared) {
              own[i].sigma > 0;
     };
     if (!std::all_of(compared.pairs.begin(), compared.pairs.end(), is_known)) continue;
-    ParameterChart chart(parameters[i].name, "result, in the order given",
-                         compared.pairs.front().comparison.b.shape());
+    const std::string& name = parameters[i].name;
+    const jobs::FileUnit unit = jobs::file_unit_of(name, shape);
+    ParameterOverResults one;
+    one.can_change = can_change(name, shape);
+    Series values{"", "a", SeriesKind::points, {}, {}};
+    const auto add = [&](std::size_t place, double value, double sigma) {
+      values.x.push_back(static_cast<double>(dates ? compared.written_ms[place]
+                                                   : static_cast<std::int64_t>(place) + 1));
+      values.y.push_back(value / unit.si_per_unit);
+      values.sigma.push_back(sigma / unit.si_per_unit);
+    };
     for (const ComparedPair& pair : compared.pairs) {
-      const ParameterDifference& one = pair.comparison.parameters[i];
-      if (pair.b == 1) chart.add(1, one.value_a, one.sigma_a);
-      if (pair.a + 1 == pair.b) chart.add(pair.b + 1, one.value_b, one.sigma_b);
+      const ParameterDifference& own = pair.comparison.parameters[i];
+      if (pair.b == 1) add(0, own.value_a, own.sigma_a);
+      if (pair.a + 1 == pair.b) add(pair.b, own.value_b, own.sigma_b);
+      const double sigmas = std::abs(own.difference) / own.sigma;
+      if (sigmas <= one.largest) continue;
+      one.largest = sigmas;
+      const NumberText text =
+          number_text(own.difference / unit.si_per_unit, own.sigma / unit.si_per_unit);
+      one.words = fmt::format("{} by {} ± {} {}", name, text.value, text.sigma, unit.unit);
     }
-    charts.push_back(std::move(chart).chart());
+    one.chart.title = name;
+    one.chart.x_label = dates ? "when the result was written" : "result, in the order given";
+    one.chart.dates = dates;
+    one.chart.y_label = fmt::format("{}, ± 1 sigma", unit.unit);
+    one.chart.series.push_back(std::move(values));
+    found.push_back(std::move(one));
   }
-  return charts;
+  std::ranges::stable_sort(found, [](const auto& a, const auto& b) {
+    return a.can_change != b.can_change ? a.can_change : a.largest > b.largest;
+  });
+  return found;
 }
 
 /// Robust z of every unit in every parameter.
@@ -203,9 +225,8 @@ std::string fleet_parameters_html(const jobs::Fleet& fleet) {
         one.middle / unit.si_per_unit, one.spread / unit.si_per_unit, unit.unit);
   }
   return html +
-         "</tbody></table>\n<p class=\"note\">Median of the units and standard deviation among "
-         "them, "
-         "from the median of their distances; it includes the standard uncertainties of the "
+         "</tbody></table>\n<p class=\"note\">Median and standard deviation of the units, the "
+         "latter from the median of their distances; it includes the standard uncertainties of the "
          "results.</p>\n";
 }
 
@@ -226,16 +247,23 @@ std::string results_html(const ComparedUnits& compared) {
   return html + "</ol>\n";
 }
 
-std::string change_words(const ComparedUnits& compared) {
+/// One sentence on changes. @param parameters  of a series; empty otherwise
+std::string change_words(const ComparedUnits& compared,
+                         const std::vector<ParameterOverResults>& parameters) {
   if (compared.pairs.empty()) return "No unit has two results.";
   const std::size_t changes = changes_of(compared);
   if (changes > 0) {
-    return fmt::format("{} of {} pairs differ by more than chance explains.", changes,
-                       compared.pairs.size());
+    const ComparedPair& first = *std::ranges::find_if(compared.pairs, &ComparedPair::changed);
+    std::string words =
+        fmt::format("{} of {} pairs differ by more than chance explains, first {} to {}", changes,
+                    compared.pairs.size(), compared.results[first.a], compared.results[first.b]);
+    const auto most = std::ranges::max_element(parameters, {}, &ParameterOverResults::largest);
+    if (most != parameters.end()) words += fmt::format("; most of all {}", most->words);
+    return words + ".";
   }
   return std::any_of(compared.pairs.begin(), compared.pairs.end(), is_tested)
              ? "No change is seen."
-             : "Nothing can be said: the results have no covariance.";
+             : "No conclusion is possible: the results have no covariance.";
 }
 
 std::string fleet_words(const ComparedFleet& one, const ComparedUnits& compared) {
@@ -265,7 +293,7 @@ std::vector<KeyNumber> numbers_of_series(const ComparedUnits& compared) {
   return {{angle_with_sigma(c.beams.errors.total, c.beams.total_sigma),
            "between the directions of the first result and the last"},
           {angle_with_sigma(c.beams.errors.shape, c.beams.shape_sigma),
-           "of that is the beams against each other: their shape"},
+           "of that is between the beams: their shape"},
           {probability_text(is_tested(ends), c.change.p_value),
            "is the probability of such differences by chance"}};
 }
@@ -280,14 +308,19 @@ std::string subject_of(const ComparedUnits& compared) {
 
 std::string units_page(const ComparedUnits& compared, const jobs::Provenance& provenance) {
   Figures figures;
-  std::string words = change_words(compared);
+  std::vector<ParameterOverResults> parameters;
+  if (compared.is_one_series) parameters = parameters_over_results(compared);
+  std::string words = change_words(compared, parameters);
   for (const ComparedFleet& fleet : compared.fleets) words += fleet_words(fleet, compared);
+  std::vector<Chart> charts;
+  charts.reserve(parameters.size());
+  for (ParameterOverResults& one : parameters) charts.push_back(std::move(one.chart));
   std::vector<Chart> fleets;
   for (const ComparedFleet& fleet : compared.fleets) fleets.push_back(chart_of_fleet(fleet));
-  const std::string head = fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(words)) +
-                           (compared.is_one_series ? overview_html(numbers_of_series(compared),
-                                                                   std::vector<Chart>(), figures)
-                                                   : charts_html(fleets, figures));
+  const std::string head =
+      fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(words)) +
+      (compared.is_one_series ? overview_html(numbers_of_series(compared), charts, figures)
+                              : charts_html(fleets, figures));
   Sections sections;
   for (const ComparedFleet& fleet : compared.fleets) {
     const std::string& sensor = compared.units[fleet.units.front()].sensor;
@@ -296,13 +329,11 @@ std::string units_page(const ComparedUnits& compared, const jobs::Provenance& pr
     sections.add(fmt::format("Parameters of the fleet: {}", sensor),
                  fleet_parameters_html(fleet.fleet));
   }
-  sections.add("Pairs", pairs_html(compared), Sections::Shown::unfolded);
-  if (compared.is_one_series) {
-    const std::vector<Chart> charts = charts_of_series(compared);
-    sections.add("Parameters over the results",
-                 charts.empty() ? std::string() : charts_html(charts, figures),
+  if (charts.size() > 1) {
+    sections.add("Parameters over the results", charts_html(charts, figures, 1),
                  Sections::Shown::unfolded);
   }
+  sections.add("Pairs", pairs_html(compared), Sections::Shown::unfolded);
   sections.add("Left out", left_out_html(compared));
   sections.add("Results", results_html(compared));
   sections.add(kHowToRepeat, provenance_html(provenance));

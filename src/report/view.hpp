@@ -14,14 +14,14 @@
 
 namespace risley::report {
 
-/// A value in a report, as pages look at it. Every question throws FileError, naming the place,
-/// where the value is missing or of another kind. Views do not outlive the report.
+/// A value in a report, for pages. Every access throws FileError, naming the place, if the value is
+/// missing or of another kind. Views do not outlive the report.
 class View {
  public:
   explicit View(const Report& report) : json_(&report.json), file_(&report.path) {}
 
   View operator[](const std::string& key) const;
-  /// Whether an object has the key, and not as null.
+  /// Whether an object has the key with a value other than null.
   bool has(const std::string& key) const;
 
   double number() const;  ///< NaN where it is null

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Shows the events of a recording that runs. Texts from the network go into the page as text alone.
+// Shows the events of a running recording. Texts from the network are inserted only as text.
 "use strict";
 
 const kSilenceMs = 3000; // between two events
@@ -20,7 +20,7 @@ function row(cells, head) {
 }
 
 const count = (value) => value.toLocaleString("en").replaceAll(",", "\u202f");
-// A number with a minus sign as long as the plus, and none before what is shown as zero.
+// A number with a minus sign as wide as the plus, and none for values shown as zero.
 const number = (value, digits) => {
   const text = Math.abs(value).toFixed(digits);
   return (value < 0 && Number(text) !== 0 ? "\u2212" : "") + text;
@@ -30,7 +30,7 @@ const signed = (value, digits) => {
   return text.startsWith("\u2212") || Number(text) === 0 ? text : "+" + text;
 };
 
-// As many decimals as leave two digits of a sigma.
+// As many decimals as show two digits of a sigma.
 function decimals(sigma) {
   if (!(sigma > 0)) return 6;
   return Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
@@ -46,10 +46,10 @@ function opticsState(optics) {
   if (optics.words) return ["not watched: " + optics.words, "care"];
   if (optics.alarm) {
     const a = optics.alarm;
-    const what = a.kind === "changed" ? "Alarm: the optics have changed" : "Alarm: the optics are not those of " +
+    const what = a.kind === "changed" ? "Alarm: the optics have changed" : "Alarm: the optics differ from those of " +
       optics.reference;
     return [`${what}: ${a.parameter} by ${signed(a.difference, decimals(a.sigma))} \u00b1 ` +
-      `${a.sigma.toFixed(decimals(a.sigma))} if nothing else differs${optics.alarmed ? "" : "; the last looks see nothing of it"}`, "alarm"];
+      `${a.sigma.toFixed(decimals(a.sigma))} if nothing else differs${optics.alarmed ? "" : "; the last checks no longer show it"}`, "alarm"];
   }
   if (optics.reason) return ["the last shots gave no estimate: " + optics.reason, "care"];
   if (optics.phase === "waiting") return ["waiting for shots", "care"];
@@ -106,8 +106,78 @@ function sensorSection(sensor, seconds) {
     section.append(element("p", "It says: " + words.filter(Boolean).join(", "),
       says.length > 0 || state === "error" ? "state care" : ""));
   }
+  if (sensor.publishing) section.append(element("p", ...publishedWords(sensor)));
+  section.append(...scanFigure(sensor));
   if (sensor.optics) section.append(...opticsParts(sensor.optics));
   return section;
+}
+
+// The scan of a sensor as it grows: azimuth (to the left, as seen from the sensor) by zenith,
+// coloured by range.
+const kMostShots = 60000, kLongestSide = 1800, kLargestHeight = 900;
+const scans = new Map(); // by serial number
+
+function newScan() {
+  const scan = { figure: element("figure"), canvas: element("canvas"), words: element("figcaption"), shots: [] };
+  scan.canvas.setAttribute("role", "img");
+  scan.figure.append(scan.canvas, scan.words);
+  return scan;
+}
+
+// The least and the greatest of each quantity, with some margin, so that not every shot moves them.
+function widened(bounds, shots) {
+  let result = bounds;
+  for (const shot of shots) {
+    if (result && shot.every((value, i) => value >= result[i][0] && value <= result[i][1])) continue;
+    result = shot.map((value, i) => [Math.min(value, result ? result[i][0] : value),
+      Math.max(value, result ? result[i][1] : value)]);
+  }
+  return result;
+}
+
+function draw(scan, shots) {
+  const [[left, right], [top, bottom], [near, far]] = scan.bounds;
+  const pen = scan.canvas.getContext("2d");
+  for (const [azimuth, zenith, range] of shots) {
+    const share = far > near ? Math.log(range / near) / Math.log(far / near) : 0;
+    pen.fillStyle = `hsl(${240 * (1 - share)} 90% 50%)`;
+    pen.fillRect((right - azimuth) * scan.scale, (zenith - top) * scan.scale, 2, 2);
+  }
+}
+
+function grow(scan, shots) {
+  if (shots.length === 0) return;
+  const bounds = widened(scan.bounds, shots);
+  scan.shots = scan.shots.concat(shots).slice(-kMostShots);
+  if (bounds === scan.bounds) {
+    draw(scan, shots);
+    return;
+  }
+  scan.bounds = bounds;
+  const [[left, right], [top, bottom], [near, far]] = bounds;
+  const width = Math.max(right - left, 0.1), height = Math.max(bottom - top, 0.1);
+  scan.scale = Math.min(kLongestSide / width, kLargestHeight / height);
+  scan.canvas.width = Math.ceil(width * scan.scale) + 2;
+  scan.canvas.height = Math.ceil(height * scan.scale) + 2;
+  scan.words.textContent = `Scan: azimuth ${number(right, 1)}\u00b0 to ${number(left, 1)}\u00b0 from left to right, ` +
+    `zenith ${number(top, 1)}\u00b0 to ${number(bottom, 1)}\u00b0 downwards, range ${near.toFixed(1)} m (blue) to ` +
+    `${far.toFixed(1)} m (red)`;
+  scan.canvas.setAttribute("aria-label", scan.words.textContent);
+  draw(scan, scan.shots);
+}
+
+function scanFigure(sensor) {
+  if (!scans.has(sensor.serial)) scans.set(sensor.serial, newScan());
+  const scan = scans.get(sensor.serial);
+  grow(scan, sensor.seen);
+  return scan.shots.length > 0 ? [scan.figure] : [];
+}
+
+function publishedWords(sensor) {
+  const about = sensor.publishing;
+  if (about.words) return ["Points: none, " + about.words, "state care"];
+  return [`Points: ${count(sensor.published)} published, made with ${about.calibration}` +
+    (sensor.latency_ms === null ? "" : `; 99 % of the frames within ${sensor.latency_ms.toFixed(0)} ms`), ""];
 }
 
 function show(state) {
@@ -126,7 +196,7 @@ function tellLink() {
   if (before) {
     words = `${before.duration_s.toFixed(1)} s recorded.`;
     if (over) words += " The recording is over.";
-    else if (Date.now() - heard > kSilenceMs) words += " Nothing is heard of it any more.";
+    else if (Date.now() - heard > kSilenceMs) words += " No packets arrive from it any more.";
   }
   if (link.textContent !== words) link.textContent = words;
 }

@@ -11,7 +11,7 @@
 namespace risley::scenes {
 namespace {
 
-/// Replaces what was met so far where this is nearer.
+/// Replaces the previous hit if this is nearer.
 void take_nearer(double range, const Vector3<double>& normal, const Vector3<double>& direction,
                  double reflectivity, std::size_t surface, std::optional<Hit>& nearest) {
   if (!(range > 0.0 && range <= kFarthestHit) || (nearest && range >= nearest->range)) return;

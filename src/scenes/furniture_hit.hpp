@@ -10,8 +10,8 @@
 
 namespace risley::scenes {
 
-/// Replaces what a ray met so far by this box where that is nearer, and within kFarthestHit. A ray
-/// that begins within a box ends at its inner side.
+/// Replaces a ray's previous hit by this box if that is nearer, and within kFarthestHit. A ray that
+/// begins within a box ends at its inner side.
 /// @param surface  number of the box in the scene
 void meet_box(const SceneBox& box, std::size_t surface, const Vector3<double>& origin,
               const Vector3<double>& direction, std::optional<Hit>& nearest);

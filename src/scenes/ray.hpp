@@ -8,10 +8,10 @@
 namespace risley::scenes {
 
 inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
-/// Surfaces reach so far beyond their edges that no ray slips between two of them, m.
+/// Surfaces extend this far beyond their edges so that no ray slips between two of them, m.
 inline constexpr double kSeam = 1e-9;
 
-/// Where a ray is within low to high of one axis: [enter, leave], enter > leave: nowhere.
+/// Interval of a ray within low to high of one axis: [enter, leave], enter > leave: nowhere.
 inline void clip(double origin, double direction, double low, double high, double& enter,
                  double& leave) {
   if (direction == 0.0) {

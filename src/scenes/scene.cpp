@@ -22,13 +22,13 @@
 namespace risley::scenes {
 namespace {
 
-/// Where a ray passes through panes of glass, the first sixteen that are found.
+/// Points where a ray passes through panes of glass, the first sixteen found.
 class Panes {
  public:
   void add(double range) {
     if (count_ < ranges_.size()) ranges_[count_++] = range;
   }
-  /// What panes leave of the light to a target and back.
+  /// Share of the light that panes transmit to a target and back.
   double transmission(double range) const {
     double left = 1.0;
     for (std::size_t i = 0; i < count_; ++i) {
@@ -42,7 +42,7 @@ class Panes {
   std::size_t count_ = 0;
 };
 
-/// Replaces what was found where a wall with shape, patches or glass is nearer.
+/// Replaces the previous hit if a wall with shape, patches or glass is nearer.
 void take_wall(const ScenePlane& wall, std::size_t surface, const Vector3<double>& origin,
                const Vector3<double>& direction, std::optional<Hit>& nearest, Panes& panes) {
   static const double mirrors = std::cos(kGlassReturnAngle);

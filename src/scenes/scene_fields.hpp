@@ -30,10 +30,10 @@ std::array<double, N> numbers(const io::YamlMap& map, std::string_view key, long
   return values;
 }
 
-/// The names that entries of a file have so far.
+/// Names of the entries of a file so far.
 using Names = std::set<std::string>;
 
-/// The name of an entry that no earlier entry has.
+/// The name of an entry, which must be unique.
 inline std::string new_name(const io::YamlMap& map, Names& earlier) {
   std::string name = map.words("name");
   if (!earlier.insert(name).second) {

@@ -63,7 +63,7 @@ Patch read_patch(const YamlMap& map, const ScenePlane& plane) {
   return patch;
 }
 
-/// What makes more of a plane than a flat surface of one kind.
+/// Properties of a plane other than a flat surface of one kind.
 /// @param number_of_plane  in the file, counted from 0: the seed of waves that state none
 void read_surface(const YamlMap& map, std::size_t number_of_plane, ScenePlane& plane) {
   plane.reflectivity = reflectivity(map);

@@ -23,14 +23,14 @@
 namespace risley::scenes {
 namespace {
 
-/// Boxes of the grid are larger by this, far more than coordinates are rounded, m.
+/// Margin of the boxes of the grid, far above the rounding of coordinates, m.
 constexpr double kBoxMargin = 1e-6;
 constexpr double kMostCells = 1e6;
 /// Walls are not lower, m.
 constexpr double kLowestWall = 0.01;
 /// Mean cosine of incidence on leaves of all directions.
 constexpr double kLeafCosine = 0.5;
-/// Number of the random stream; those of simulations are others.
+/// Number of the random stream; simulations use others.
 constexpr std::uint64_t kVillageRoofs = 200, kVillageBushes = 201;
 
 double wave_number(double wavelength) { return kTwoPi / wavelength; }

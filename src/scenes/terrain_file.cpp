@@ -46,7 +46,7 @@ std::array<double, 2> range(const YamlMap& map, std::string_view key, const Limi
   return values;
 }
 
-/// Its own name, or one made of what it is and its number.
+/// Its own name, or one made of its kind and its number.
 std::string name_of(const YamlMap& map, std::string_view kind, std::size_t number, Names& names) {
   if (map.find("name") != nullptr) return new_name(map, names);
   std::string name = fmt::format("{} {}", kind, number);

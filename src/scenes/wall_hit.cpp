@@ -12,7 +12,7 @@
 namespace risley::scenes {
 namespace {
 
-/// How far an intersection may be from the surface along the ray, m.
+/// Tolerance of an intersection along the ray, m.
 constexpr double kTolerance = 1e-13;
 constexpr int kMostIterations = 60;
 constexpr int kMostSteps = 10'000;
@@ -75,15 +75,15 @@ class WallRay {
         d};
   }
 
-  /// Where the ray meets the surface: t, NaN where it does not, and the deviation there, whose
-  /// slopes are those of a place less than a micrometre away.
+  /// Intersection of the ray with the surface: t, NaN if there is none, and the deviation there,
+  /// whose slopes are those of a place less than a micrometre away.
   struct Root {
     double t = std::nan("");
     Deviation deviation;
   };
 
   /// Where f is 0 within [begin, end].
-  /// @param side     sign of f at begin; a steep ray does not ask for it
+  /// @param side  sign of f at begin; unused for a steep ray
   /// @param crosses  whether f is known to have the other sign at end
   Root root(double begin, double end, double depth, double side, bool crosses) const {
     if (!steep_) return first_root(begin, end, depth, side, crosses);
@@ -138,7 +138,7 @@ class WallRay {
 double depth_of(const Patch* patch) { return patch == nullptr ? 0.0 : patch->depth; }
 double sign_of(double value) { return value < 0.0 ? -1.0 : 1.0; }
 
-/// What the ray meets of the face of a patch or of the wall itself.
+/// Intersection of the ray with the face of a patch or with the wall itself.
 WallHit face_hit(const ScenePlane& wall, const WallRay::Root& root, const Patch* patch) {
   const Deviation& slope = root.deviation;
   WallHit hit;
@@ -151,7 +151,7 @@ WallHit face_hit(const ScenePlane& wall, const WallRay::Root& root, const Patch*
   return hit;
 }
 
-/// The side of a step: of what the ray would get into.
+/// The side of a step: of the part that the ray would enter.
 WallHit step_hit(const ScenePlane& wall, double t, const Patch* into, bool horizontal) {
   WallHit hit;
   hit.range = t;
@@ -161,8 +161,8 @@ WallHit step_hit(const ScenePlane& wall, double t, const Patch* into, bool horiz
   return hit;
 }
 
-/// Where a ray passes over an edge of a patch. Without values of its own, as room for many of them
-/// is made for every ray.
+/// Points where a ray crosses an edge of a patch. Without default values, because room for many of
+/// them is made for every ray.
 struct Crossing {
   double t;
   bool horizontal;  ///< whether the edge limits the patch along the horizontal axis
@@ -194,7 +194,7 @@ std::optional<WallHit> meet_wall(const ScenePlane& wall, const Vector3<double>& 
     if (enter > leave) return std::nullopt;
   }
 
-  // The ray passes over edges of patches at these places, between which the depth is the same.
+  // The ray crosses edges of patches at these places; between them the depth is constant.
   std::array<Crossing, 4 * kMostPatches> crossings;
   std::size_t count = 0;
   if (nearest_depth != farthest_depth) {
@@ -235,7 +235,7 @@ std::optional<WallHit> meet_wall(const ScenePlane& wall, const Vector3<double>& 
   if (side == 0.0 && !ray.steep()) side = sign_of(ray.gap(begin, depth_of(patch)).value);
   const WallRay::Root root = ray.root(begin, leave, depth_of(patch), side, false);
   if (!(root.t > 0.0 && root.t <= farthest)) return std::nullopt;
-  // Without steps the patch is only known where the ray ends.
+  // Without steps the patch is only known at the end of the ray.
   return face_hit(wall, root, count == 0 ? ray.patch_at(root.t) : patch);
 }
 

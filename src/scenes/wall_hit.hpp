@@ -8,7 +8,7 @@
 
 namespace risley::scenes {
 
-/// What a ray meets of one wall.
+/// Hit of a ray on one wall.
 struct WallHit {
   double range = 0;        ///< m
   Vector3<double> normal;  ///< unit vector, on either side
@@ -22,8 +22,7 @@ inline bool is_plain(const ScenePlane& wall) {
 }
 
 /// The nearest point of a wall with its waves, bow and steps in front of a ray, or nothing. Rays
-/// that stay near a wall they are almost parallel to for more than some thousand half waves end
-/// nowhere.
+/// that stay near an almost parallel wall for more than some thousand half waves end nowhere.
 /// @param farthest  that is of interest, m
 std::optional<WallHit> meet_wall(const ScenePlane& wall, const Vector3<double>& origin,
                                  const Vector3<double>& direction, double farthest);

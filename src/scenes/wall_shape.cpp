@@ -14,11 +14,11 @@
 namespace risley::scenes {
 namespace {
 
-/// Number of the random stream; those of simulations and of villages are others.
+/// Number of the random stream; simulations and villages use others.
 constexpr std::uint64_t kWallWaves = 202;
 
-/// sin(x) / x and cos(x) of x^2 for |x| <= pi / 2, right to 5e-14: Taylor's series. Written out, so
-/// that compilers work on several sinusoids at once.
+/// sin(x) / x and cos(x) of x^2 for |x| <= pi / 2, accurate to 5e-14: Taylor's series. Unrolled, so
+/// that compilers process several sinusoids at once.
 inline double sine_by_angle(double s) {
   return 1.0 + s * (-1.0 / 6 +
                     s * (1.0 / 120 +

@@ -22,10 +22,10 @@ namespace risley::sensors {
 namespace {
 
 constexpr std::uint64_t kMostCompared = 1'000'000, kPiece = 65'536;
-constexpr double kSameAngle = 1e-9;  // rad, far below anything that a file shows
+constexpr double kSameAngle = 1e-9;  // rad, far below any number in a file
 
 /// Rotation angles of all rotors at time 0 as a common turn and a common time lag: start_k = turn +
-/// speed_k lag, and what is left of them.
+/// speed_k lag, and the remainder.
 struct Start {
   double turn = 0, lag = 0;
   std::vector<double> left;  ///< [prisms], rad
@@ -90,7 +90,7 @@ std::array<double, 3> turn_angles(const Eigen::Matrix3d& turn) {
           std::atan2(-turn(0, 1), turn(1, 1))};
 }
 
-/// The pattern and what HELIOS++ makes of it before it is turned, in its axes, shot by shot.
+/// The pattern and the HELIOS++ version of it before rotation, in its axes, shot by shot.
 class Comparison {
  public:
   Comparison(const Sensor& sensor, PrismTrain train, std::uint64_t rows,
@@ -135,7 +135,7 @@ class Comparison {
   }
 
  private:
-  /// When the rotors stand as they do for the whole group of a shot.
+  /// If the rotors are stationary for the whole group of a shot.
   double group_time(std::uint64_t shot) const {
     const std::uint64_t group = shot / emitters_;
     const std::uint64_t first =
@@ -163,7 +163,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
   }
   if (sensor.train.layout().reflects()) {
     throw InvalidArgument(fmt::format(
-        "sensor \"{}\" reflects its beam within glass, a scanner of HELIOS++ has prisms alone",
+        "sensor \"{}\" reflects its beam within glass, a scanner of HELIOS++ has only prisms",
         sensor.name));
   }
   if (options.every != 1) {
@@ -171,7 +171,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
         "every = {}, allowed 1: a scanner of HELIOS++ has prisms instead of rows", options.every));
   }
   rows = std::min(rows, kMostCompared);
-  scan_pattern(sensor, 0, 1, options);  // says what is wrong with the rest
+  scan_pattern(sensor, 0, 1, options);  // reports the defects of the rest
   const ScanSequence sequence = sensor.sequence.value_or(ScanSequence{});
   const double rate = options.shot_rate.value_or(sensor.shot_rate);
 
@@ -205,7 +205,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
   const double pulses = rate / emitters;
   result.pulse_frequency = std::max(1L, std::lround(pulses));
   const bool in_turn = emitters > 1 && options.firing.value_or(sequence.firing) == Firing::in_turn;
-  // Where they fire in turn, the middle of a group stands for it.
+  // If they fire in turn, the middle of a group represents it.
   result.time_lag = start.lag + (in_turn ? 0.5 * (emitters - 1) / rate : 0.0);
 
   const bool tilted = is_tilted(sensor.train);
@@ -242,7 +242,7 @@ HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
   }
   if (tilted) {
     result.not_carried.emplace_back(
-        "Tilts of prisms and bearings: instead, the whole scanner is rotated as fits best.");
+        "Tilts of prisms and bearings: instead, the whole scanner is rotated for the best fit.");
   }
   for (int i = 0; i < prisms; ++i) {
     const double left = start.left[static_cast<std::size_t>(i)];

@@ -18,7 +18,7 @@
 namespace risley::sensors {
 namespace {
 
-/// Text of a preset and how messages call it.
+/// Text of a preset and its name in messages.
 struct PresetSource {
   std::string text, path;
 };

@@ -125,7 +125,7 @@ class Neighbours {
     for (const auto& direction : directions) sorted_[next[grid.of(direction)]++] = direction;
   }
 
-  /// Angle to the nearest of them, rad; stops looking as soon as it is less than `enough`.
+  /// Angle to the nearest of them, rad; the search stops as soon as it is less than `enough`.
   double nearest(const Vector3<double>& own, double enough) const {
     const auto centre = static_cast<long>(grid_.of(own));
     const long columns = grid_.columns(), rows = grid_.rows();
@@ -203,7 +203,7 @@ double PatternCoverage::time_to_cover(double share) const {
 
 PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions& scan,
                                  const CoverageOptions& options, const Progress& progress) {
-  scan_pattern(sensor, 0, 1, scan);  // says what is wrong with the scan
+  scan_pattern(sensor, 0, 1, scan);  // reports the defect of the scan
   const double rows_per_second =
       scan.shot_rate.value_or(sensor.shot_rate) / static_cast<double>(scan.every);
   check(options, rows_per_second);
@@ -218,7 +218,7 @@ PatternCoverage pattern_coverage(const Sensor& sensor, const ScanPatternOptions&
   result.all_around = sensor.train.layout().axis_up;
   const Grid grid(options.cell, result.all_around);
 
-  // One direction of every small cell: where circles without a shot may have their centre.
+  // One direction of every small cell: possible centres of circles without a shot.
   const Grid fine(std::max(0.25 * options.cell, kFinest), result.all_around);
   std::vector<char> in_field(grid.size()), seen(fine.size());
   std::vector<Vector3<double>> centres;

@@ -49,7 +49,7 @@ std::string file_number(double value, long double scale, std::string_view field)
   return io::yaml_decimal(value, scale);
 }
 
-/// A number of a sensor that is no parameter of the observation model.
+/// A number of a sensor that is not a parameter of the observation model.
 struct Specification {
   const char* section;
   const char* name;
@@ -83,7 +83,7 @@ constexpr std::array kSpecifications{
                   0, 90},
 };
 
-/// A preset with such a number could not be read again.
+/// A preset with this number could not be read again.
 void require_specification(const Specification& s, double value) {
   const long double scale = scale_of(s.unit);
   if (value >= si_from_file(s.lower, scale) && value <= si_from_file(s.upper, scale)) return;
@@ -92,7 +92,7 @@ void require_specification(const Specification& s, double value) {
                                     s.unit, s.lower, s.upper));
 }
 
-/// Section names in file order; the section range has its own place.
+/// Section names in file order; the section range has a fixed place.
 std::vector<std::string_view> section_names() {
   std::vector<std::string_view> names;
   for (const Specification& entry : kSpecifications) {
@@ -208,7 +208,7 @@ void read_parameters(const YamlMap& map, Sensor& sensor) {
   }
 }
 
-/// What the sensor adds to true ranges; absent values are 0.
+/// Range errors of the sensor; absent values are 0.
 void read_range_values(const YamlMap& root, Sensor& sensor) {
   if (root.find("range") == nullptr) return;
   const YamlMap map = root.section("range");
@@ -245,7 +245,7 @@ void read_specifications(const YamlMap& root, Sensor& sensor) {
 }
 
 /// Largest thickness and spacing of prisms, m, and the smallest of either: walls determine only
-/// combinations of sizes, so that a single one may be found below 0.
+/// combinations of sizes, so that a single one may come out below 0.
 constexpr long double kThickest = 1, kWidest = 10, kThinnest = -0.1L;
 
 /// Sizes of the prisms, each kind under its shared name or under the prisms' own.
@@ -288,7 +288,7 @@ void read_geometry(const YamlMap& root, Sensor& sensor) {
   }
 }
 
-/// combination, the number of the one that the sensor is in, and combinations, a list of
+/// combination, the number of the sensor's own one, and combinations, a list of
 /// {angular_velocity_deg_per_s: [one per prism], face_order}; the latter may be missing.
 void read_combinations(const YamlMap& root, Sensor& sensor) {
   if (root.find("combination") == nullptr) {
@@ -391,7 +391,7 @@ void read_sequence(const YamlMap& root, Sensor& sensor) {
   sensor.sequence = std::move(sequence);
 }
 
-/// Writes one quantity with what is known of it.
+/// Writes one quantity with its uncertainty and source.
 std::string quantity_text(const Sensor& sensor, std::string_view name, double value,
                           std::string_view unit, const Knowledge* known) {
   const long double scale = scale_of(unit);
@@ -450,7 +450,7 @@ std::string parameters_text(const Sensor& sensor) {
   return text;
 }
 
-/// A number of combination that stands for one of the sensor's.
+/// The number of one of the sensor's combinations.
 void require_combination(const Sensor& sensor) {
   if (!sensor.combination) {
     require_length("combinations of a sensor without combination", sensor.combinations.size(), 0);
@@ -503,7 +503,7 @@ std::string geometry_text(const Sensor& sensor) {
   return text;
 }
 
-/// The section range, or nothing where all of it is 0 and nothing is known of it.
+/// The section range, or nothing if all of it is 0 and unknown.
 std::string range_text(const Sensor& sensor) {
   require_length_or_none("emitter of range_errors", sensor.range_errors.emitter.size(),
                          static_cast<std::size_t>(sensor.train.emitters()));

@@ -13,8 +13,8 @@ namespace {
 using Batch = xsimd::batch<float>;
 using Doubles = xsimd::batch<double>;
 constexpr std::size_t kLanes = Batch::size;
-/// Rows between angles that are known in double precision. Sines of angles between them come from
-/// those of the angle and of a table by the sum of angles: errors do not grow from row to row.
+/// Rows between angles computed in double precision. Sines of the angles between them follow from
+/// those of the angle and of a table by the addition theorem: errors do not grow from row to row.
 constexpr std::size_t kBlock = 512;
 /// Groups of rows that take each step of the model together.
 constexpr std::size_t kGroups = 4;
@@ -70,7 +70,7 @@ class Scan {
   }
 
  private:
-  /// The beams of the emitters that fire from some emitter on.
+  /// The beams of the emitters, beginning with a given one.
   void set_incident(std::size_t first) {
     alignas(64) float x[kLanes], y[kLanes], z[kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane) {

@@ -17,10 +17,10 @@ namespace {
 
 constexpr long double kTurn = 2.0L * std::numbers::pi_v<long double>;
 
-/// What speeds that swing by 1 rad/s add to the angles: see ScanSequence.
+/// Effect on the angles of speeds that swing by 1 rad/s: see ScanSequence.
 class Swing {
  public:
-  /// @param interval  at which speeds are added up, s
+  /// @param interval  at which speeds are summed, s
   Swing(const Sensor& sensor, const ScanSequence& sequence, double interval)
       : interval_(sequence.swing.empty() ? 0 : interval),
         half_step_(0.5 * swing_angular_frequency(sensor) * interval) {}
@@ -39,7 +39,7 @@ class Swing {
   double interval_, half_step_;  // s, rad
 };
 
-/// Which shots some rows are, and when they are fired.
+/// Shots of some rows, and their times.
 struct Rows {
   ScanSequence sequence;
   std::vector<double> start;  ///< rotation angles at time 0, rad
@@ -75,7 +75,7 @@ struct Rows {
   /// Shots that are fired at one time.
   std::uint64_t at_once() const { return together ? emitters : 1; }
   std::uint64_t step(std::uint64_t shot) const { return first_shot + shot / at_once(); }
-  /// Of a step. Hundreds of turns in, double precision would cost the last printed digit.
+  /// Of a step. After hundreds of turns double precision would cost the last printed digit.
   long double seconds(std::uint64_t step) const {
     return static_cast<long double>(step * at_once()) / static_cast<long double>(rate);
   }

@@ -71,7 +71,7 @@ void Sensor::set(std::string_view parameter, double value) {
   }
   train.set(parameter, value);
   if (info.places.size() > 1) return;
-  // Prisms that stop being alike: what was known of all is now known of each.
+  // Prisms that stop being alike: knowledge of all becomes knowledge of each.
   for (const ParameterInfo& shared : parameter_list(shape())) {
     if (shared.kind != ParameterKind::train || shared.places.size() < 2) continue;
     if (std::find(shared.places.begin(), shared.places.end(), info.places.front()) ==
@@ -94,7 +94,7 @@ void Sensor::set(std::string_view parameter, double value) {
 }
 
 void Sensor::set_prism_geometry(const PrismGeometry& sizes) {
-  face_positions(train.face_order(), sizes);  // refuses sizes that do not fit
+  face_positions(train.face_order(), sizes);  // rejects sizes that do not fit
   geometry = sizes;
   std::erase_if(knowledge, [](const Knowledge& entry) {
     return entry.name.starts_with("prism_thickness_") || entry.name.starts_with("prism_spacing_");
@@ -139,13 +139,13 @@ std::vector<SpeedCombination> combinations_of(const Sensor& sensor) {
   return two;
 }
 
-/// Which rotor of one combination turns in another's place, and whether it changes its sense.
+/// Permutation of the rotors between two combinations, and the changes of sense.
 struct Place {
   std::size_t rotor = 0;
   double sign = 1;
 };
 
-/// [rotors of `to`]; empty where these are other speeds.
+/// [rotors of `to`]; empty if the speeds differ.
 std::vector<Place> places_of(const std::vector<double>& from, const std::vector<double>& to) {
   std::vector<Place> places;
   std::vector<bool> taken(from.size(), false);
@@ -154,7 +154,7 @@ std::vector<Place> places_of(const std::vector<double>& from, const std::vector<
     for (std::size_t k = from.size(); k-- > 0;) {
       const bool same_size =
           !taken[k] && std::abs(std::abs(from[k]) - std::abs(speed)) <= 1e-9 * std::abs(speed);
-      // One that also keeps its sense is the likelier.
+      // One that also keeps its sense is more likely.
       if (same_size && (best == from.size() || from[k] * speed >= 0)) best = k;
     }
     if (best == from.size()) return {};
@@ -168,7 +168,7 @@ std::string speed_name(std::size_t rotor) {
   return fmt::format("angular_velocity_{}_deg_per_s", prism_letter(static_cast<int>(rotor)));
 }
 
-/// A sensor whose speeds, face orders and covariance can be taken to other rotors.
+/// A sensor whose speeds, face orders and covariance can be transferred to other rotors.
 void require_combinations(const Sensor& sensor, const std::vector<SpeedCombination>& all) {
   const auto prisms = static_cast<std::size_t>(sensor.prisms());
   require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), prisms);

@@ -12,14 +12,14 @@
 namespace risley::simulation {
 namespace {
 
-/// Rays of equal energy that stand for a footprint: each ninth of both divergences has one, the
+/// Rays of equal energy that represent a footprint: each ninth of both divergences has one, the
 /// first is the middle of the beam.
 constexpr int kRays = 9;
-/// Where ray i is along the horizontal and the vertical axis, in ninths of the divergences.
+/// Position of ray i along the horizontal and the vertical axis, in ninths of the divergences.
 constexpr std::array<std::array<int, 2>, kRays> kPlaces{
     {{0, 0}, {1, 4}, {-1, -4}, {2, -1}, {-2, 1}, {3, 3}, {-3, -3}, {4, -2}, {-4, 2}}};
-/// Surfaces whose ranges differ by less give one pulse, whose range is the mean of theirs, m.
-/// Assumed: pulses of 4 ns.
+/// Surfaces with a smaller range difference give one pulse, at their mean range, m. Assumed: pulses
+/// of 4 ns.
 constexpr double kPulseLength = 0.6;
 /// Data sheets state the maximum range for this reflectivity.
 constexpr double kReflectivityOfLimits = 0.8;
@@ -87,7 +87,7 @@ BeamReturn BeamReturns::of_footprint(const SceneBeam& beam) const {
   const auto end = hits.begin() + count;
   std::stable_sort(hits.begin(), end,
                    [](const scenes::Hit& a, const scenes::Hit& b) { return a.range < b.range; });
-  // The first pulse that the sensor detects. What it receives of a ray falls with the range
+  // The first pulse that the sensor detects. The received energy of a ray falls with the range
   // squared.
   for (std::size_t first = 0; first < count;) {
     std::size_t last = first + 1;

@@ -19,12 +19,12 @@ struct SceneBeam {
   double time = 0;                    ///< since the first shot, s
 };
 
-/// What comes back of one shot, before the errors of the sensor.
+/// Return of one shot, before the errors of the sensor.
 struct BeamReturn {
   double true_range = std::numeric_limits<double>::quiet_NaN();  ///< of the beam's middle, m
-  double range = 0;            ///< that the sensor measures, m; 0: no return
+  double range = 0;            ///< measured by the sensor, m; 0: no return
   double reflectance = 0;      ///< reflectivity times cosine of incidence, [0, 1]
-  double footprint_depth = 0;  ///< sensors::footprint_depth, m; 0 where nothing needs it
+  double footprint_depth = 0;  ///< sensors::footprint_depth, m; 0 if it is not needed
 };
 
 /// How a sensor sees a scene.
@@ -33,7 +33,7 @@ class BeamReturns {
   /// Keeps references to both.
   BeamReturns(const scenes::Scene& scene, const sensors::Sensor& sensor);
 
-  /// Whether a beam has to come with the axes of its footprint.
+  /// Whether a beam needs the axes of its footprint.
   bool needs_axes() const { return footprint_ || slopes_; }
   BeamReturn of(const SceneBeam& beam) const;
 

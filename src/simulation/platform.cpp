@@ -116,7 +116,7 @@ Vector3<double> PlatformPoses::SensorPose::point(const Vector3<double>& of_senso
 
 PlatformPoses::SensorPose PlatformPoses::Cursor::at(std::int64_t shot_ns) {
   const auto pose = cursor_.at(poses_->trajectory_time_ns(shot_ns));
-  if (!pose) {  // gaps and ends were refused before
+  if (!pose) {  // gaps and ends were rejected before
     throw InvalidArgument(fmt::format("the trajectory has no pose at {}",
                                       time_text(poses_->trajectory_time_ns(shot_ns))));
   }

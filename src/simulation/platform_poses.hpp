@@ -13,13 +13,13 @@
 
 namespace risley::simulation {
 
-/// Where the sensor of a platform is at each shot, in the axes of a scene.
+/// Poses of a platform's sensor at each shot, in the axes of a scene.
 class PlatformPoses {
  public:
   /// @param last_shot_ns  of the recording, since its first shot
-  /// @throws InvalidArgument where the trajectory has no pose for a part of the recording, naming
-  ///         both intervals; for a geocentric trajectory and a scene without origin; and as
-  ///         first_clock_reading_ns
+  /// @throws InvalidArgument if the trajectory has no pose for a part of the recording, naming both
+  /// intervals; for a geocentric trajectory and a scene without origin; and as
+  /// first_clock_reading_ns
   PlatformPoses(const Platform& platform, const scenes::Scene& scene, std::int64_t last_shot_ns);
   PlatformPoses(const PlatformPoses&) = delete;
   PlatformPoses& operator=(const PlatformPoses&) = delete;
@@ -35,7 +35,7 @@ class PlatformPoses {
     Vector3<double> point(const Vector3<double>& of_sensor) const;
   };
 
-  /// Poses one after the other; every thread has one of its own.
+  /// Poses in sequence; each thread has its own.
   class Cursor {
    public:
     explicit Cursor(const PlatformPoses& poses) : poses_(&poses), cursor_(poses.poses_) {}

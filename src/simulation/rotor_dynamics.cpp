@@ -171,7 +171,8 @@ void RotorMotion::evaluate(std::span<const std::int64_t> time_ns, std::span<doub
         before = after;
         after = next_knot(after, number + 1);
       }
-      // The cubic through both knots' angles and speeds: what white noise does on average between.
+      // The cubic through both knots' angles and speeds: the mean effect of white noise between
+      // them.
       const double h = kKnotInterval;
       const double u =
           static_cast<double>(now % kKnotInterval_ns) / static_cast<double>(kKnotInterval_ns);

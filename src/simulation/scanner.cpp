@@ -35,11 +35,11 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kFullIntensity = 150.0;
 constexpr double kMostIntensity = 255.0;
 
-/// What a simulation needs of the true sensor.
+/// Quantities of the true sensor needed by a simulation.
 void require_sensor(const sensors::Sensor& sensor) {
   require_between("device_type", sensor.device_type, 0, 255);
   require_length("angular_velocity of the sensor", sensor.angular_velocity.size(), sensor.prisms());
-  face_positions(sensor.train.face_order(), sensor.geometry);  // refuses sizes that do not fit
+  face_positions(sensor.train.face_order(), sensor.geometry);  // rejects sizes that do not fit
   require_not_below("range_minimum", sensor.range_minimum, 0, "m");
   require_not_below("range_maximum", sensor.range_maximum, 0, "m");
   require_finite("range_offset", sensor.range_offset, "m");
@@ -113,7 +113,7 @@ NoiseSettings noise_settings(const SimulationSettings& settings) {
 }
 
 /// A serial number that follows from the optics, so that all recordings of one simulated unit agree
-/// on it. Broadcast codes have 15 characters, of which the last counts the sensor's heads.
+/// on it. Broadcast codes have 15 characters; the last one counts the sensor's heads.
 std::string simulated_serial(const sensors::Sensor& sensor) {
   std::uint64_t hash = 14695981039346656037U;  // FNV-1a, the same on every machine
   const std::string text = to_string(sensor.train.face_order()) +
@@ -298,7 +298,7 @@ class Scanner::State {
   }
 
   /// A beam of the sensor where the sensor is then.
-  /// @param cursor  of the calling thread, where the sensor moves
+  /// @param cursor  of the calling thread, if the sensor moves
   SceneBeam in_scene(std::optional<PlatformPoses::Cursor>& cursor, std::int64_t time_ns,
                      const Vector3<double>& origin, const Vector3<double>& direction) const {
     const auto beam_of = [&](const Vector3<double>& from, const auto& turned) {

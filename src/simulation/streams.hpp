@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-/// What each stream of random numbers is for. A number once given keeps its meaning, or seeds would
-/// change theirs.
+/// Purpose of each stream of random numbers. Numbers keep their meaning, or seeds would change
+/// theirs.
 namespace risley::simulation::stream {
 
 inline constexpr std::uint64_t kStartAngles = 1;

@@ -20,7 +20,7 @@
 namespace risley::simulation {
 namespace {
 
-/// Files that are removed again unless everything succeeds.
+/// Files that are removed unless everything succeeds.
 class FilesInProgress {
  public:
   FilesInProgress() = default;
@@ -37,7 +37,7 @@ class FilesInProgress {
   std::vector<std::string> paths_;
 };
 
-/// @return what the format of the user's trajectory has no place for
+/// @return data that the format of the user's trajectory cannot hold
 std::vector<std::string> write_platform(const SimulationSettings& settings, const std::string& path,
                                         FilesInProgress& files) {
   const Platform& platform = *settings.platform;
@@ -131,7 +131,7 @@ SimulationResult simulate_to_file(
     const SimulationSettings& settings, const std::string& path,
     const std::vector<std::pair<std::string, std::string>>& provenance, const Progress& progress) {
   Scanner scanner(settings);
-  const auto recording = recordings::create_recording(path, scanner.header());
+  const auto recording = recordings::create_recording(path, scanner.header(), {}, settings.writing);
   recordings::TruthWriter truth_columns(truth_columns_path(path), settings.truth.prisms());
   FilesInProgress beside;
   std::vector<std::string> left_out;

@@ -24,9 +24,9 @@
 namespace risley::tables {
 namespace {
 
-/// Status with which a child ends that got no more memory.
+/// Exit status of a child that ran out of memory.
 constexpr int kOutOfMemory = 3;
-/// Status with which a child ends whose service threw something else.
+/// Exit status of a child after its service threw another exception.
 constexpr int kThrew = 4;
 
 /// @return whether all bytes were moved
@@ -65,7 +65,7 @@ void limit(int resource, rlim_t most) {
   ::setrlimit(static_cast<__rlimit_resource_t>(resource), &own);
 }
 
-/// Memory that this process has mapped already.
+/// Memory already mapped by this process.
 std::size_t mapped_bytes() {
   std::size_t pages = 0;
   if (std::FILE* file = std::fopen("/proc/self/statm", "re")) {
@@ -75,14 +75,14 @@ std::size_t mapped_bytes() {
   return pages * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
 }
 
-/// The clock of the processor time that one request may take; 0 stops it.
+/// The clock of the processor time limit for one request; 0 stops it.
 void set_clock(int seconds) {
   itimerval time{};
   time.it_value.tv_sec = seconds;
   ::setitimer(ITIMER_PROF, &time, nullptr);
 }
 
-/// Lets go of files that the parent has open: their locks would outlast its closing them.
+/// Closes files that the parent has open: their locks would outlast its closing them.
 void close_all_but(int socket) {
   constexpr unsigned kFirst = 3;  // behind the standard streams
   const auto own = static_cast<unsigned>(socket);
@@ -90,11 +90,12 @@ void close_all_but(int socket) {
   ::close_range(own + 1, ~0U, 0);
 }
 
-/// Runs in the child on a copy of its owner's stack, whose frames no exception may reach.
+/// Runs in the child on a copy of its owner's stack; no exception may reach the frames of that
+/// stack.
 [[noreturn]] void serve(int socket, const ConfinedProcess::Service& service) noexcept {
   close_all_but(socket);
   if (!send_message(socket, {})) ::_exit(0);
-  // The owner ends this process; it hears of signals itself.
+  // The owner ends this process; it receives signals itself.
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) std::signal(signal, SIG_IGN);
   std::signal(SIGPROF, SIG_DFL);
   sigset_t none;
@@ -147,7 +148,7 @@ ConfinedProcess::ConfinedProcess(const Service& service, const Progress& progres
                                    std::strerror(problem)));
   }
   try {
-    receive();  // it has let go of our files
+    receive();  // it has released our files
   } catch (const Cancelled&) {
     end();
     throw;
@@ -195,7 +196,7 @@ void ConfinedProcess::fail() {
     end();
     throw ProcessEnded(fmt::format("the library did not answer within {} s", kMostWaitSeconds));
   }
-  ::kill(child_, SIGKILL);  // changes nothing for one that has ended
+  ::kill(child_, SIGKILL);  // no effect on a process that has ended
   int status = 0;
   pid_t ended = -1;
   do {

@@ -28,14 +28,14 @@ inline constexpr bool kMemoryIsLimited = false;
 inline constexpr bool kMemoryIsLimited = true;
 #endif
 
-/// The child process of a ConfinedProcess ended, or did not answer; the message says how.
+/// The child process of a ConfinedProcess ended, or did not answer; the message gives details.
 class ProcessEnded : public Error {
  public:
   using Error::Error;
 };
 
-/// A child process for a library that hostile bytes may crash, keep busy for ever or make greedy:
-/// the child ends then, and the caller goes on. It is a copy of this process without its other
+/// A child process for a library that hostile bytes may crash, keep busy forever or make greedy:
+/// the child ends then, and the caller continues. It is a copy of this process without its other
 /// threads, so the constructor must be called while no other thread is inside that library.
 /// docs/decisions/0008-netcdf-in-a-child-process.md
 class ConfinedProcess {
@@ -46,11 +46,11 @@ class ConfinedProcess {
   static constexpr std::size_t kMostBytes = std::size_t{1} << 30;  ///< of memory, beside ours
   static constexpr std::size_t kMostAnswerBytes = std::size_t{1} << 30;
 
-  /// Answers one request; called in the child. Must not throw but std::bad_alloc.
+  /// Answers one request; called in the child. Must throw nothing but std::bad_alloc.
   using Service = std::function<std::string(std::string_view request)>;
 
   /// @param progress  stops waiting for answers; its flag must outlive the process
-  /// @throws ProcessEnded where the system refuses a process
+  /// @throws ProcessEnded if the system cannot create a process
   explicit ConfinedProcess(const Service& service, const Progress& progress = {});
   ~ConfinedProcess();
   ConfinedProcess(const ConfinedProcess&) = delete;

@@ -38,7 +38,7 @@ std::string shape_of(std::span<const NetcdfDimension> dimensions) {
   return text;
 }
 
-/// Whether values of a dataset lie in other files.
+/// Whether values of a dataset are in other files.
 bool lies_elsewhere(hid_t group, const char* name) {
   const hid_t object = H5Oopen(group, name, H5P_DEFAULT);
   if (object < 0) return false;  // reading it fails
@@ -52,8 +52,8 @@ bool lies_elsewhere(hid_t group, const char* name) {
   return elsewhere;
 }
 
-/// Called for every link of a file. @param found  std::string*, gets words of the first that leads
-///        out of the file
+/// Called for every link of a file. @param found  std::string*, receives a description of the first
+/// that leads out of the file
 /// @return not 0 to stop
 herr_t find_link_outside(hid_t group, const char* name, const H5L_info_t* link, void* found) {
   const bool inside = link->type == H5L_TYPE_HARD || link->type == H5L_TYPE_SOFT;
@@ -76,13 +76,13 @@ NetcdfFile::~NetcdfFile() { nc_close(id_); }
 
 void NetcdfFile::refuse_links() const {
   const htri_t is_hdf5 = H5Fis_hdf5(path_.c_str());
-  if (is_hdf5 <= 0) return;  // an earlier NetCDF holds all that it has
+  if (is_hdf5 <= 0) return;  // an earlier NetCDF version contains all of its data
   const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   if (file < 0) return;  // NetCDF says why
   std::string found;
   const herr_t visited = H5Lvisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, find_link_outside, &found);
   H5Fclose(file);
-  if (!found.empty()) fail(found + ", and only files that hold all their data themselves are read");
+  if (!found.empty()) fail(found + ", and only files that contain all their data are read");
   if (visited < 0) fail("cannot be opened as NetCDF: its groups cannot be listed");
 }
 
@@ -165,7 +165,7 @@ std::vector<std::string> NetcdfFile::texts(const std::string& name,
       nc_inq_vardimid(id_, number, &dimension) != NC_NOERR || dimension != along.id) {
     fail(fmt::format("expected texts in variable {} along {}", name, shape_of({&along, 1})));
   }
-  // In the file, a text takes a byte at least, and its bytes stand there as they are.
+  // In the file, a text takes at least a byte, and its bytes are stored unchanged.
   std::uint64_t bytes = along.length;
   std::vector<std::string> texts;
   for (std::size_t i = 0; i < along.length; ++i) {

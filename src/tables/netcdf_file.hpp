@@ -12,8 +12,8 @@
 
 namespace risley::tables {
 
-/// A NetCDF file as the library reads it: what NetcdfInput asks for, answered in the process that
-/// the library may end. Nobody else may be inside the library.
+/// A NetCDF file as read by the library: answers the requests of NetcdfInput, in the process that
+/// the library may end. No other thread may be inside the library.
 class NetcdfFile {
  public:
   explicit NetcdfFile(const std::string& path);

@@ -57,7 +57,7 @@ class Parcel {
   std::string bytes_;
 };
 
-/// Takes a parcel apart. What a process whose library misbehaved sends is not trusted.
+/// Takes a parcel apart. Data from a process whose library misbehaved are not trusted.
 class Unpacker {
  public:
   explicit Unpacker(std::string_view bytes) : left_(bytes) {}
@@ -72,7 +72,7 @@ class Unpacker {
   std::string take_text() { return std::string(take_bytes(take<std::size_t>())); }
   std::string_view take_bytes(std::size_t size) {
     if (size > left_.size())
-      throw ProcessEnded("the process that reads the file sent an answer that makes no sense");
+      throw ProcessEnded("the process that reads the file returned an invalid answer");
     const std::string_view taken = left_.substr(0, size);
     left_.remove_prefix(size);
     return taken;
@@ -104,7 +104,7 @@ NetcdfDimension take_dimension(Unpacker& parcel) {
   return dimension;
 }
 
-/// Answers requests about one file, in the process of its own.
+/// Answers requests about one file, in a separate process.
 class Service {
  public:
   explicit Service(const io::InputFile& file)
@@ -127,7 +127,7 @@ class Service {
   void serve(Unpacker& asked, Parcel& answer) {
     switch (asked.take<Request>()) {
       case Request::open:
-        // Some systems keep processes out of each other's files.
+        // Some systems prevent processes from opening each other's files.
         file_ = std::make_shared<NetcdfFile>(::access(name_.c_str(), R_OK) == 0 ? name_ : path_);
         break;
       case Request::has_attribute:
@@ -199,7 +199,7 @@ class NetcdfInput::Process {
   Process(const NetcdfInput& owner, const io::InputFile& file, const Progress& progress)
       : owner_(owner) {
     try {
-      const NetcdfLock lock;  // the copy of this process finds the library at rest
+      const NetcdfLock lock;  // no call of the library is in progress in the copy of this process
       process_.emplace(Service(file), progress);
     } catch (const ProcessEnded& error) {
       owner_.fail(error.what());

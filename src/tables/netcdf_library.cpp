@@ -51,8 +51,8 @@ TypeEntry entry_of(NetcdfType type) {
 }  // namespace
 
 NetcdfLock::NetcdfLock() : lock_(library_mutex()) {
-  // Every file is closed by its owner. What a full disk refused to close is beyond saving, and
-  // HDF5's own try as the process ends ends it with a fault.
+  // Every file is closed by its owner. Data that a full disk rejected on closing are lost, and
+  // HDF5's own attempt at process exit crashes.
   static const bool kept_from_exit = H5dont_atexit() >= 0;
   static_cast<void>(kept_from_exit);
   // HDF5 keeps one error stack per thread and prints it; NetCDF silences only the first thread's.

@@ -10,7 +10,7 @@
 
 namespace risley::tables {
 
-/// Held around every call of the NetCDF library, of the whole process.
+/// Held around every call of the NetCDF library, for the whole process.
 class NetcdfLock {
  public:
   NetcdfLock();
@@ -28,7 +28,7 @@ std::string_view name_of(NetcdfType type);
 void require_dimensions(const std::string& variable,
                         std::span<const NetcdfDimension* const> dimensions);
 
-/// What the library says of a status; of a refusal by the disk what the system says.
+/// The library's message for a status; for a disk error the system's.
 std::string netcdf_reason(int status);
 
 }  // namespace risley::tables

@@ -22,8 +22,8 @@ namespace risley::tables {
 
 namespace {
 
-/// One more handle of a file that NetCDF has open, below 0 without one. NetCDF ends the process
-/// with a fault where the system refuses to close a file, so somebody else has to close it last.
+/// One more handle of a file that NetCDF has open, below 0 without one. NetCDF crashes the process
+/// if the system fails to close a file, so another handle must be closed last.
 hid_t another_handle(const std::string& path) {
   std::vector<hid_t> files(
       static_cast<std::size_t>(std::max<ssize_t>(0, H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_FILE))));
@@ -38,7 +38,7 @@ hid_t another_handle(const std::string& path) {
 
 }  // namespace
 
-/// The open file. Its members expect the lock to be held, but for close().
+/// The open file. Its members expect the lock to be held, except close().
 class NetcdfOutput::File {
  public:
   explicit File(const std::string& path) : own_(path), output_(*own_) { create(); }
@@ -46,8 +46,8 @@ class NetcdfOutput::File {
   ~File() {
     if (!id_) return;
     const NetcdfLock lock;
-    // After a close that the disk refused, HDF5 ends the process with a fault at its exit. What is
-    // left here is going to be removed, so on a full disk its room serves to close it.
+    // After a failed close, HDF5 crashes the process at its exit. The partial file will be removed,
+    // so on a full disk its room serves to close it.
     std::error_code ignored;
     if (nc_sync(*id_) != NC_NOERR) {
       std::filesystem::resize_file(output_.temporary_path(), 0, ignored);
@@ -60,7 +60,7 @@ class NetcdfOutput::File {
   int id() const { return *id_; }
   const std::string& path() const { return output_.path(); }
 
-  /// @param part  of the file that was refused, empty for the whole
+  /// @param affected  part of the file, empty for the whole
   void check(int status, const std::string& part) const {
     if (status == NC_NOERR) return;
     throw FileError(path(), {},
@@ -90,7 +90,7 @@ class NetcdfOutput::File {
   void close() {
     {
       const NetcdfLock lock;
-      // What a full disk refuses is refused now, when the destructor can still help.
+      // A full disk fails now, while the destructor can still help.
       check(nc_sync(id()), "");
       check(close_library(), "");
     }

@@ -17,7 +17,7 @@
 namespace risley::tables {
 namespace {
 
-/// A file's path as a URI of SQLite that promises that the file does not change.
+/// A file's path as an SQLite URI declaring that the file does not change.
 std::string immutable_uri(const std::string& path) {
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(path).string()) {
@@ -38,7 +38,7 @@ bool has_journal(const std::string& path) {
   return false;
 }
 
-/// Bytes that a database should have by its header: those of its pages, as far as it says.
+/// Size of a database according to its header: that of its pages, if stated.
 std::uint64_t bytes_by_header(const std::string& path, std::uint64_t file_bytes) {
   constexpr std::size_t kPageBytesAt = 16, kChangesAt = 24, kPagesAt = 28, kPagesValidForAt = 92;
   std::array<unsigned char, 100> head{};
@@ -58,7 +58,7 @@ std::uint64_t bytes_by_header(const std::string& path, std::uint64_t file_bytes)
 
 constexpr int kInstructionsPerLook = 10'000;  // of SQLite's machine
 
-/// A name as SQL takes it: in quotes.
+/// A name in SQL: in quotes.
 std::string sql_name(const std::string& name) {
   std::string text = "\"";
   for (const char c : name) text += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -67,7 +67,7 @@ std::string sql_name(const std::string& name) {
 
 }  // namespace
 
-/// The open database, and the limits of what one step may take.
+/// The open database, and the limits of one step.
 class SqliteInput::Database {
  public:
   Database(std::string path, std::string kind, const Progress& progress)
@@ -127,7 +127,7 @@ class SqliteInput::Database {
     }
   }
 
-  /// SQLite reads what is missing at the end as zeros, which would make values of them.
+  /// SQLite reads missing data at the end as zeros, which would become values.
   void require_all_pages() const {
     std::error_code code;
     const std::uint64_t found = std::filesystem::file_size(path_, code);

@@ -46,10 +46,9 @@ TableFormat table_format(const std::string& path) {
   for (const TableEnding& one : kTableEndings) {
     if (name.ends_with(one.ending)) return one.format;
   }
-  throw InvalidArgument(
-      fmt::format("{}: the ending does not say which kind of table, allowed: .csv (text) or "
-                  ".nc (NetCDF)",
-                  path));
+  throw InvalidArgument(fmt::format(
+      "{}: the ending does not give the kind of table, allowed: .csv (text) or .nc (NetCDF)",
+      path));
 }
 
 class CsvTable final : public TableFile::Writer {
@@ -100,7 +99,7 @@ class CsvTable final : public TableFile::Writer {
   bool is_first_ = true;
 };
 
-/// Texts have to be known before anything is written, so all of it is kept until then.
+/// Texts must be known before anything is written, so everything is kept until then.
 class NetcdfTable final : public TableFile::Writer {
  public:
   NetcdfTable(std::string path, const std::vector<TableColumn>& columns, TableAbout about)
@@ -114,7 +113,7 @@ class NetcdfTable final : public TableFile::Writer {
       const auto* whole = std::get_if<std::int64_t>(&cell);
       if (column.is.kind == CellKind::text) {
         const auto* text = std::get_if<std::string>(&cell);
-        // The library takes texts as those of C.
+        // The library expects C strings.
         column.texts.push_back(text ? text->substr(0, text->find('\0')) : std::string());
       } else if (column.is.kind == CellKind::integer) {
         column.integers.push_back(whole ? *whole : TableFile::kMissingInteger);
@@ -177,7 +176,7 @@ class NetcdfTable final : public TableFile::Writer {
   std::size_t rows_ = 0;
 };
 
-/// The same cell, one without a value where it is not finite.
+/// The same cell, without a value if it is not finite.
 TableCell checked(const TableCell& cell, const TableColumn& column) {
   if (std::holds_alternative<std::monostate>(cell)) return cell;
   if (const auto* real = std::get_if<double>(&cell); real && column.kind == CellKind::real) {
@@ -188,7 +187,7 @@ TableCell checked(const TableCell& cell, const TableColumn& column) {
           ? column.kind == CellKind::text
           : std::holds_alternative<std::int64_t>(cell) && column.kind != CellKind::text;
   if (fits) return cell;
-  throw InvalidArgument(fmt::format("column {}: the value is of another kind", column.name));
+  throw InvalidArgument(fmt::format("column {}: the value has another type", column.name));
 }
 
 }  // namespace

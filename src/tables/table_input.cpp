@@ -57,7 +57,7 @@ std::string names_of(const std::vector<TableColumn>& columns) {
       fmt::format("expected a table of results, found none of the columns {}", names_of(columns)));
 }
 
-/// Rows of text in which fields in quotes may hold anything, line feeds included.
+/// Rows of text in which quoted fields may contain anything, line feeds included.
 class CsvInput {
  public:
   explicit CsvInput(const std::string& path) : path_(path), lines_(path) {}

@@ -117,7 +117,8 @@ std::string no_overlap_words(const Trajectory& trajectory, std::int64_t first_ns
         last_ns + shift >= trajectory.time_ns.front()) {
       return words +
              fmt::format(
-                 "; they are of two clocks: the times of the recording count from power-on of the "
+                 "; they come from two clocks: the times of the recording count from power-on of "
+                 "the "
                  "sensor, the stamps of its messages are UTC. By the stamps, they overlap when "
                  "{:.6f} s are added to the recording's times (clock_offset_s of the mount)",
                  1e-9 * static_cast<double>(shift));

@@ -153,13 +153,13 @@ ErrorProcess::ErrorProcess(const ErrorModel& model, const Trajectory& trajectory
             .heading;
     // Roll turns about the nose's direction, pitch about the right wing's.
     const double along = std::cos(heading), across = std::sin(heading);
-    PoseErrorVector told;
-    told << accuracy.position, std::hypot(along * accuracy.roll, across * accuracy.pitch),
+    PoseErrorVector sigmas;
+    sigmas << accuracy.position, std::hypot(along * accuracy.roll, across * accuracy.pitch),
         std::hypot(across * accuracy.roll, along * accuracy.pitch), accuracy.heading;
     for (std::size_t i = 0; i < kPoseErrors; ++i) {
-      if (model.terms[i].sigma) told[i] = stated[i];
+      if (model.terms[i].sigma) sigmas[i] = stated[i];
     }
-    sigmas_.push_back(told);
+    sigmas_.push_back(sigmas);
   }
 }
 

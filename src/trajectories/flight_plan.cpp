@@ -27,7 +27,7 @@ using io::fail_at;
 using io::YamlMap;
 
 constexpr int kFlightVersion = 1, kStripsVersion = 1;
-/// Numbers of the random streams; those of scenes and simulations are others.
+/// Numbers of the random streams; scenes and simulations use others.
 constexpr std::uint64_t kAttitudeMotion = 300, kVelocityMotion = 301;
 
 constexpr double kFarthestPlace = 1e5;                  // m from the map's origin
@@ -39,7 +39,7 @@ constexpr double kLongestTurn = 3600;                   // s
 constexpr double kLargestStart = 1e10;                  // s
 constexpr double kLargestSwing_deg = 30, kLargestVelocity = 100;
 constexpr double kHighestFrequency = 1000;  // Hz
-// In extended precision, as files are read: a file may hold 0.1 where 0.1 and more is allowed.
+// In extended precision, as files are read: a file may contain 0.1 if 0.1 and more is allowed.
 constexpr long double kLowestSpeed = 0.01L, kLowestFrequency = 1e-3L, kShortestTurn = 0.1L;
 constexpr int kMostSinusoids = 1000, kMostStrips = 10'000;
 
@@ -50,7 +50,7 @@ constexpr TimeScale kTimeScales[] = {TimeScale::unknown,           TimeScale::gp
 /// One axis of a motion: the sum of amplitude cos(frequency t + phase).
 class AxisMotion {
  public:
-  /// @param axis  0 to 2, which decides on the random numbers
+  /// @param axis  0 to 2, which selects the random numbers
   AxisMotion(const SinusoidMotion& motion, std::size_t axis, const RandomStream& random) {
     const auto count = static_cast<std::size_t>(motion.sinusoids);
     if (motion.rms[axis] == 0.0) return;
@@ -95,13 +95,13 @@ std::array<AxisMotion, 3> axes_of(const SinusoidMotion& motion, std::uint64_t se
 
 Eigen::Vector3d direction_of(double heading) { return {std::sin(heading), std::cos(heading), 0.0}; }
 
-/// Where the platform would be without motion.
+/// Position of the platform without motion.
 struct Planned {
   Eigen::Vector3d position, velocity;
   double heading = 0;
 };
 
-/// A strip with the times, s since the begin of the flight, at which it is flown.
+/// A strip with its times, s since the beginning of the flight.
 struct TimedStrip {
   const Strip* strip;
   double begin = 0, end = 0;
@@ -119,7 +119,7 @@ struct TimedStrip {
 double smooth_step(double u) { return u * u * u * (10.0 + u * (-15.0 + 6.0 * u)); }
 double smooth_step_slope(double u) { return 30.0 * u * u * (1.0 - u) * (1.0 - u); }
 
-/// Between two strips: both lines flown on, blended.
+/// Between two strips: both lines extended, blended.
 Planned turning(const TimedStrip& last, const TimedStrip& next, double t) {
   const double duration = next.begin - last.end;
   const double u = (t - last.end) / duration;
@@ -344,7 +344,7 @@ Flight fly(const FlightPlan& plan) {
   trajectory.position.reserve(records);
   trajectory.attitude.reserve(records);
   trajectory.velocity.reserve(records);
-  std::size_t current = 0;  // the strip that is flown, or the one before the turn
+  std::size_t current = 0;  // the current strip, or the one before the turn
   for (std::size_t i = 0; i < records; ++i) {
     const std::int64_t time_ns =
         since_start_ns(static_cast<long double>(i) / static_cast<long double>(plan.rate));

@@ -17,11 +17,11 @@ namespace {
 
 constexpr std::int64_t kStripSecond = 1'000'000'000;
 
-/// How the platform moves over ground during one second.
+/// Motion of the platform over ground during one second.
 struct SecondOfFlight {
   std::int64_t begin_ns = 0;
   double course = 0, way = 0;  ///< rad, m
-  double heading = 0;          ///< of the body where the second begins, rad
+  double heading = 0;          ///< of the body at the beginning of the second, rad
 };
 
 /// The whole seconds of a flight that have poses at both ends and no gap between.
@@ -45,7 +45,7 @@ std::vector<SecondOfFlight> seconds_of_flight(const Interpolation& interpolation
   return seconds;
 }
 
-/// How far one may go from a second on without turning.
+/// How far one can go from a given second without turning.
 struct Reach {
   std::size_t end = 0;  ///< the first second behind
   double course = 0, length = 0;
@@ -94,7 +94,7 @@ std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
   for (std::size_t i = 0; i < seconds.size(); ++i) {
     reach.push_back(reach_of(seconds, i, least, options.widest_course));
   }
-  // The longest first: one that begins in the end of a turn would break off too early.
+  // The longest first: one that begins at the end of a turn would break off too early.
   std::vector<FlownStrip> strips;
   std::vector<bool> taken(seconds.size(), false);
   for (;;) {

@@ -10,8 +10,8 @@
 namespace risley::trajectories {
 namespace {
 
-// Coordinates of 6.4e6 m in double precision are exact to a nanometre. Sums of them are taken in
-// extended precision, so that nothing is lost to more than the rounding of the results.
+// Coordinates of 6.4e6 m in double precision are exact to a nanometre. Sums of them are formed in
+// extended precision, so that only the rounding of the results remains.
 using Extended = long double;
 
 constexpr Extended kRatio = 1 - Extended{kFlattening};  // of the polar axis to the equatorial one
@@ -23,7 +23,7 @@ void require_place(const Geodetic& place) {
   require_between("height", place.height, kLowestHeight, kHighestHeight, "m");
 }
 
-/// One step towards the normal of the ellipsoid, along which up and out are components.
+/// One step towards the normal of the ellipsoid, with components up and out.
 /// @param z, from_axis  of the place, m
 template <class Number>
 void bowring_step(Number z, Number from_axis, Number& up, Number& out) {
@@ -57,8 +57,9 @@ Geodetic geodetic_from_geocentric(const Eigen::Vector3d& position) {
   require_between("distance from the centre of the Earth", position.norm(),
                   kSemiMajorAxis * (1 - kFlattening) + kLowestHeight,
                   kSemiMajorAxis + kHighestHeight, "m");
-  // Bowring's iteration on the reduced latitude: an error shrinks a thousand times and more with
-  // every step, and the first value is right to 0.2 degree. The last step alone is extended.
+  // Bowring's iteration on the reduced latitude: the error shrinks by a factor of a thousand or
+  // more with every step, and the first value is accurate to 0.2 degree. Only the last step is in
+  // extended precision.
   const Extended z = position.z();
   const Extended from_axis =
       std::sqrt(Extended{position.x()} * position.x() + Extended{position.y()} * position.y());

@@ -17,7 +17,7 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 /// Records further apart than this part of the median step may both be used.
 constexpr std::int64_t kCloseParts = 4;
-/// So many records are looked at on each side of an interval.
+/// Number of records examined on each side of an interval.
 constexpr std::size_t kFarthestRecord = 64;
 
 /// A rotation vector of the same rotation, the nearest one to another vector.
@@ -129,7 +129,7 @@ std::optional<Pose> Interpolation::Cursor::at(std::int64_t time_ns) {
       row = static_cast<std::size_t>(later - times.begin()) - 1;
     }
     row = std::min(row, times.size() - 2);
-    // A record at the begin of a gap is the end of the stretch before it.
+    // A record at the beginning of a gap is the end of the stretch before it.
     if (row > 0 && time_ns == times[row] && interpolation_->is_gap(row)) --row;
     if (row != row_ || begin_ns_ > end_ns_) set_interval(row);
   }

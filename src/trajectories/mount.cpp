@@ -34,7 +34,7 @@ using io::YamlMap;
 
 constexpr int kMountVersion = 1;
 constexpr long double kDegree = std::numbers::pi_v<long double> / 180;
-/// Beyond this a rotation belongs into the nominal one.
+/// Beyond this a rotation belongs in the nominal one.
 constexpr double kLargestBoresight_deg = 45;
 constexpr double kLongestLeverArm = 1000;     // m
 constexpr double kLargestClockOffset = 1e10;  // s: the origins of any two scales of time
@@ -59,7 +59,7 @@ double skewness_of(const Eigen::Matrix3d& matrix) {
   return (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
 }
 
-/// Axes that a matrix of whole numbers swaps, as words; nothing for other matrices.
+/// Axes permuted by a matrix of whole numbers, as words; nothing for other matrices.
 std::optional<std::array<std::string, 3>> axes_words(const Eigen::Matrix3d& nominal) {
   std::array<std::string, 3> words;
   for (int i = 0; i < 3; ++i) {
@@ -186,7 +186,7 @@ long double scale_of(const std::string& name) {
   return name.ends_with("_deg") ? kDegree : 1.0L;
 }
 
-/// A covariance and the sigmas beside it are of one adjustment.
+/// A covariance and the sigmas beside it come from one adjustment.
 void require_own_covariance(const Mount& mount) {
   const algebra::NamedCovariance& own = mount.covariance;
   if (const auto n = std::ssize(own.names); own.matrix.rows() != n || own.matrix.cols() != n) {
@@ -230,7 +230,7 @@ void require_mount(const Mount& mount) {
   if (!(skewness_of(mount.nominal) < 1e-9 && mount.nominal.determinant() > 0)) {
     throw InvalidArgument("nominal: expected a right-handed rotation");
   }
-  // A rounding of the limits themselves is none of the caller's fault.
+  // The rounding of the limits themselves is not the caller's fault.
   const double largest_boresight = radians_from_degrees(kLargestBoresight_deg) * (1 + 1e-15);
   for (std::size_t i = 0; i < 3; ++i) {
     require_stated(fmt::format("boresight[{}]", i), mount.boresight[i], largest_boresight, "rad");
@@ -329,8 +329,7 @@ Mount parse_mount(const std::string& text, const std::string& path) {
   }
   if (axes != nullptr && matrix != nullptr) {
     fail_at(path, std::max(axes->line, matrix->line),
-            "sensor_axes and body_from_sensor are two ways to state the same, expected only one of "
-            "them");
+            "sensor_axes and body_from_sensor state the same quantity, expected only one of them");
   }
   const YamlMap rotation = root.section(axes != nullptr ? "sensor_axes" : "body_from_sensor");
   mount.nominal = axes != nullptr ? read_axes(rotation) : read_matrix(rotation);
@@ -384,8 +383,9 @@ std::string mount_text(const Mount& mount) {
   text += fmt::format("clock_offset_s: {}\n", stated_text(mount.clock_offset, 1));
   if (!mount.covariance.empty()) {
     text +=
-        "# Found together with the sensor's parameters, which its calibration states: with that\n"
-        "# calibration, points know what errors of both have in common.\n";
+        "# Adjusted together with the sensor's parameters, which are in its calibration: with "
+        "that\n"
+        "# calibration, the covariances of points include the common errors of both.\n";
     text += io::covariance_text(mount.covariance, scale_of);
   }
   return text;

@@ -11,16 +11,16 @@
 
 namespace risley::trajectories {
 
-/// The order that puts rows into that of their times.
+/// The order that sorts rows by time.
 struct RowOrder {
-  TimeOrder told;
-  std::vector<std::size_t> rows;  ///< row i is to be rows[i]; empty where all stay
+  TimeOrder times;
+  std::vector<std::size_t> rows;  ///< row i comes from rows[i]; empty if all stay
 };
 
-/// Rows in the order of their times; of rows of one time the first stays.
+/// Rows sorted by time; of rows with the same time the first stays.
 RowOrder row_order(const std::vector<std::int64_t>& times_ns);
 
-/// Row order[i] comes to row i; empty columns stay empty.
+/// Row order[i] moves to row i; empty columns stay empty.
 template <class T>
 void reorder(std::vector<T>& column, const std::vector<std::size_t>& order) {
   if (column.empty()) return;

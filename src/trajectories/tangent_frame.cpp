@@ -16,7 +16,7 @@ void require_frame(const Trajectory& trajectory, Frame frame) {
       fmt::format("frame = {}, expected {}", to_string(trajectory.frame), to_string(frame)));
 }
 
-/// Turns everything about the origin; positions are the caller's.
+/// Rotates everything about the origin; the caller handles positions.
 void turn(Trajectory& trajectory, const Eigen::Matrix3d& rotation) {
   const Eigen::Quaterniond quaternion(rotation);
   for (Eigen::Quaterniond& attitude : trajectory.attitude) {

@@ -19,7 +19,7 @@
 namespace risley::trajectories {
 namespace {
 
-/// No two times are further apart: half of what 64 bits hold, so that differences fit.
+/// Largest distance of two times: half of the range of 64 bits, so that differences fit.
 constexpr std::int64_t kLongestSpan_ns = (std::int64_t{1} << 62) - 1;
 
 /// @throws InvalidArgument that names the column and the row
@@ -41,7 +41,7 @@ void require_lengths(const Trajectory& trajectory) {
 
 namespace {
 
-/// [TimeScale], as files and as sentences name them.
+/// [TimeScale], names in files and in sentences.
 struct ScaleName {
   const char *name, *words;
 };
@@ -71,7 +71,7 @@ Eigen::Quaterniond ned_from_body(const RollPitchHeading& angles) {
 RollPitchHeading roll_pitch_heading(const Eigen::Quaterniond& ned_from_body) {
   require_unit_length("attitude", ned_from_body.norm());
   const Eigen::Matrix3d turn = ned_from_body.normalized().toRotationMatrix();
-  // The nose in ned axes is the first column. Its horizontal part decides what can be told.
+  // The nose in ned axes is the first column. Only its horizontal part has a heading.
   const double level = std::hypot(turn(0, 0), turn(1, 0));
   RollPitchHeading angles;
   angles.pitch = std::atan2(-turn(2, 0), level);
@@ -146,17 +146,17 @@ RollPitchHeading roll_pitch_heading(Frame frame, const Eigen::Vector3d& position
 
 RowOrder row_order(const std::vector<std::int64_t>& times) {
   RowOrder order;
-  TimeOrder& told = order.told;
+  TimeOrder& found = order.times;
   std::int64_t latest = times.empty() ? 0 : times.front();
   bool in_order = true;
   for (std::size_t i = 1; i < times.size(); ++i) {
     in_order = in_order && times[i] > times[i - 1];
     if (times[i] < latest) {
-      ++told.moved;
+      ++found.moved;
       const std::int64_t back = saturating_difference(latest, times[i]);
-      if (back > told.largest_back_ns) {
-        told.largest_back_ns = back;
-        told.largest_back_at = i;
+      if (back > found.largest_back_ns) {
+        found.largest_back_ns = back;
+        found.largest_back_at = i;
       }
     }
     latest = std::max(latest, times[i]);
@@ -170,7 +170,7 @@ RowOrder row_order(const std::vector<std::int64_t>& times) {
       order.rows.push_back(row);
       continue;
     }
-    if (told.repeated++ == 0) told.repeated_at = row;
+    if (found.repeated++ == 0) found.repeated_at = row;
   }
   return order;
 }
@@ -178,13 +178,13 @@ RowOrder row_order(const std::vector<std::int64_t>& times) {
 TimeOrder order_by_time(Trajectory& trajectory) {
   require_lengths(trajectory);
   const RowOrder order = row_order(trajectory.time_ns);
-  if (order.rows.empty()) return order.told;
+  if (order.rows.empty()) return order.times;
   reorder(trajectory.position, order.rows);
   reorder(trajectory.attitude, order.rows);
   reorder(trajectory.velocity, order.rows);
   reorder(trajectory.accuracy, order.rows);
   reorder(trajectory.time_ns, order.rows);
-  return order.told;
+  return order.times;
 }
 
 }  // namespace risley::trajectories

@@ -23,7 +23,7 @@ void include(Extent& extent, double value, bool first) {
   extent.max = first ? value : std::max(extent.max, value);
 }
 
-/// A function of many values, for each accuracy apart.
+/// A function of many values, separately for each accuracy.
 template <class Function>
 PoseAccuracy for_each_accuracy(const std::vector<PoseAccuracy>& all, Function&& function) {
   const auto of = [&](auto&& get) {
@@ -141,8 +141,8 @@ TrajectoryAudit audit_trajectory(const Trajectory& t, const InterpolationOptions
   }
   if (t.time_scale == TimeScale::unknown) {
     warn(audit.warnings, kWarning.clock_unknown,
-         "nothing says what the times count from: a clock offset must bring the recording's clock "
-         "to them");
+         "the origin of the times is not stated: a clock offset must align the recording's clock "
+         "with them");
   }
   if (!t.accuracy.empty()) audit.accuracy = for_each_accuracy(t.accuracy, median);
   return audit;

@@ -45,7 +45,7 @@ std::string known_formats() {
   return names;
 }
 
-/// @throws FileError for what is no file
+/// @throws FileError for a path that is not a file
 FileHead read_file_head(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code code;

@@ -49,7 +49,7 @@ Vector3d ned_of(VelocityAxes axes, const Vector3d& v, double wander,
   return v;
 }
 
-/// Sums over spans of time of what one candidate leaves.
+/// Sums of one candidate's residuals over spans of time.
 struct Residuals {
   Vector3d squares{0, 0, 0};  ///< of residuals along north, east, down
   Vector3d rms(double spans) const { return (squares / spans).cwiseSqrt(); }
@@ -69,8 +69,8 @@ std::int64_t median_step(const std::vector<std::int64_t>& times) {
   return upper_median(steps);
 }
 
-/// Velocities summed over spans of up to a second, against the change of the position: rounded
-/// positions and the noise of single records cost little then.
+/// Velocities integrated over spans of up to a second, compared with the change of the position:
+/// rounded positions and the noise of single records matter little then.
 Comparison compare(const Trajectory& t, const std::vector<double>& wander,
                    const std::vector<VelocityAxes>& tried) {
   Comparison result;
@@ -191,7 +191,8 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
       : few ? fmt::format("{} records, at least {} are needed to compare velocities with positions",
                           trajectory.size(), kFewestRecords)
             : "gaps leave too few records to compare velocities with positions";
-  // What fits: a few centimetres per second, which rounded positions leave, or 1 % of the speed.
+  // Tolerance of a fit: a few centimetres per second, due to rounded positions, or 1 % of the
+  // speed.
   const double speed = can_compare ? std::sqrt(comparison.speed_squares / spans) : 0;
   const double largest = 0.05 + 0.01 * speed;
 
@@ -232,7 +233,7 @@ void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander
   if (total(best) > largest) {
     drop(
         fmt::format("none of {} frames fits the change of the positions: with the best, {}, they "
-                    "differ by {} (north, east, down); the columns of a CSV state theirs",
+                    "differ by {} (north, east, down); the columns of a CSV state their frame",
                     candidates.size(), words_of(best.first), in_mm(*found.residual)));
     return;
   }

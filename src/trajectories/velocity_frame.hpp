@@ -10,7 +10,7 @@
 
 namespace risley::trajectories {
 
-/// Axes that the velocities of a file may stand along.
+/// Possible axes of a file's velocities.
 enum class VelocityAxes : std::uint8_t {
   north_east_down,
   east_north_up,
@@ -23,13 +23,12 @@ enum class VelocityAxes : std::uint8_t {
 /// "north-west-up, turned by the wander angle"
 std::string_view words_of(VelocityAxes axes);
 
-/// Turns the velocities of a file, which stand in `trajectory.velocity` as they were read, into the
-/// trajectory's frame, and says along which axes they stood. They are removed where that cannot be
-/// told.
-/// @param wander  of every row, rad; empty where the file has none
-/// @param stated  what the file says of its axes; all are tried where it says nothing. What does
-/// not
-///                fit the positions is a warning
+/// Rotates the velocities of a file, which are in `trajectory.velocity` as read, into the
+/// trajectory's frame, and returns their original axes. They are removed if the axes remain
+/// unclear.
+/// @param wander  of every row, rad; empty if the file has none
+/// @param stated  the file's statement on its axes; all are tried if there is none. A misfit with
+/// the positions gives a warning
 void settle_velocities(Trajectory& trajectory, const std::vector<double>& wander,
                        std::optional<VelocityAxes> stated);
 

@@ -10,28 +10,28 @@
 
 namespace risley::wire {
 
-void ClientSession::tell(ClientEvent::Kind kind, std::uint32_t value, std::string text) {
+void ClientSession::notify(ClientEvent::Kind kind, std::uint32_t value, std::string text) {
   events_.push_back({kind, value, std::move(text)});
 }
 
-void ClientSession::tell(const SensorReport& report) {
+void ClientSession::notify(const SensorReport& report) {
   events_.push_back({ClientEvent::Kind::report, 0, {}, report});
 }
 
 void ClientSession::lose(std::string why) {
   state_ = ClientState::lost;
   pending_.reset();
-  tell(ClientEvent::Kind::lost, 0, std::move(why));
+  notify(ClientEvent::Kind::lost, 0, std::move(why));
 }
 
 void ClientSession::close() {
   state_ = ClientState::closed;
-  tell(ClientEvent::Kind::closed);
+  notify(ClientEvent::Kind::closed);
 }
 
 void ClientSession::connect(std::int64_t now_ns) {
   connected_ = true;
-  tell(ClientEvent::Kind::connected);
+  notify(ClientEvent::Kind::connected);
   send_heartbeat(now_ns);
 }
 
@@ -68,7 +68,7 @@ void ClientSession::go_on(std::int64_t now_ns) {
 
 void ClientSession::advance(std::int64_t now_ns) {
   if (over()) return;
-  // While the caller stood still, nobody asked the sensor anything.
+  // While the caller was suspended, the sensor got no requests.
   heard_ns_ += std::max<std::int64_t>(now_ns - next_ns(), 0);
   if (now_ns - heard_ns_ >= kSilence) {
     lose(fmt::format("no reply for {:.1f} s", 1e-9 * static_cast<double>(now_ns - heard_ns_)));

@@ -81,7 +81,7 @@ class DataWriter {
   std::vector<std::uint8_t> bytes_;
 };
 
-/// Takes fields from data; remembers the first fault and gives zeros behind it.
+/// Reads fields from data; remembers the first fault and returns zeros after it.
 class DataReader {
  public:
   explicit DataReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -146,7 +146,7 @@ class DataReader {
     }
   }
 
-  /// Whether something was wrong, or data are left.
+  /// Whether there was an error, or data remain.
   bool failed() const { return failed_ || at_ != bytes_.size(); }
   /// The first fault.
   DataFault fault() const { return fault_; }
@@ -169,7 +169,7 @@ class DataReader {
   DataFault fault_ = DataFault::length;
 };
 
-// The fields of every value in their order, for both directions.
+// The fields of every value in order, for both directions.
 
 template <class T, class Value>
 concept Is = std::same_as<std::remove_const_t<T>, Value>;
@@ -280,7 +280,7 @@ std::vector<std::uint8_t> encode_as(FrameType type, const auto& any, std::uint16
       any);
 }
 
-/// Reads the data of a frame into a value, which has its id already.
+/// Reads the data of a frame into a value, whose id is already set.
 template <class Any, class Value>
 std::variant<Any, DataFault> decode_as(const Frame& frame, Value value) {
   DataReader data(frame.data);
@@ -289,7 +289,7 @@ std::variant<Any, DataFault> decode_as(const Frame& frame, Value value) {
   return Any(std::move(value));
 }
 
-/// Of the alternatives that answer one command or are one, that of the frame's id.
+/// Of the alternatives for commands or replies, the one with the frame's id.
 template <class Any, std::size_t kAlternative = 0>
 std::variant<Any, DataFault> decode_any(const Frame& frame) {
   if constexpr (kAlternative == std::variant_size_v<Any>) {

@@ -8,7 +8,7 @@ namespace risley::wire {
 namespace {
 
 constexpr std::uint8_t kMillimetres = 1;  // data type
-/// Between two looks at a sensor that is about to start, ns.
+/// Interval between checks of a sensor that is about to start, ns.
 constexpr std::int64_t kImpatient = 200'000'000;
 constexpr std::uint16_t kStateKeys[] = {kFirmwareTypeKey, kStateKey, kDiagnosisKey,
                                         kTemperatureKey,  kSyncKey,  kFaultsKey};
@@ -83,7 +83,7 @@ void ControlClient::ask_for_the_end() {
 
 void ControlClient::ask_next(std::int64_t now_ns) {
   if (state() == ClientState::connecting && identified_ && is_application_) {
-    if (settings().return_mode) tell(ClientEvent::Kind::refused, 0, "return mode");
+    if (settings().return_mode) notify(ClientEvent::Kind::refused, 0, "return mode");
     set_up();
   }
   if (to_ask_.empty()) return;
@@ -138,7 +138,7 @@ bool ControlClient::take_reply(const ControlFrame& frame, std::int64_t now_ns) {
       break;
     case Purpose::setting:
     case Purpose::restore:
-      if (!good) tell(ClientEvent::Kind::refused, 0, asked_.name);
+      if (!good) notify(ClientEvent::Kind::refused, 0, asked_.name);
       break;
     case Purpose::stop:
       close();
@@ -152,13 +152,13 @@ void ControlClient::take_identity(std::span<const KeyValue> list) {
     if (value.size() == 1 && key == kDataTypeKey) data_type_ = value[0];
     if (value.size() == 1 && key == kImuSwitchKey) imu_ = value[0];
     if (key == kFirmwareKey && !std::exchange(told_firmware_, true)) {
-      tell(ClientEvent::Kind::firmware, 0, version_text(value));
+      notify(ClientEvent::Kind::firmware, 0, version_text(value));
     }
   }
   note(list);
 }
 
-/// Takes what the sensor says of itself, and follows its work state.
+/// Processes a sensor's report, and follows its work state.
 void ControlClient::note(std::span<const KeyValue> list) {
   for (const auto& [key, value] : list) {
     if (key == kFirmwareTypeKey && value.size() == 1) is_application_ = value[0] != 0;
@@ -167,15 +167,15 @@ void ControlClient::note(std::span<const KeyValue> list) {
   update_report(report, list);
   if (report != report_) {
     report_ = std::move(report);
-    tell(report_);
+    notify(report_);
   }
   const bool samples = report_.work_state == kSamplingState;
-  // While something is asked, the state may be that of before.
+  // While a request is pending, the state may be outdated.
   if (state() == ClientState::setting_up && samples && to_ask_.empty() &&
       asked_.purpose == Purpose::start) {
     set_state(ClientState::sampling);
     set_heartbeat_period(kHeartbeatPeriod);
-    tell(ClientEvent::Kind::sampling);
+    notify(ClientEvent::Kind::sampling);
   } else if (state() == ClientState::sampling &&
              (report_.work_state == kIdleState || report_.work_state == kReadyState)) {
     set_up();

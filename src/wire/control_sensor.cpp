@@ -18,17 +18,17 @@ constexpr std::uint8_t kOfMid360 = 1, kOfMid360s = 2, kOfHap = 4, kOfAll = 7, kO
 constexpr std::uint16_t kProductKey = 0x8001, kLoaderKey = 0x8003, kHardwareKey = 0x8004,
                         kMacKey = 0x8005, kPowerUpsKey = 0x8008, kLastSyncKey = 0x800A,
                         kStatusCodeKey = 0x800D, kPatternKey = 0x0001;
-/// Within the work states, but for the motors.
+/// Within the work states, except for the motors.
 constexpr std::int64_t kStep = 100'000'000;  // ns
 
 /// A key of a sensor.
 struct KeyInfo {
   std::uint16_t key;
-  std::uint8_t bytes, of;    ///< length of its value; which types have it
-  std::uint8_t most = 0xFF;  ///< greatest value where it has one byte
+  std::uint8_t bytes, of;    ///< length of its value; supporting types
+  std::uint8_t most = 0xFF;  ///< greatest value if it has one byte
 };
 
-/// In the order in which sensors list them.
+/// In the order used by sensors.
 constexpr KeyInfo kKeys[] = {
     {kDataTypeKey, 1, kOfAll, 3},
     {kPatternKey, 1, kOfAll, 2},
@@ -137,7 +137,7 @@ void ControlSensor::set_clock(std::uint8_t sync, std::int64_t ahead_ns) {
   ahead_ns_ = ahead_ns;
 }
 
-/// Brings what changes by itself up to date.
+/// Updates values that change by themselves.
 void ControlSensor::refresh(std::int64_t now_ns) {
   values_[kStateKey] = {state_};
   const auto clock = values_.find(kClockKey);
@@ -147,7 +147,7 @@ void ControlSensor::refresh(std::int64_t now_ns) {
   if (sync_ != 0) values_[kLastSyncKey] = clock->second;
 }
 
-/// Goes one work state on towards that which is wanted.
+/// Advances one work state towards the requested one.
 void ControlSensor::take_step(std::int64_t now_ns) {
   const std::uint8_t wanted = values_[kTargetStateKey][0];
   const bool has_ready = kind_of(identity().device_type) != kOfHap;
@@ -169,7 +169,7 @@ void ControlSensor::advance(std::int64_t now_ns) {
   if (now_ns >= step_due_ns_) take_step(now_ns);
   if (now_ns < push_due_ns_) return;
   push_due_ns_ = now_ns + kPushPeriod;
-  // Without a target of its own it is sent to whom the points are.
+  // Without a separate target it is sent to the destination of the points.
   const bool has_target = values_.contains(kPushTargetKey);
   auto target = *target_of(values_.at(has_target ? kPushTargetKey : kPointTargetKey));
   if (!has_target) target.host_port = ports_.push;
@@ -209,7 +209,7 @@ void ControlSensor::receive(const Endpoint& from, std::uint16_t port,
     ++rejected_;
     return;
   }
-  // Of other sensors, and its own, which it hears, too.
+  // Of other sensors, and its own, which it receives, too.
   if (frame->reply || frame->from_sensor) return;
   const bool is_search = frame->command == ControlCommand::search;
   const auto data = is_search ? answer_search() : answer(from, *frame, now_ns);
@@ -239,7 +239,7 @@ ControlSensor::Bytes ControlSensor::answer(const Endpoint& from, const ControlFr
       reboot_ = std::int64_t{io::load<std::uint16_t>(frame.data.data())} * 1'000'000;
       return {kDone};
     case ControlCommand::factory_reset: {
-      // What hosts send behind it is anything.
+      // Any data may follow it in hosts' packets.
       const std::string& serial = identity().code;
       if (frame.data.size() < serial.size() ||
           !std::equal(serial.begin(), serial.end(), frame.data.begin())) {
@@ -249,7 +249,7 @@ ControlSensor::Bytes ControlSensor::answer(const Endpoint& from, const ControlFr
       follow_values(now_ns);
       return {kDone};
     }
-    // It has a clock of its own, no logs and no other data.
+    // It has a separate clock, no logs and no other data.
     case ControlCommand::gps_time:
     case ControlCommand::log_switch:
     case ControlCommand::log_time:
@@ -275,7 +275,7 @@ ControlSensor::Bytes ControlSensor::answer_get(std::span<const std::uint8_t> dat
     list.push_back({found->first, found->second});
     bytes += kHead + found->second.size();
   }
-  // Keys that are asked for again and again.
+  // Keys that are requested repeatedly.
   if (bytes + 3 + kControlHeaderBytes > kMostFrameBytes) return encode_list_reply(kWrongCount, {});
   return encode_list_reply(kDone, list);
 }
@@ -298,7 +298,7 @@ std::uint8_t ControlSensor::judge(const Address& from, const KeyValue& entry) co
         value == kSamplingState || value == kIdleState || (value == kReadyState && kind != kOfHap);
     if (entry.key == kTargetStateKey && !is_state) return kOutOfRange;
   }
-  // It has the address that it was started on.
+  // Its address is the one with which it was started.
   if (entry.key == kAddressKey) return kFails;
   const bool is_target =
       entry.key >= kPushTargetKey && entry.key <= 0x0009 && entry.value.size() == 8;
@@ -328,7 +328,7 @@ ControlSensor::Bytes ControlSensor::answer_set(const Address& from, const Contro
   }
   for (const KeyValue& entry : list) {
     Bytes& value = values_[entry.key];
-    // Hosts that did not hear the reply say it again.
+    // Hosts that missed the reply repeat it.
     const bool changes = !std::ranges::equal(value, entry.value);
     if (entry.key == kPointTargetKey && changes) ++handshakes_;
     value.assign(entry.value.begin(), entry.value.end());
@@ -337,7 +337,7 @@ ControlSensor::Bytes ControlSensor::answer_set(const Address& from, const Contro
   return reply(kDone, 0);
 }
 
-/// Does as the settings have it.
+/// Applies the settings.
 void ControlSensor::follow_values(std::int64_t now_ns) {
   const auto target = [&](std::uint16_t key) {
     const HostTarget to = *target_of(values_.at(key));

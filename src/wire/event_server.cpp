@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cstring>
@@ -17,18 +16,17 @@
 
 #include <fmt/format.h>
 #include <microhttpd.h>
-#include <sys/socket.h>
 
 #include "risley/core/error.hpp"
 #include "risley/io/block_file.hpp"
 #include "risley/wire/udp_socket.hpp"
 
-#include "wire/system_address.hpp"
+#include "wire/listening_socket.hpp"
 
 namespace risley::wire {
 namespace {
 
-constexpr unsigned kIdleSeconds = 10;  // for a request, and for a browser that takes no bytes
+constexpr unsigned kIdleSeconds = 10;  // for a request, and for a browser that accepts no bytes
 constexpr std::size_t kStreamBlock = 4096;
 constexpr const char* kEventsPath = "/events";
 constexpr const char* kPolicy =
@@ -69,29 +67,6 @@ void add_headers(MHD_Response* response, const char* type) {
   for (const auto& [name, value] : headers) MHD_add_response_header(response, name, value);
 }
 
-/// A socket of our own, because libmicrohttpd does not say why it could not make one.
-/// @param local  its port, if 0, becomes the one that was free  @throws NetworkError
-io::FileDescriptor listening_socket(Endpoint& local) {
-  const auto refuse_if = [&](bool failed) {
-    if (!failed) return;
-    throw NetworkError(fmt::format(
-        "{}: {}: {}", to_string(local), std::strerror(errno),
-        errno == EADDRINUSE ? "another program has this port; name another, or 0"
-                            : "name an address of this machine and a port that is free"));
-  };
-  io::FileDescriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  refuse_if(socket.get() < 0);
-  const int on = 1;  // a port whose last connections have not timed out yet is free
-  refuse_if(::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0);
-  sockaddr_in address = system_address(local);
-  socklen_t bytes = sizeof address;
-  refuse_if(::bind(socket.get(), any_address(&address), bytes) != 0 ||
-            ::listen(socket.get(), SOMAXCONN) != 0 ||
-            ::getsockname(socket.get(), any_address(&address), &bytes) != 0);
-  local = endpoint_of(address);
-  return socket;
-}
-
 }  // namespace
 
 std::vector<std::string> host_names(const Endpoint& local) {
@@ -111,11 +86,7 @@ class EventServer::Server {
  public:
   Server(const Endpoint& local, std::vector<ServedText> texts)
       : local_(local), texts_(std::move(texts)) {
-    if (local.address == Address{}) {
-      throw InvalidArgument(
-          "0.0.0.0 is no address that a page can be at, expected one of this machine, such as "
-          "127.0.0.1");
-    }
+    // A separate socket, because libmicrohttpd does not report why creating one failed.
     io::FileDescriptor socket = listening_socket(local_);
     daemon_ = MHD_start_daemon(
         MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_EPOLL | MHD_ALLOW_SUSPEND_RESUME, local_.port,
@@ -127,7 +98,7 @@ class EventServer::Server {
       throw NetworkError(to_string(local_) +
                          ": libmicrohttpd could not start: end other programs, or watch no page");
     }
-    const std::scoped_lock lock(mutex_);  // whoever asks already waits for this
+    const std::scoped_lock lock(mutex_);  // the caller already waits for this
     hosts_ = host_names(local_);
   }
 
@@ -137,7 +108,7 @@ class EventServer::Server {
       ending_ = true;
       for (Listener& one : listeners_) wake(one);
     }
-    // Browsers that take their bytes hear how it ended.
+    // Browsers that accept their bytes receive the final event.
     constexpr int kLooks = 30;
     constexpr std::chrono::milliseconds kBetween(10);
     for (int look = 0; look < kLooks && counts().listeners > 0; ++look) {
@@ -176,7 +147,7 @@ class EventServer::Server {
     Server* server = nullptr;
     MHD_Connection* connection = nullptr;
     std::deque<std::string> waiting;
-    std::string current;  // of which `sent` bytes are gone
+    std::string current;  // of which `sent` bytes are sent
     std::size_t sent = 0;
     bool suspended = false;
     std::list<Listener>::iterator place;
@@ -262,7 +233,7 @@ class EventServer::Server {
     return result;
   }
 
-  /// Gives bytes of events to the server's thread, which waits where there are none.
+  /// Passes bytes of events to the server's thread, which waits if there are none.
   static ssize_t give(void* to, std::uint64_t, char* bytes, std::size_t most) {
     auto& listener = *static_cast<Listener*>(to);
     const std::scoped_lock lock(listener.server->mutex_);
@@ -292,7 +263,7 @@ class EventServer::Server {
 
   Endpoint local_;
   std::vector<ServedText> texts_;
-  mutable std::mutex mutex_;  // of all that follows but the daemon
+  mutable std::mutex mutex_;  // of all members below except the daemon
   std::vector<std::string> hosts_;
   std::list<Listener> listeners_;
   std::string latest_;

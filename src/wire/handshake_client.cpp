@@ -62,7 +62,7 @@ void HandshakeClient::take_message(const Frame& frame) {
     reject();
   } else if (status_ != abnormal->status) {
     status_ = abnormal->status;
-    tell(ClientEvent::Kind::status, abnormal->status);
+    notify(ClientEvent::Kind::status, abnormal->status);
   }
 }
 
@@ -95,7 +95,7 @@ void HandshakeClient::take_reply(const Frame& frame, std::int64_t now_ns) {
     }
     if (sampling->value == 1) {
       set_state(ClientState::sampling);
-      tell(ClientEvent::Kind::sampling);
+      notify(ClientEvent::Kind::sampling);
     }
   } else if (std::holds_alternative<Handshake>(asked_)) {
     if (result != 0) {
@@ -107,11 +107,11 @@ void HandshakeClient::take_reply(const Frame& frame, std::int64_t now_ns) {
   } else if (std::holds_alternative<Disconnect>(asked_)) {
     close();
   } else if (result != 0) {
-    tell(ClientEvent::Kind::refused, 0, to_string(frame.command));
+    notify(ClientEvent::Kind::refused, 0, to_string(frame.command));
   }
   if (const auto* info = std::get_if<DeviceInfo>(reply)) {
     identified_ = true;
-    tell(ClientEvent::Kind::firmware, 0, firmware_text(info->firmware));
+    notify(ClientEvent::Kind::firmware, 0, firmware_text(info->firmware));
   }
   go_on(now_ns);
 }
@@ -120,12 +120,12 @@ void HandshakeClient::note_heartbeat(const HeartbeatReply& reply) {
   if (reply.result != 0) return;
   if (sensor_state_ != reply.state) {
     sensor_state_ = reply.state;
-    tell(ClientEvent::Kind::sensor_state, reply.state);
+    notify(ClientEvent::Kind::sensor_state, reply.state);
   }
   const bool starting = reply.state == static_cast<std::uint8_t>(SensorState::starting);
   if (!starting && status_ != reply.status) {
     status_ = reply.status;
-    tell(ClientEvent::Kind::status, reply.status);
+    notify(ClientEvent::Kind::status, reply.status);
   }
 }
 

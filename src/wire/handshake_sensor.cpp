@@ -167,7 +167,7 @@ ParametersReply HandshakeSensor::reset(const ResetParameters& wanted) {
   return {ResetParameters::kId, kOk, 0, 0};
 }
 
-/// Does what a command of the host asks. @return what it is answered with
+/// Executes a command of the host. @return what it is answered with
 std::optional<Reply> HandshakeSensor::obey(const Command& command, std::int64_t now_ns) {
   return std::visit(
       [&](const auto& wanted) -> std::optional<Reply> {
@@ -227,7 +227,7 @@ std::optional<Reply> HandshakeSensor::obey(const Command& command, std::int64_t 
           reboot_ = std::int64_t{wanted.delay_ms} * 1'000'000;
           return result_of(command, true);
         } else if constexpr (std::is_same_v<Kind, SetAddress> || std::is_same_v<Kind, SetUtc>) {
-          // It has the address that it was started on, and a clock of its own.
+          // Its address is the one with which it was started, and it has its own clock.
           return result_of(command, false);
         } else if constexpr (std::is_same_v<Kind, Disconnect>) {
           return result_of(command, true);

@@ -12,7 +12,7 @@
 
 namespace risley::wire {
 
-/// An endpoint as the calls of sockets take it.
+/// An endpoint in the form for socket calls.
 inline sockaddr_in system_address(const Endpoint& endpoint) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -31,7 +31,7 @@ inline Endpoint endpoint_of(const sockaddr_in& system) {
   return {address_of(system), ntohs(system.sin_port)};
 }
 
-/// Those calls have one type for the addresses of all protocols.
+/// These calls have one type for the addresses of all protocols.
 template <class System>
 auto* any_address(System* address) {
   if constexpr (std::is_const_v<System>) {

@@ -30,11 +30,11 @@ constexpr std::int64_t kNanoseconds = 1'000'000'000;
 [[noreturn]] void refuse(const Endpoint& local, int error) {
   std::string remedy;
   if (error == EADDRINUSE) {
-    remedy = ": another program has this port, such as Livox Viewer or another risley; end it";
+    remedy = ": another program uses this port, such as Livox Viewer or another risley; end it";
   } else if (error == EADDRNOTAVAIL) {
     remedy = ": no interface of this machine has this address; give it one, or name another";
   } else if (error == EACCES || error == EPERM) {
-    remedy = ": the system does not allow it to this user";
+    remedy = ": the system does not permit it for this user";
   }
   throw NetworkError(fmt::format("{}: {}{}", to_string(local), std::strerror(error), remedy));
 }
@@ -77,9 +77,9 @@ std::vector<Interface> interfaces() {
     if (found.is_loopback && is_loopback(found.address)) {
       found.broadcast = Address{{127, 255, 255, 255}};
     } else if ((one->ifa_flags & IFF_BROADCAST) != 0 && one->ifa_broadaddr != nullptr) {
-      // Without one of its own the address stands there again.
-      const Address told = address_of(*reinterpret_cast<const sockaddr_in*>(one->ifa_broadaddr));
-      if (told != found.address && told != Address{}) found.broadcast = told;
+      // Without a broadcast address the address itself appears again.
+      const Address stated = address_of(*reinterpret_cast<const sockaddr_in*>(one->ifa_broadaddr));
+      if (stated != found.address && stated != Address{}) found.broadcast = stated;
     }
     all.push_back(std::move(found));
   }
@@ -94,7 +94,7 @@ Interface interface_of(const std::string& address) {
                          [](const Interface& one) { return !one.is_loopback; });
     if (real.size() == 1) return real.front();
     throw InvalidArgument(
-        fmt::format("{}: which interface the sensors are at cannot be told, this machine has {}; "
+        fmt::format("{}: it is unclear which interface reaches the sensors: this machine has {}; "
                     "name the address of one",
                     name_of(kSetting.interface_address), list_of(real.empty() ? all : real)));
   }
@@ -155,7 +155,7 @@ UdpSocket::UdpSocket(const Endpoint& local, std::size_t receive_buffer, const st
   }
   if (receive_buffer > 0) {
     const int asked = static_cast<int>(std::min<std::size_t>(receive_buffer, 1U << 30U));
-    // Who administers the network gets more than the system allows everybody.
+    // A network administrator may exceed the system's usual limit.
     if (::setsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUFFORCE, &asked, sizeof asked) != 0) {
       set(SO_RCVBUF, &asked, sizeof asked);
     }
@@ -164,7 +164,8 @@ UdpSocket::UdpSocket(const Endpoint& local, std::size_t receive_buffer, const st
     if (::getsockopt(socket_.get(), SOL_SOCKET, SO_RCVBUF, &granted, &bytes) != 0) {
       refuse(local, errno);
     }
-    receive_buffer_ = static_cast<std::size_t>(granted) / 2;  // Linux says twice what it grants
+    receive_buffer_ = static_cast<std::size_t>(granted) / 2;  // Linux reports twice the granted
+                                                              // size
   }
   const sockaddr_in address = system_address(local);
   if (::bind(socket_.get(), any_address(&address), sizeof address) != 0) refuse(local, errno);

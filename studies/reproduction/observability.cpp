@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Section 2.3 of the paper: what directions tell of every parameter.
+// Section 2.3 of the paper: what directions determine about every parameter.
 #include "risley/estimation/observability.hpp"
 
 #include <algorithm>
@@ -49,9 +49,9 @@ double effect(const QuantityObservability& one) {
   return degrees_from_radians(one.sensitivity) * si_per_unit(one.name);
 }
 
-/// Correlation of both tilts of prism A in the paper's filter, when it estimates both. The data do
-/// not tell the horizontal one, so it ends anywhere within its prior, and where it ends decides how
-/// the vertical one follows it: a random number between -1 and 1 that is seldom small.
+/// Correlation of both tilts of prism A in the paper's filter, if it estimates both. The data do
+/// not determine the horizontal one, so it ends anywhere within its prior, and where it ends
+/// decides how the vertical one follows it: a random number between -1 and 1 that is seldom small.
 Row vertical_tilt_row(const ReproduceOptions& options, const Progress& progress) {
   const double residual = radians_from_degrees(0.004);
   const double rounding = std::pow(options.unit.angle_resolution, 2) / 12.0;
@@ -92,7 +92,8 @@ Row vertical_tilt_row(const ReproduceOptions& options, const Progress& progress)
   row.checks = {within("percentile of the paper's |-0.99| among ours", row.distribution->percentile,
                        2.5, 97.5, "the central 95 % of our draws")};
   row.note = fmt::format(
-      "One random draw: the data do not tell the horizontal tilt, so the filter leaves it anywhere "
+      "One random draw: the data do not determine the horizontal tilt, so the filter leaves it "
+      "anywhere "
       "within its prior, and where it ends decides how the vertical tilt follows. {} of {} draws "
       "at "
       "section 3.1's noise are negative; sizes 5, 50 and 95 %: {:.3f}, {:.3f}, {:.3f}.",
@@ -123,8 +124,9 @@ Reproduction observability(const ReproduceOptions& options, const Progress& prog
   angle.checks = {at_most("ours", angle.ours, -0.985,
                           "as strong as the paper's at its printed digits, and negative")};
   angle.note =
-      "The tilt turns the prism about the vertical, which an ideal sensor cannot tell from its "
-      "rotation angle at all. Ours is stronger than the paper's since nothing but data bind it.";
+      "The tilt turns the prism about the vertical, which for an ideal sensor is indistinguishable "
+      "from its "
+      "rotation angle. Ours is stronger than the paper's since nothing but data bind it.";
   table.rows.push_back(angle);
 
   const auto& tilt = quantity(all, kTilt);
@@ -169,10 +171,10 @@ Reproduction observability(const ReproduceOptions& options, const Progress& prog
             "with the other default parameters free"),
       at_least("its size", std::abs(material.ours), 0.999,
                "the paper: perfectly correlated through Snell's law")};
-  material.note = "Not quite one quantity: 30 s at 100 kHz tell the wedge to 0.01 degree.";
+  material.note = "Not quite one quantity: 30 s at 100 kHz determine the wedge to 0.01 degree.";
   table.rows.push_back(material);
 
-  Row air{"combinations of air, prism index and wedge that data do not tell", "1", {}, 0.0};
+  Row air{"combinations of air, prism index and wedge that data do not determine", "1", {}, 0.0};
   bool exact = false;
   for (const estimation::WeakDirection& weak : all.unobservable) {
     bool material_only = true;
@@ -184,7 +186,7 @@ Reproduction observability(const ReproduceOptions& options, const Progress& prog
     air.ours += material_only;
   }
   air.checks = {at_least("ours", air.ours, 1.0, "the paper fixes two of the three"),
-                holds("the index of air cannot be told at all",
+                holds("the index of air cannot be determined at all",
                       exact || std::isinf(quantity(all, "refractive_index_air").sigma),
                       "only ratios of indices enter Snell's law")};
   table.rows.push_back(air);

@@ -24,8 +24,8 @@ double quantile(const std::vector<double>& sorted, double share) {
   return sorted[below] + (place - std::floor(place)) * (sorted[above] - sorted[below]);
 }
 
-/// Significant digits that tell a check's value from its limits: four, and more for limits that
-/// differ little.
+/// Significant digits that distinguish a check's value from its limits: four, and more for limits
+/// that differ little.
 int digits_of(const Check& check) {
   constexpr int kDigits = 4, kMostDigits = 12;
   const double spread = check.greatest - check.least;

@@ -30,7 +30,7 @@ SimulatedRun simulate(const simulation::SimulationSettings& settings, bool range
 simulation::SimulationSettings unit_settings(const ReproduceOptions& options, std::uint64_t run);
 
 /// As the command estimates with its defaults, from the nominal type.
-/// @param angle_noise  that the estimator is told, rad
+/// @param angle_noise  given to the estimator, rad
 estimation::Estimate estimate_run(estimation::Method method, const SimulatedRun& run,
                                   const sensors::Sensor& type, double angle_noise,
                                   std::vector<estimation::RotorProcess> process = {});

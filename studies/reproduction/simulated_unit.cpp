@@ -24,7 +24,7 @@ using estimation::Estimate;
 using estimation::Evaluation;
 using estimation::Method;
 
-/// The noise that the paper simulates and the estimators are told.
+/// The noise that the paper simulates, also given to the estimators.
 constexpr const char* kPapersNoise = "0.01";
 /// Half the width of the band of a mean that holds it in 999 of 1000 cases, in its sigmas.
 constexpr double kScatterBand = 3.3;

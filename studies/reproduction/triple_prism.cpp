@@ -29,7 +29,7 @@ using estimation::Evaluation;
 using estimation::Method;
 
 constexpr double kTripleDuration = 1.0;  // s
-/// The noise that the estimators are told; the paper's residuals of a real unit.
+/// The noise given to the estimators; the paper's residuals of a real unit.
 constexpr double kTripleNoise = radians_from_degrees(0.004);
 /// So much of a recording shows what a model lacks, s.
 constexpr double kModelDuration = 0.05;
@@ -42,8 +42,8 @@ SimulatedRun triple_run(const ReproduceOptions& options, std::size_t i) {
   // options.angle_noise is the paper's 0.01 degree of section 3.2; another value scales this too.
   settings.angle_noise = kTripleNoise * options.angle_noise / radians_from_degrees(0.01);
   settings.rotor = simulation::RotorKind::hunting;
-  // Two prisms that turn equally fast in opposite senses keep their sum, and with it what a
-  // recording tells: all start as the plan of the bounds does.
+  // Two prisms that turn equally fast in opposite senses keep their sum, and with it the
+  // information of a recording: all start as the plan of the bounds does.
   settings.start_angles.assign(options.triple_unit.angular_velocity.size(), 0.0);
   settings.seed = run_seed(options, 850000 + i);
   return simulate(settings);
@@ -71,7 +71,7 @@ double over_draws(const std::vector<TripleDraw>& draws,
   return root_mean_squares ? root_mean_square(values) : mean_of(values);
 }
 
-/// Cramer-Rao bounds of the unit at the noise that the estimators are told.
+/// Cramer-Rao bounds of the unit at the noise given to the estimators.
 estimation::Observability triple_bounds(const ReproduceOptions& options) {
   estimation::ObservabilityPlan plan;
   plan.sensor = options.triple_unit;
@@ -348,13 +348,14 @@ Estimate one_emitter_estimate(const SimulatedRun& run, const sensors::Sensor& ty
                               of_emitter(run.head, emitter), wishes);
 }
 
-/// As section 2.3: what the directions tell of every parameter, from six emitters and from one.
+/// As section 2.3: what the directions determine about every parameter, from six emitters and from
+/// one.
 Table emitter_table(const ReproduceOptions& options, const Estimate& six, const SimulatedRun& run) {
   const estimation::Observability all = estimation::observability_of_estimate(six);
   const estimation::EmitterComparison& emitters = all.emitters;
   const TrainShape shape = options.triple_unit.shape();
   Table table{"triple_prism_emitters",
-              "Future work 2: what six emitters tell of three prisms, and one does not",
+              "Future work 2: what six emitters determine about three prisms, and one does not",
               fmt::format("Section 2.3 again, from the information of the first recording: all six "
                           "emitters, and as many shots of emitter {} alone, with what is free for "
                           "a sensor with one emitter.",
@@ -386,7 +387,7 @@ Table emitter_table(const ReproduceOptions& options, const Estimate& six, const 
        {"refractive_index_c", "prism_tilt_c_horizontal_deg", "prism_tilt_c_vertical_deg"}) {
     add_gain(name, 0.9, 1.1, "beams of all directions meet the last prism even from one emitter");
   }
-  Row untold{"combinations that one emitter alone does not tell",
+  Row untold{"combinations that one emitter alone does not determine",
              "1",
              {},
              static_cast<double>(emitters.untold_alone.size())};

@@ -5,10 +5,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "refusal.hpp"
+
 namespace risley::algebra::named_covariance_test {
 
 using Eigen::MatrixXd;
-using ::testing::HasSubstr;
+using ::testing::AllOf;
 
 TEST(NamedCovariance, GivesPartsInTheOrderThatIsAskedFor) {
   const NamedCovariance all{{"a", "b", "c"},
@@ -31,9 +33,9 @@ TEST(CovarianceFault, IsFoundWhereItShows) {
   EXPECT_EQ(fault(1, 1, 1, 1).row, -2) << "one quantity may decide another";
   EXPECT_EQ(fault(1, 2, 2, 1).row, -1);
   EXPECT_EQ(fault(1, 0.5, 0.5, 0).row, 1);
-  EXPECT_THAT(fault(1, 0.5, 0.5, 0).words, HasSubstr("[1][1]: a variance must be above 0"));
+  EXPECT_THAT(fault(1, 0.5, 0.5, 0).words, NamesField("[1][1]"));
   EXPECT_EQ(fault(1, 0.5, 0.4, 1).row, 1);
-  EXPECT_THAT(fault(1, 0.5, 0.4, 1).words, HasSubstr("[1][0] differs from [0][1]"));
+  EXPECT_THAT(fault(1, 0.5, 0.4, 1).words, AllOf(NamesField("[1][0]"), NamesField("[0][1]")));
   EXPECT_EQ(fault(1, 0.5, 0.5 + 1e-14, 1).row, -2) << "rounding";
 }
 

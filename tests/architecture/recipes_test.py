@@ -30,7 +30,7 @@ class RecipesTest(unittest.TestCase):
         known = "".join(read(name) for name in ("CMakeLists.txt", "python/CMakeLists.txt", "cmake/RisleyNpm.cmake"))
         recipes = ("pyproject.toml", "CMakePresets.json", "packaging/conda/meta.yaml", "packaging/vcpkg/portfile.cmake")
         for recipe in recipes:
-            for option in re.findall(r"\bRISLEY_[A-Z_]+", read(recipe)):
+            for option in re.findall(r"\bRISLEY_[A-Z0-9_]+", read(recipe)):
                 if option not in ("RISLEY_COVERED_LAYERS",):
                     self.assertRegex(known, rf"(option|set)\({option}\b", f"{recipe}: {option}")
 

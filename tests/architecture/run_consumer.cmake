@@ -62,7 +62,7 @@ if(WAY STREQUAL "installed")
     run(${WORK}/prefix/bin/risley --version)
     foreach(file share/risley/data/hall.yaml share/risley/presets/mid-40.yaml share/doc/risley/LICENSE
                  share/doc/risley/echarts/LICENSE share/doc/risley/echarts/NOTICE
-                 share/doc/risley/echarts-gl/LICENSE share/doc/risley/THIRD-PARTY.md share/man/man1/risley.1
+                 share/doc/risley/echarts-gl/LICENSE share/doc/risley/three/LICENSE share/doc/risley/THIRD-PARTY.md share/man/man1/risley.1
                  share/man/man1/risley-estimate.1 share/bash-completion/completions/risley
                  share/zsh/site-functions/_risley share/fish/vendor_completions.d/risley.fish)
       if(NOT EXISTS ${WORK}/prefix/${file})
@@ -89,7 +89,7 @@ elseif(WAY STREQUAL "in_tree")
     run(${CMAKE_COMMAND} --build ${WORK}/in_tree)
     execute_process(COMMAND ${valgrind} -q ${WORK}/in_tree/point_a_beam
                     RESULT_VARIABLE status OUTPUT_VARIABLE text)
-    if(NOT status EQUAL 3 OR NOT text MATCHES "= avx512, of which this processor runs none: build risley")
+    if(NOT status EQUAL 3 OR NOT text MATCHES "= avx512, of which this processor supports none: build risley")
       message(FATAL_ERROR "with kernels of another processor: status ${status}:\n${text}")
     endif()
   endif()

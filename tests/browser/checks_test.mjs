@@ -197,7 +197,7 @@ test('colours that colour-blind readers confuse, and faint ones', () => withPage
   }));
 
 test('a scale of colours that goes to and fro', () => withPage(
-  whole.replace("'#fde725']", "'#202020']").replace(/<meta http-equiv="Content-Security-Policy"[^>]*>/, ''),
+  whole.replaceAll('#fde725;', '#202020;').replace(/<meta http-equiv="Content-Security-Policy"[^>]*>/, ''),
   async (tab) => complains(await checks.checkColours(tab), /to and fro in lightness/)));
 
 test('paper without diagrams', async () => {

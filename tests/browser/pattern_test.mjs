@@ -10,7 +10,7 @@ import { inspect, ownFolder, risley } from './pages.mjs';
 
 skipWithoutBrowser();
 const folder = ownFolder();
-const file = join(folder, 'tele-15.html');
+const file = join(folder, 'tele-15.html'), panorama = join(folder, 'mid-360.html');
 
 inspect('pattern', async () => {
   await risley(folder, 0, 'pattern', '--sensor', 'tele-15', '--integration-s', '0.05,0.1',
@@ -19,7 +19,6 @@ inspect('pattern', async () => {
 }, /Coverage and gaps/, false);
 
 inspect('panorama', async () => {
-  const panorama = join(folder, 'mid-360.html');
   await risley(folder, 0, 'pattern', '--sensor', 'mid-360', '--integration-s', '0.1,0.5',
                '--report', panorama);
   return panorama;
@@ -63,6 +62,25 @@ test('the rosette grows as far as the slider stands, and at a press of the butto
   const stopped = await points();
   assert.ok(stopped < all, `${stopped} of ${all} points`);
   assert.equal(await button.innerText(), 'Watch it grow');
+  assert.deepEqual(page.complaints, []);
+  await page.context.close();
+});
+
+test('arrows move a panorama to where they point, as one looks out', async () => {
+  page = await openPage(browser, panorama);
+  const k = await page.tab.evaluate(() =>
+    window.risley.charts.findIndex(({ data }) => data.kind === 'panorama'));
+  await page.tab.focus('#' + await page.tab.evaluate((i) => window.risley.charts[i].place.id, k));
+  const pressed = async (key) => {
+    await page.tab.keyboard.press(key);
+    return page.tab.evaluate((i) =>
+      window.risley.charts[i].chart.getOption().dataZoom.map(({ start }) => start), k);
+  };
+  const [azimuth, elevation] = await pressed('+');
+  const [right] = await pressed('ArrowRight');
+  assert.ok(right < azimuth, `${right} against ${azimuth}`); // azimuths grow to the left
+  const [, up] = await pressed('ArrowUp');
+  assert.ok(up > elevation, `${up} against ${elevation}`);
   assert.deepEqual(page.complaints, []);
   await page.context.close();
 });

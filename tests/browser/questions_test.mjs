@@ -30,7 +30,7 @@ const pattern = (says) => says.split('…').map((part) => part.replace(/[.*+?^${
 const find = (tab, says) => tab.evaluate((words) => {
   const text = (element) => element.innerText?.replace(/\s+/g, ' ') ?? '';
   const wanted = new RegExp(words);
-  return [...document.querySelectorAll('main *')]
+  return [...document.querySelectorAll('main *, #viewer *')]
     .filter((one) => wanted.test(text(one)) && ![...one.children].some((child) => wanted.test(text(child))))
     .map((one) => ({ section: one.closest('details.section'), box: one.getBoundingClientRect() }))
     .filter(({ box }) => box.width > 0 && box.height > 0)

@@ -54,7 +54,7 @@ TEST(FlightShots, RefuseColumnsThatDoNotFit) {
   EXPECT_EQ(refused([](FlightShots& s) {
               s.strip = {1, 0, 0};
             }),
-            "strip[1] = 0, allowed 1 and more, that of the shot before it");
+            "strip[1] = 0, allowed 1 and more, as the shot before it");
   EXPECT_NE(
       refused([](FlightShots& s) { s.time_ns[2] = std::numeric_limits<std::int64_t>::max(); }), "");
   EXPECT_NE(refused([](FlightShots& s) { s.strip.pop_back(); }), "");

@@ -8,6 +8,9 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "risley/core/angle.hpp"
+
+#include "calibration/flight_findings.hpp"
 #include "refusal.hpp"
 
 namespace risley::calibration::trajectory_knots_test {
@@ -180,6 +183,31 @@ TEST(TrajectoryKnots, CorrectPosesBetweenBeforeAndBehindThem) {
   EXPECT_NE(refusal([&] { knot_information(knots, process, 6); }), "");
   EXPECT_NE(refusal([&] { covariance_between_knots(process, 0, 5, 5, 1); }), "");
   EXPECT_NE(refusal([&] { covariance_between_knots(process, 0, 0, 5, 0); }), "");
+}
+
+// What stays of tilts about east and north, in the words of a body that heads somewhere.
+TEST(TrajectoryKnots, TheAccuracyOfACorrectedTrajectoryTurnsWithItsHeading) {
+  FlightModel model;
+  model.knots = make_knots(two_strips(), 0.55);
+  model.corrections = MatrixXd::Zero(6, model.knots.size());
+  MatrixXd sigma(6, model.knots.size());
+  for (int c = 0; c < 6; ++c) sigma.row(c).setConstant(kSigma[c]);
+  for (const double heading : {0.0, 0.5, kPi / 2, 4.0}) {
+    trajectories::Trajectory trajectory;
+    trajectory.frame = trajectories::Frame::local;
+    trajectory.time_ns = {0};
+    trajectory.position = {{0, 0, 0}};
+    trajectory.attitude = {Eigen::Quaterniond(trajectories::ned_axes(trajectory.frame, {0, 0, 0})) *
+                           trajectories::ned_from_body({0, 0, heading})};
+    const trajectories::PoseAccuracy found =
+        corrected(trajectory, model, some_process(), sigma).accuracy.at(0);
+    const double c = std::cos(heading), s = std::sin(heading);
+    EXPECT_NEAR(found.position.x(), kSigma[1], 1e-12);
+    EXPECT_NEAR(found.position.y(), kSigma[0], 1e-12);
+    EXPECT_NEAR(found.roll, std::hypot(c * kSigma[4], s * kSigma[3]), 1e-12);
+    EXPECT_NEAR(found.pitch, std::hypot(s * kSigma[4], c * kSigma[3]), 1e-12);
+    EXPECT_NEAR(found.heading, kSigma[5], 1e-12);
+  }
 }
 
 TEST(TrajectoryKnots, KeepWhatIsKnownExactly) {

@@ -20,7 +20,6 @@ namespace risley::calibration::wall_matching_test {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using testing::station;
 using testing::wall;
 
@@ -205,8 +204,7 @@ TEST(WallMatching, RefusesWhenNoKnownPlaneIsSeen) {
   scene.planes = {wall("known", 60, 90, 10, 0.1), wall("named", 0, 90, 10)};
   std::vector<FoundPlane> found{found_from(0, kUpright, scene.planes[1])};
   EXPECT_THAT(refusal<EstimationError>([&] { match_walls(found, {"one.lvx"}, scene, {}); }),
-              AllOf(HasSubstr("none of the known planes is seen"), HasSubstr("one.lvx"),
-                    HasSubstr("azimuth 0.0"), HasSubstr("distance 10.00 m")));
+              AllOf(NamesField("one.lvx"), NamesField("azimuth 0.0"), NamesField("10.00 m")));
   // Planes that are only named are no datum and may be missing.
   scene.planes[0].normal_sigma.reset();
   found = {found_from(0, kUpright, wall("", -90, 90, 4))};
@@ -221,7 +219,7 @@ TEST(WallMatching, NamesAStationThatSharesNothing) {
   EXPECT_THAT(refusal<EstimationError>([&] {
                 match_walls(found, {"one", "two"}, std::nullopt, {kUpright, wrong});
               }),
-              AllOf(HasSubstr("station upright contradicts the data"), HasSubstr("20.0 degrees")));
+              AllOf(NamesField("station upright"), NamesField("20.0 degrees")));
 
   // With a third one that agrees with the first, the second is to blame.
   scenes::Station third = kUpright;
@@ -230,7 +228,7 @@ TEST(WallMatching, NamesAStationThatSharesNothing) {
   EXPECT_THAT(refusal<EstimationError>([&] {
                 match_walls(found, {"one", "two", "three"}, std::nullopt, {kUpright, wrong, third});
               }),
-              HasSubstr("station flipped contradicts the data"));
+              NamesField("station flipped"));
 
   // A known wall ties a station as well as another station does.
   scenes::Scene scene;

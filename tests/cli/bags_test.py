@@ -55,8 +55,14 @@ class BagsTest(CommandTest):
         self.assertAlmostEqual(info["rate_hz"], 1e5, delta=1)
         self.expect(0, "convert", "whole.mcap", "-o", "whole.nc")
         self.assertEqual(self.expect_json(0, "info", "whole.nc")["observations"], 2000)
-        self.assertIn("unknown ending",
-                      self.expect(2, "convert", "whole.nc", "-o", "again.mcap").stderr)
+        for name in ("again.mcap", "again.db3", "again.bag"):
+            for _ in range(2):  # and once more over what is there
+                self.expect(0, "convert", "whole.nc", "-o", name)
+            info = self.expect_json(0, "info", name)
+            self.assertEqual((info["observations"], info["no_return"], info["warnings"]),
+                             (2000, 0, []))
+        self.assertIn("allowed 0.25 to 1000", self.expect(
+            2, "convert", "whole.nc", "-o", "slow.mcap", "--frame-rate-hz", "0.1").stderr)
 
         (self.folder / "cut.mcap").write_bytes(data[:places[7] + 50])
         done = self.expect(0, "convert", "cut.mcap", "-o", "cut.nc")
@@ -95,6 +101,22 @@ class BagsTest(CommandTest):
         self.assertEqual((bag / "drive_1.mcap").read_bytes(), before)
         (bag / "drive_1.mcap").unlink()
         self.assertIn("not in the folder: drive_1.mcap", self.expect(3, "info", "drive").stderr)
+
+    def test_a_topic_is_rectified_in_its_bag(self):
+        self.expect(0, "simulate", "-o", "scan.mcap", "--sensor", "mid-40-table3", "--scene", HALL,
+                    "--reported", "nominal", "--duration-s", "1", "--seed", "5")
+        truth = ("--calibration", "scan.mcap.truth.yaml")
+        made = self.expect_json(0, "cloud", "scan.mcap", *truth, "-o", "true.mcap", "--replace")
+        self.assertEqual(made["format"], "mcap")
+        self.expect(0, "cloud", "scan.mcap", *truth, "-o", "points.mcap", "--message", "custom",
+                    "--topic", "/livox/lidar")
+        before, after, points = (self.expect_json(0, "info", name)
+                                 for name in ("scan.mcap", "true.mcap", "points.mcap"))
+        self.assertEqual(after["observations"], before["observations"])
+        self.assertEqual(after["observations"] - after["no_return"], points["observations"])
+        self.assertEqual(points["observations"], made["points"])
+        for output, more in (("a.las", ()), ("a.mcap", ("--extrinsics", "1,0,0"))):
+            self.expect(2, "cloud", "scan.mcap", *truth, "-o", output, "--replace", *more)
 
     def test_a_cloud_in_a_bag_keeps_the_times_of_its_points(self):
         self.expect(0, "simulate", "-o", "scan.nc", "--sensor", "mid-40-table3", "--scene", HALL,

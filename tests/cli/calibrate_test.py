@@ -179,6 +179,11 @@ class CalibrateTest(CommandTest):
         result = self.expect_json(0, "calibrate", "again.nc", *sensor, *truth_of("again.nc"))
         self.assertLess(result["truth"]["before"]["total_deg"], 0.002)
 
+    def test_a_list_of_recordings_is_an_input(self):
+        self.write("list.txt", "# one evening\nhall.nc\n")
+        found = self.expect_json(0, "calibrate", "--list", "list.txt", "-o", "listed", "--no-report")
+        self.assertLessEqual({"list.txt", "hall.nc"}, {one["path"] for one in found["inputs"]})
+
     def test_paper(self):
         self.simulate("niche.nc", self.write("niche.yaml", NICHE))
         result = self.expect_json(0, "calibrate", "niche.nc", "--method", "paper",

@@ -33,7 +33,10 @@ class CampaignTest(CommandTest):
     def test_all_at_once(self):
         whole = self.expect_json(0, "campaign", "plan.yaml", "-o", "whole", "--threads", "1")
         self.assertEqual((whole["cells"], whole["done"], whole["missing"]), (16, 16, []))
-        self.assertEqual(self.files("whole"), ["cells.csv", "chunks/chunk-1-of-1.jsonl", "summary.json"])
+        self.assertEqual(self.files("whole"), ["cells.csv", "chunks/chunk-1-of-1.jsonl", "report.html", "summary.json"])
+        page = (self.folder / "whole/report.html").read_text(encoding="utf-8")
+        self.assertEqual(page.count('class="verdict"'), 1)
+        self.assertIn('"sigma":', page)  # the bands
         written = json.loads((self.folder / "whole/summary.json").read_text())
         self.assertEqual(written["settings"], whole["settings"])
         self.assertEqual([one["grid"] for one in whole["settings"]],
@@ -86,7 +89,7 @@ class CampaignTest(CommandTest):
     def test_wrong_use(self):
         for arguments, status, words in (
                 ((), 2, "--output"),
-                (("-o", "d", "--chunk", "3"), 2, "--chunk: found 3, wanted I/N"),
+                (("-o", "d", "--chunk", "3"), 2, "--chunk: found 3, expected I/N"),
                 (("-o", "d", "--chunk", "4/3"), 2, "--chunk = 4/3"),
                 (("-o", "d", "--chunk", "1/17"), 2, "16 cells"),
                 (("-o", "d", "--chunk", "1/2", "--merge"), 2, "--merge"),
@@ -101,7 +104,7 @@ class CampaignTest(CommandTest):
         self.assertIn("estimate.metod", self.expect(3, "campaign", "bad.yaml", "-o", "d").stderr)
         self.assertFalse((self.folder / "d").exists())
         nothing = self.expect(3, "campaign", "plan.yaml", "--merge", "-o", "d").stderr
-        self.assertIn("d/chunks: no chunk of a campaign is there", nothing)
+        self.assertRegex(nothing, "d/chunks: .*no chunk of a campaign")
         self.assertFalse((self.folder / "d").exists())
 
 

@@ -177,6 +177,20 @@ class CloudTest(CommandTest):
         bent.write_text(re.sub(r"(incident_beam_vertical_deg: {value: )[^,]*", r"\g<1>0.4", text))
         self.refused(1, "incident_beam_vertical_deg", "wall.nc", "no.las", calibration=bent.name)
 
+    def test_without_a_calibration_points_are_where_the_sensor_says(self):
+        made = self.expect_json(0, "cloud", "wall.nc", "-o", "told.csv", "--beam-origin", "no")
+        self.assertIn("calibration_assumed", codes_of(made))
+        self.assertEqual(made["calibration"], {"path": "mid-40", "calibrated_against": None})
+        self.cloud("wall.nc", "named.csv", "--beam-origin", "no", "--directions", "reported", calibration="mid-40")
+        columns = ("X_m", "Y_m", "Z_m")
+        for told, named in zip(self.rows("told.csv"), self.rows("named.csv")):
+            self.assertEqual([told[c] for c in columns], [named[c] for c in columns])
+
+    def test_another_sensor_is_refused_by_the_header_of_the_recording(self):
+        self.expect(0, "convert", "wall.nc", "-o", "wall.lvx")
+        done = self.expect(1, "cloud", "wall.lvx", "--calibration", "avia", "-o", "no.las")
+        self.assertIn("Mid-40", done.stderr)
+
     def test_coordinates_beyond_las(self):
         self.refused(2, "allowed", "wall.nc", "far.las", "--las-scale-m", "1e-9")
 
@@ -219,7 +233,7 @@ class CloudTest(CommandTest):
         self.assertIn(f"{found['points']:,}".replace(",", "\u202f"), page)
         error = self.expect(2, "cloud", "wall.nc", "other.nc", "--calibration", "mid-40-table3",
                             "-o", "clouds", "--report", "page.html").stderr
-        self.assertIn("--report is of one recording, and there are 2", error)
+        self.assertIn("--report is for one recording, and there are 2", error)
         self.expect(2, "cloud", "wall.nc", "--calibration", "mid-40-table3", "-o", "same.ply",
                     "--report", "same.ply")
         self.assertFalse((self.folder / "same.ply").exists())

@@ -2,6 +2,7 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Has a unit changed? Results on walls of different days, and what stands beside them."""
+import os
 import re
 import unittest
 
@@ -27,6 +28,8 @@ class CompareTest(CommandTest):
             file.write_text(re.sub(r"(?m)^serial: .*$", 'serial: "3GGDH5B00100011"', file.read_text()))
 
     def test_a_bend_between_two_days_is_seen(self):
+        for number, day in enumerate(DAYS):
+            os.utime(self.folder / day / "calibration.yaml", 2 * (1e9 + 1e7 * number,))
         result = self.expect_json(0, "compare", "march", "june", "november", "-o", "series.html")
         pairs = {(pair["a"], pair["b"]): pair for pair in result["pairs"]}
         self.assertEqual(list(pairs), [("march", "june"), ("june", "november"), ("march", "november")])
@@ -40,6 +43,10 @@ class CompareTest(CommandTest):
                          [f"{day}/calibration.yaml" for day in DAYS])
         page = (self.folder / "series.html").read_text()
         self.assertIn("2 of 3 pairs differ by more than chance explains", page)
+        # What changed most comes first, over the dates, with its sigmas.
+        self.assertEqual(re.search(r'"title":"([^"]+)"', page)[1], "prism_tilt_b_vertical_deg")
+        self.assertIn('"dates":true', page)
+        self.assertIn('"sigma":[', page)
 
     def test_text_says_which_pair_changed(self):
         text = self.expect(0, "compare", "march/calibration.yaml", "november").stdout

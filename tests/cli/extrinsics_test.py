@@ -106,6 +106,20 @@ class ExtrinsicsTest(CommandTest):
             self.assertIn("--extrinsics", done.stderr)
         self.expect(0, "info", "sensor.csv", "--extrinsics", "-90,0,0")
 
+    def test_missing_returns_are_no_turn_of_the_frame(self):
+        """Emitters of a sensor that looks all around are found by means, which sky moves."""
+        (self.folder / "side.yaml").write_text("""planes:
+  - {name: ahead, distance_m: 12, normal_azimuth_deg: 10, normal_zenith_deg: 85}
+  - {name: left, distance_m: 3, normal_azimuth_deg: 90, normal_zenith_deg: 90}
+  - {name: floor, distance_m: 1.4, normal_azimuth_deg: 0, normal_zenith_deg: 180}
+""")
+        self.expect(0, "simulate", "-o", "side.nc", "--sensor", "mid-360", "--duration-s", "0.1",
+                    "--scene", "side.yaml", "--seed", "2")
+        kept = self.expect_json(0, "estimate", "side.nc", "--truth", "side.nc.truth.yaml")
+        self.assertNotIn("turned_back", codes_of(kept))
+        turned = self.expect_json(0, "estimate", "side.nc", "--extrinsics", "90,0,0")
+        self.assertTrue(turned["converged"])
+
     def test_estimate_decides_on_a_stored_pose(self):
         own = self.expect_json(0, "estimate", "sensor.csv", "--sensor", "mid-40")
         kept = self.expect_json(0, "estimate", "sensor.lvx")
@@ -119,7 +133,7 @@ class ExtrinsicsTest(CommandTest):
         self.assert_same_parameters(told, own)
 
     def test_where_shots_do_not_tell_hubs_count_as_moving(self):
-        for hub, words in ((b"", "taken as they are"), (b"13UUG1R00400170", "turned back")):
+        for hub, words in ((b"", "left unchanged"), (b"13UUG1R00400170", "turned back")):
             (self.folder / "roll.lvx").write_bytes((self.folder / "sensor.lvx").read_bytes())
             self.store("roll.lvx", (0, 0, 90), (0, 0, 0), hub)
             warnings = self.expect(0, "observability", "roll.lvx", "--rate-hz", 20000).stderr

@@ -82,7 +82,7 @@ class FleetTest(CommandTest):
         again = self.expect_json(3, "calibrate", "fleet/east", "fleet/north", "fleet/bad/empty.lvx", "-o", "calibrated",
                                  "--table", "units.csv", "--no-report", "--states", "none", "--resume")
         self.assertEqual([again[key] for key in ("done", "failed", "skipped")], [0, 1, 3])
-        self.assertIn("is of one recording, and there are", self.expect(
+        self.assertIn("--truth is for one recording, and there are 3", self.expect(
             2, "calibrate", "fleet/east", "fleet/north", "--table", "t.csv", "--truth",
             "fleet/east/scan.lvx.truth.yaml").stderr)
         # Without a table, one calibration of all.
@@ -264,7 +264,7 @@ class FleetTest(CommandTest):
 
         status, told, whole = stopped(signal.SIGINT)
         self.assertEqual(status, 130)
-        self.assertIn("--resume does the rest", told)
+        self.assertIn("--resume continues", told)
         self.assertGreaterEqual(whole, 2)
         self.assertEqual(len(self.rows("kept.csv")), whole)
         status, _, whole = stopped(signal.SIGKILL)

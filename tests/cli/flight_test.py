@@ -32,8 +32,8 @@ class FlightTest(CommandTest):
         self.assertEqual(result["no_return"], 0)
         self.assertEqual([strip["name"] for strip in result["strips"]],
                          ["strip 1", "strip 2", "strip 3", "strip 4"])
-        self.assertAlmostEqual(result["strips"][0]["begin_s"], 2)
-        self.assertAlmostEqual(result["strips"][0]["end_s"], 18)
+        self.assertAlmostEqual(result["strips"][0]["begin_s"], 208802)
+        self.assertAlmostEqual(result["strips"][0]["end_s"], 208818)
         self.assertEqual(result["files"], [
             "a.lvx", "a.lvx.truth.yaml", "a.lvx.truth.nc", "a.lvx.trajectory.truth.csv",
             "a.lvx.trajectory.csv", "a.lvx.mount.truth.yaml", "a.lvx.strips.yaml"])
@@ -46,10 +46,12 @@ class FlightTest(CommandTest):
         # The trajectories are files that others read.
         info = self.expect_json(0, "info", "a.lvx.trajectory.csv")
         self.assertAlmostEqual(info["rate_hz"], 200)
-        # What was flown once can be flown again, along the file.
+        # What was flown once can be flown again, along the file, where the scene says where it lies.
+        village = (DATA / "village.yaml").read_text(encoding="utf-8")
+        origin = "origin: {latitude_deg: 50, longitude_deg: 8.5, ellipsoidal_height_m: 250}"
+        (self.folder / "placed.yaml").write_text(village.replace("terrain:", f"terrain:\n  {origin}"))
         again = self.simulate(0, "-o", "c.lvx", "--trajectory", "a.lvx.trajectory.truth.csv",
-                              "--mount", "a.lvx.mount.truth.yaml", "--scene",
-                              DATA / "village.yaml", *SHORT)
+                              "--mount", "a.lvx.mount.truth.yaml", "--scene", "placed.yaml", *SHORT)
         self.assertEqual(again["strips"], [])
         self.assertEqual((self.folder / "a.lvx").read_bytes(), (self.folder / "c.lvx").read_bytes())
 
@@ -78,6 +80,8 @@ class FlightTest(CommandTest):
         self.assertIn("give its terrain an origin", failed.stderr)
 
     def test_what_is_missing_is_told(self):
+        (self.folder / "local.yaml").write_text("".join(
+            line for line in EARTH.splitlines(True) if not line.startswith(("origin", "start"))))
         before = self.names()
         for status, words, arguments in (
                 (2, "--mount is missing", FLIGHT[:2] + FLIGHT[4:]),
@@ -87,7 +91,8 @@ class FlightTest(CommandTest):
                 (2, "excludes", FLIGHT + ("--trajectory", DATA / "flight-s4.yaml")),
                 (2, "not both", FLIGHT + ("--station", "x")),
                 (2, "the recording lasts from", FLIGHT + ("--duration-s", "500")),
-                (2, "frame of its own", FLIGHT + SHORT + ("--trajectory-format", "sbet")),
+                (2, "frame of its own",
+                 ("--flight", "local.yaml") + FLIGHT[2:] + SHORT + ("--trajectory-format", "sbet")),
                 (3, "missing.yaml", FLIGHT[:2] + ("--mount", "missing.yaml") + FLIGHT[4:]),
                 (3, "risley_flight", ("--flight", DATA / "village.yaml") + FLIGHT[2:]),
                 (3, "not a trajectory of a known kind",

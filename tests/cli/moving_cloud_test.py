@@ -8,6 +8,7 @@ import sqlite3
 import struct
 import unittest
 
+import las_file
 from command import SOURCE, CommandTest, codes_of
 
 DATA = SOURCE / "data"
@@ -92,56 +93,26 @@ class MovingCloudTest(CommandTest):
         self.assertLess(max(abs(p[1] - 5538631) for p in points), 200)
         self.assertLess(max(abs(p[2] - 254) for p in points), 8)
 
-    def read_las(self, name):
-        """Points with their extra fields, and the table of the trajectory's errors, by the words of
-        docs/files/clouds.md."""
-        data = (self.folder / name).read_bytes()
-        at, points_at, records = struct.unpack_from("<HII", data, 94)
-        length, = struct.unpack_from("<H", data, 105)
-        scale, offset = struct.unpack_from("<3d", data, 131), struct.unpack_from("<3d", data, 155)
-        (evlr_at, evlrs), (count,) = struct.unpack_from("<QI", data, 235), struct.unpack_from(
-            "<Q", data, 247)
-        fields, kinds, facts, rows = [], [], {}, []
+    def test_results_of_a_flight_are_found_together(self):
+        folder = self.folder / "flight"
+        folder.mkdir()
+        for name, file in (("calibration.yaml", "a.lvx.truth.yaml"), ("mount.yaml", "a.lvx.mount.truth.yaml"),
+                           ("trajectory.csv", self.trajectory)):
+            (folder / name).write_bytes((self.folder / file).read_bytes())
+        self.cloud(0)
+        self.expect_json(0, "cloud", "a.lvx", "-o", "found.csv", "--calibration", "flight", "--directions",
+                         "reported", "--crs", "EPSG:32632")
+        self.assertEqual(self.points("a.csv"), self.points("found.csv"))
 
-        def take(user, number, body):
-            if user == b"LASF_Spec" and number == 4:
-                for k in range(0, len(body), 192):
-                    fields.append(body[k + 4:k + 36].split(b"\0")[0].decode())
-                    kinds.append(" BbHhIiQqfd"[body[k + 2]])
-            if user == b"risley" and number == 100:
-                for line in body.decode().rstrip("\0").splitlines():
-                    key, _, values = line.partition(": ")
-                    facts[key] = values.strip("[]").split(",")
-            if user == b"risley" and number > 100:
-                for k in range(0, len(body), 80):
-                    rows.append(struct.unpack_from("<q9d", body, k))
-        for _ in range(records):
-            user, number, size = struct.unpack_from("<16sHH", data, at + 2)
-            take(user.split(b"\0")[0], number, data[at + 54:at + 54 + size])
-            at += 54 + size
-        at = evlr_at
-        for _ in range(evlrs):
-            user, number, size = struct.unpack_from("<16sHQ", data, at + 2)
-            take(user.split(b"\0")[0], number, data[at + 60:at + 60 + size])
-            at += 60 + size
-        points = []
-        for k in range(0, count, 97):
-            base = points_at + k * length
-            whole = struct.unpack_from("<3i", data, base)
-            extra = struct.unpack_from("<" + "".join(kinds), data, base + 30)
-            point = dict(zip(fields, extra))
-            point["at"] = [w * s + o for w, s, o in zip(whole, scale, offset)]
-            adjusted, = struct.unpack_from("<d", data, base + 22)
-            point["time_ns"] = round(1e9 * adjusted) + (10**9 + 315964800 - 18) * 10**9
-            points.append(point)
-        return points, facts, rows
+    def test_latitudes_and_longitudes_are_answered_with_the_zone(self):
+        self.assertIn("EPSG:25832", self.cloud(2, crs="EPSG:4258").stderr)
 
     def test_covariances_follow_from_the_table_by_its_recipe(self):
         done = self.cloud(0, "--trajectory-errors", DATA / "trajectory-errors.yaml",
                           "--common-factors", "yes", mount=DATA / "mount-as-built.yaml",
                           output="a.las")
         self.assertIn("boresight_x_deg", done["common_factors"])
-        points, facts, rows = self.read_las("a.las")
+        points, facts, rows = las_file.read(self.folder / "a.las")
         self.assertGreater(len(points), 30)
         self.assertGreaterEqual(len(rows), 2)
         number = {key: [float(v) for v in values] for key, values in facts.items()
@@ -268,10 +239,10 @@ class MovingCloudTest(CommandTest):
     def test_a_mount_is_needed(self):
         said = self.cloud(2, mount=None).stderr
         self.assertIn("--mount is missing", said)
-        self.assertIn("how the sensor sits", said)
+        self.assertIn("how the sensor is mounted", said)
 
     def test_wrong_maps_are_told(self):
-        for crs, words in (("EPSG:4326", "is not a map projection"), ("EPSG:2225", "US survey foot"),
+        for crs, words in (("EPSG:4326", "latitudes and longitudes"), ("EPSG:2225", "US survey foot"),
                            ("EPSG:999999", "not a coordinate reference system that PROJ knows"),
                            ("nonsense", "EPSG:25832"),
                            ("EPSG:32632+5703", "grid"),       # NAVD88, without its grid

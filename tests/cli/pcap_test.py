@@ -119,7 +119,7 @@ class PcapTest(ProcessTest):
         self.assertEqual(times, [i for i in range(300) if i not in (100, 101, 102, 200)])
         said = self.warnings(name)
         self.assertIn("192.168.1.41:65000: 4 packets are missing between others", said)
-        self.assertIn("192.168.1.41:65000: 296 packets were captured twice; the second ones were left out", said)
+        self.assertIn("192.168.1.41:65000: 296 packets were captured twice; the second ones were ignored", said)
 
     def test_captures_of_parts(self):
         name = self.write("snap.pcap", pcap(links(stream(count=9)), snap=200))
@@ -132,7 +132,7 @@ class PcapTest(ProcessTest):
         self.assertEqual([one["lost_records"] for one in warnings if one["code"] == "shots_lost"], [9 * 96])
         pieces = [(t, udp(MID, (HOST, 56001), packet(1, 0, 0), flags=0x2000)) for t, _ in stream(count=3)]
         name = self.write("pieces.pcap", pcap(links(stream(count=9) + pieces)))
-        self.assertIn("3 fragments of datagrams were left out; sensors send none", self.warnings(name))
+        self.assertIn("3 fragments of datagrams were ignored; sensors send none", self.warnings(name))
 
     def test_a_capture_that_is_cut_off(self):
         for whole, head, record in ((pcap(links(stream(count=20))), 24, 16 + 14 + 28 + 918),

@@ -2,10 +2,15 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Clouds read back by programs of others: NumPy, Open3D, rosbag and laspy, as far as they are there."""
+import base64
 import csv
 import importlib.util
+import json
 import math
 import os
+import pathlib
+import sqlite3
+import struct
 import subprocess
 import sys
 import unittest
@@ -101,11 +106,119 @@ class ReadersTest(CommandTest):
                 for name in rows.dtype.names:
                     columns.setdefault(name.lower(), []).extend(rows[name].astype(float).tolist())
                 times += (message.header.stamp.to_sec() + 1e-9 * rows["offset_time"]).tolist()
+        columns["beam"] = columns.pop("line")
+        columns["time"] = [1e-9 * value for value in columns.pop("timestamp")]
         for name in self.expected:
             self.compare(name, columns[name.lower()])
         self.compare("Time", times, tolerance=1e-6)
         info = subprocess.run(["rosbag", "info", path], capture_output=True, text=True, check=False)
         self.assertIn("sensor_msgs/PointCloud2", info.stdout)
+
+    def points_of(self, message):
+        """Time in ns, x, y, z, intensity, tag and line of the points of a message."""
+        if "points" in message:
+            self.assertEqual(message["point_num"], len(message["points"]))
+            return [(int(message["timebase"]) + p["offset_time"], p["x"], p["y"], p["z"],
+                     p["reflectivity"], p["tag"], p["line"]) for p in message["points"]]
+        stamp = message["header"]["stamp"]
+        begin = 10**9 * stamp["sec"] + stamp["nanosec"]
+        fields = {one["name"]: (one["offset"], one["datatype"]) for one in message["fields"]}
+        self.assertEqual(list(fields), ["x", "y", "z", "intensity", "tag", "line", "timestamp",
+                                        "offset_time"])
+        kinds = {2: "B", 6: "I", 7: "f", 8: "d"}
+        layout = "<" + "".join(kinds[datatype] for _, datatype in fields.values())
+        self.assertEqual(struct.calcsize(layout), message["point_step"])
+        rows = list(struct.iter_unpack(layout, base64.b64decode(message["data"])))
+        self.assertEqual(len(rows), message["width"])
+        for row in rows:
+            self.assertAlmostEqual(row[6], begin + row[7], delta=300)  # as doubles have it
+        return [(begin + row[7], *row[:6]) for row in rows]
+
+    def from_ros1(self, path):
+        """The messages of a bag of ROS 1, as the reader of ROS 2's prints them."""
+        rosbag = importlib.import_module("rosbag")
+
+        def plain(value):
+            if hasattr(value, "__slots__"):
+                if value.__class__.__name__ == "Time":
+                    return {"sec": value.secs, "nanosec": value.nsecs}
+                return {name: plain(getattr(value, name)) for name in value.__slots__}
+            return [plain(one) for one in value] if isinstance(value, list) else value
+        with rosbag.Bag(path) as bag:
+            for topic, message, time, header in bag.read_messages(return_connection_header=True):
+                # The class comes from the definition in the bag, and its sum is that of the type.
+                self.assertEqual(message._md5sum.encode(), header["md5sum"])
+                fields = plain(message)
+                if "data" in fields:
+                    fields["data"] = base64.b64encode(fields["data"]).decode()
+                yield {"topic": topic, "type": header["type"].decode(), "time": time.to_nsec(),
+                       "message": fields}
+
+    def from_node(self, path):
+        script = pathlib.Path(__file__).parent / "bag_reader.mjs"
+        done = subprocess.run([os.environ["RISLEY_NODE"], "--preserve-symlinks", script, path],
+                              capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return map(json.loads, done.stdout.splitlines())
+
+    def from_folder(self, path):
+        """The messages of a folder of ROS 2, as far as possible without ROS."""
+        yaml = module("yaml")
+        about = yaml.safe_load((pathlib.Path(path) / "metadata.yaml").read_text())
+        about = about["rosbag2_bagfile_information"]
+        database = sqlite3.connect(pathlib.Path(path) / about["relative_file_paths"][0])
+        self.assertEqual(database.execute("PRAGMA integrity_check").fetchall(), [("ok",)])
+        rows = database.execute(
+            "SELECT name, type, encoded_message_definition, timestamp, data FROM messages"
+            " JOIN topics ON topics.id = topic_id JOIN message_definitions ON topic_type = type"
+            " ORDER BY timestamp").fetchall()
+        self.assertEqual(about["message_count"], len(rows))
+        self.assertEqual(about["starting_time"]["nanoseconds_since_epoch"], rows[0][3])
+        self.assertEqual(about["duration"]["nanoseconds"], rows[-1][3] - rows[0][3])
+        lines = [json.dumps({"topic": topic, "type": kind, "definition": definition, "time": str(time),
+                             "bytes": base64.b64encode(data).decode()})
+                 for topic, kind, definition, time, data in rows]
+        (self.folder / "messages.jsonl").write_text("\n".join(lines))
+        return self.from_node(self.folder / "messages.jsonl")
+
+    def test_bags_of_every_kind(self):
+        if module("rosbag") is None or not os.environ.get("RISLEY_NODE"):
+            self.skipTest("rosbag, node")
+        types = {("bag", "points"): "sensor_msgs/PointCloud2",
+                 ("bag", "custom"): "livox_ros_driver/CustomMsg",
+                 ("bag", "custom2"): "livox_ros_driver2/CustomMsg",
+                 ("ros2", "points"): "sensor_msgs/msg/PointCloud2",
+                 ("ros2", "custom"): "livox_interfaces/msg/CustomMsg",
+                 ("ros2", "custom2"): "livox_ros_driver2/msg/CustomMsg"}
+        single = lambda value: struct.unpack("<f", struct.pack("<f", value))[0]  # noqa: E731
+        self.cloud("cloud.csv")
+        for ending, read in (("bag", self.from_ros1), ("mcap", self.from_node),
+                             ("db3", self.from_folder)):
+            for kind in ("points", "custom", "custom2"):
+                with self.subTest(ending=ending, kind=kind):
+                    path = str(self.folder / f"{kind}.{ending}")
+                    self.make("cloud", "wall.nc", "--calibration", "mid-40-table3", "-o", path,
+                              "--message", kind, "--frame-rate-hz", 20, "--topic", "/lidar",
+                              "--frame-id", "lidar_frame")
+                    messages = list(read(path))
+                    self.assertEqual(len(messages), 20)
+                    points = []
+                    for one in messages:
+                        header = one["message"]["header"]
+                        self.assertEqual((one["topic"], one["type"], header["frame_id"]),
+                                         ("/lidar", types["bag" if ending == "bag" else "ros2", kind],
+                                          "lidar_frame"))
+                        stamp = 10**9 * header["stamp"]["sec"] + header["stamp"]["nanosec"]
+                        self.assertEqual(int(one["time"]), stamp)
+                        points += self.points_of(one["message"])
+                    self.assertEqual(len(points), len(self.expected["X"]))
+                    for i, (time, *xyz, intensity, tag, line) in enumerate(points):
+                        self.assertAlmostEqual(time, 1e9 * self.expected["Time"][i], delta=2)
+                        for value, name in zip(xyz, "XYZ"):
+                            self.assertAlmostEqual(value, single(self.expected[name][i]), delta=1e-5)
+                        self.assertEqual((intensity, tag, line),
+                                         tuple(int(self.expected[name][i])
+                                               for name in ("Intensity", "Tag", "Beam")))
 
     def test_las_and_laz(self):
         laspy = module("laspy")

@@ -60,7 +60,7 @@ class ReportTest(CommandTest):
         self.assertIn("calibrate/calibration.yaml", [one["path"] for one in found["inputs"]])
         page = (self.folder / "two.html").read_text()
         for words in ("estimate (estimate)", "calibrate (calibrate)", "One unit, mid-40",
-                      "The sensor does not point where it believes"):
+                      "<code>bent</code>"):
             self.assertIn(words, page)
         self.assertIn("--output is missing",
                       self.expect(2, "report", "estimate", "calibrate").stderr)

@@ -48,9 +48,12 @@ class Walker:
 
     def resolve(self, schema, place):
         while "$ref" in schema:
-            name = schema["$ref"].rpartition("/")[2]
-            place = f"{self.verb if name in self.own else 'common'}#{name}"
-            schema = self.whole["$defs"][name]
+            name = schema["$ref"].partition("#/$defs/")[2]
+            steps = name.split("/")  # "properties" of a definition, too
+            place = f"{self.verb if steps[0] in self.own else 'common'}#{name}"
+            schema = self.whole["$defs"]
+            for step in steps:
+                schema = schema[step]
         return schema, place
 
     def takes(self, schema, instance):
@@ -223,8 +226,26 @@ class SchemasTest(CommandTest):
         cls.print(0, "preset", "show", "avia")
         cls.print(0, "preset", "new", "mine", "--from", "avia", "-o", "mine.yaml")
         cls.print(3, "preset", "check", "mine.yaml", "no.yaml")
+        cls.survey(bent)
         cls.fly(bent)
         cls.record()
+
+    @classmethod
+    def survey(cls, bent):
+        stations = (DATA / "site-stations.yaml").read_text(encoding="utf-8")
+        gate, *_ = stations.partition("  - name: crane")
+        (cls.folder / "gate.yaml").write_text(gate, encoding="utf-8")
+        poses = "risley_stations: 1\nstations:\n" + "".join(
+            f"  - name: {name}\n    position: {{easting_m: 1, northing_m: 2, height_m: 3, sigma_m: [0.01, 0.01, 0.01]}}\n"
+            "    attitude: {roll_deg: 0, pitch_deg: 0, heading_deg: 90, sigma_deg: [0.1, 0.1, 0.1]}\n"
+            for name in ("sound", "damaged"))
+        (cls.folder / "poses.yaml").write_text(poses, encoding="utf-8")
+        cls.print(0, "simulate", "-o", "gate.lvx", *bent[:4], "--scene", DATA / "site.yaml", "--station", "gate",
+                  "--duration-s", 2)
+        preset = ("--calibration", "mid-40-table3", "--common-factors", "yes")
+        cls.print(0, "cloud", "gate.lvx", "--station", "gate.yaml", *preset, "-o", "gate.las", "--report", "gate.html")
+        cls.print(3, "cloud", "hall.lvx", "bad.lvx", "--station", "poses.yaml", *preset, "-o", "poses.las")
+        cls.print(0, "compare", "gate.las", "gate.las", "--table", "cells.csv", "-o", "cells.html")
 
     @classmethod
     def record(cls):
@@ -232,7 +253,7 @@ class SchemasTest(CommandTest):
                                      "--restart-takes-s", "0.5", "--set", "prism_tilt_b_vertical_deg=3", "--json"], stdout=subprocess.PIPE, text=True)
         cls.print(0, "record", "--list", "--interface", "127.0.0.94")
         cls.print(0, "record", "-o", "live.lvx", "--interface", "127.0.0.94", "--duration-s", 13,
-                  "--optics", "mid-40")
+                  "--optics", "mid-40", "--publish", "foxglove:0")
         emulator.terminate()
         cls.outputs.append(("emulate", json.loads(emulator.communicate()[0])))
         # The second generation says more of itself.

@@ -177,7 +177,7 @@ class SecondGenerationTest(CommandTest):
         self.assertEqual(self.expect_json(0, "info", "hap.lvx2")["observations"], 48_000)
         for verb in (("estimate", ), ("observability", ), ("calibrate", )):
             said = self.expect(2, *verb, "hap.lvx2").stderr
-            self.assertIn("the optics of a Livox HAP are not known", said)
+            self.assertRegex(said, "optics of a Livox HAP.* not known")
             self.assertNotIn("beam =", said)
 
     def test_damage_and_versions(self):
@@ -193,8 +193,8 @@ class SecondGenerationTest(CommandTest):
         info, (second, ) = self.second("cut.lvx2")
         self.assertEqual((info["observations"], second["lost_packets"]), (96 * (len(whole) - 1), 0))
         self.assertIn("cut off", info["warnings"][0]["message"])
-        self.assertIn("LVX 2 does not hold", self.expect(2, "simulate", "-o", "mid-40.lvx2", "--duration-s", "0.1",
-                                                         "--scene", HALL).stderr)
+        self.assertIn("LVX 2 does not", self.expect(2, "simulate", "-o", "mid-40.lvx2", "--duration-s", "0.1",
+                                             "--scene", HALL).stderr)
 
 
 if __name__ == "__main__":

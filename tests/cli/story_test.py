@@ -18,7 +18,7 @@ UNITS = {
     "wall": ("--sensor", "mid-40-table3", "--reported", "nominal", "--scene", "wall.yaml"),
     "noisy": ("--sensor", "mid-40-table3", "--noise-angle-deg", 0.05, "--scene", HALL),
 }
-PROVISO = re.compile("only walls (tell|show)")
+PROVISO = re.compile("only walls")
 HEALTHY = re.compile(r"healthy|in order|nothing is wrong|true beyond doubt", re.I)
 
 
@@ -96,7 +96,7 @@ class StoryTest(CommandTest):
         again, said = self.run_verb(0, "estimate", "bent.nc", "--sensor", "bent-2", folder="bent-3")
         self.assertEqual(again["verdict"]["code"], "unusual")
         for text in (again["verdict"]["words"], self.page_of("bent-3")[0]):
-            self.assertIn("not what its calibration says", text)
+            self.assertIn("differ from its calibration", text)
             self.assertNotIn("preset", text)
             self.assertNotIn("walls", text)  # they have been asked
         self.assertEqual(again["verdict"]["to_do"],
@@ -122,7 +122,7 @@ class StoryTest(CommandTest):
         total = found["pointing_error"]["total_deg"]
         self.assertLess(total["value"], 4 * found["datum"]["sigma_total_deg"])
         # What the sensor believes is as good: there is no calibration, unless it is forced.
-        self.assertIn("calibration.yaml was not written, because what the sensor believes is as good: --force",
+        self.assertIn("calibration.yaml was not written, because the sensor's own parameters are as good: --force",
                       said.stderr)
         self.assertIs(found["calibration_written"], False)
         self.check_nothing_written("perfect", "perfect-2")
@@ -142,7 +142,7 @@ class StoryTest(CommandTest):
                             ("cloud", "-o", f"{name}.las", "--calibration", folder)):
             result = self.expect_json(3, verb, f"{name}.nc", *more)
             self.assertIn(f"{folder}/calibration.yaml: is missing", result["error"])
-            self.assertIn("report.html beside it says why", result["error"])
+            self.assertIn("report.html beside it gives the reason", result["error"])
         self.assertFalse((self.folder / f"{name}.las").exists())
 
     def test_one_wall_straight_ahead(self):

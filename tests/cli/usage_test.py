@@ -2,10 +2,11 @@
 # SPDX-FileCopyrightText: 2026 The risley authors
 # SPDX-License-Identifier: MIT
 """Help, versions and wrong usage."""
+import os
 import re
 import unittest
 
-from command import CommandTest, verbs
+from command import SOURCE, CommandTest, verbs
 
 VERBS = ("info", "convert", "simulate", "record", "emulate", "estimate", "observability", "calibrate", "cloud",
          "compare", "campaign", "identify", "pattern", "preset", "report", "reproduce")
@@ -38,7 +39,7 @@ WRONG = [
     (["simulate", "-o", "a.csv", "--start-angles-deg", "1,2,3"], "start"),
     (["simulate", "-o", "a.csv", "--quiet", "--verbose"], "--quiet"),
     (["convert", "a.lvx", "a.csv", "-o", "folder"], "--format"),
-    (["cloud", "a.lvx", "-o", "a.las"], "--calibration"),
+    (["cloud", "--beam-origin-map", "a.html"], "--calibration"),
     (["cloud", "--calibration", "mid-40", "-o", "a.las"], "INPUT"),
     (["cloud", "a.lvx", "--calibration", "mid-40"], "--output"),
     (["cloud", "a.lvx", "--calibration", "mid-41", "-o", "a.las"], "mid-41"),
@@ -125,6 +126,22 @@ class UsageTest(CommandTest):
         self.assertEqual(sorted(verbs()), sorted(VERBS))
         for verb in VERBS:
             self.assertEqual(self.expect(0, "help", verb).stdout, self.expect(0, verb, "--help").stdout)
+
+    def test_help_matches_its_golden_text(self):
+        for verb in ("", *VERBS):
+            text = self.expect(0, verb or "help", *["--help"] * bool(verb)).stdout
+            if verb:
+                seen = set(text.splitlines())
+                more = [line for line in self.expect(0, verb, "--help-all").stdout.splitlines() if line not in seen]
+                text += "\n======== with --help-all also\n" + "".join(line + "\n" for line in more)
+            golden = SOURCE / f"tests/cli/golden/{verb or 'risley'}.txt"
+            with self.subTest(golden=golden.name):
+                wanted = golden.read_text(encoding="utf-8") if golden.exists() else ""
+                if text != wanted and os.environ.get("RISLEY_UPDATE_GOLDEN"):
+                    golden.write_text(text, encoding="utf-8")
+                self.assertEqual(text.splitlines(), wanted.splitlines(), "RISLEY_UPDATE_GOLDEN=1 writes it")
+        kept = {path.stem for path in (SOURCE / "tests/cli/golden").iterdir()}
+        self.assertEqual(kept, {"risley", *VERBS})
 
     def test_help_of_each_verb_has_an_example(self):
         for verb in VERBS:

@@ -11,6 +11,8 @@
 
 #include "risley/core/error.hpp"
 
+#include "refusal.hpp"
+
 namespace risley::cloud::cloud_writer_test {
 
 using ::testing::AllOf;
@@ -49,17 +51,15 @@ TEST(CloudFormats, EveryEndingHasADefault) {
 TEST(CloudFormats, UnknownEndingsAreRefusedWithTheKnownOnes) {
   for (const char* path : {"cloud.docx", "cloud", "las", ""}) {
     EXPECT_THAT([path] { find_cloud_format(path, ""); },
-                ThrowsMessage<InvalidArgument>(
-                    AllOf(HasSubstr(path), HasSubstr("unknown ending"), HasSubstr(".las"))));
+                ThrowsMessage<InvalidArgument>(AllOf(NamesField(path), NamesField(".las"))));
   }
 }
 
 TEST(CloudFormats, UnknownFormatsAreRefusedWithTheKnownOnes) {
-  EXPECT_THAT(
-      [] { find_cloud_format("cloud.las", "las-1.3"); },
-      ThrowsMessage<InvalidArgument>(AllOf(HasSubstr("format = las-1.3"), HasSubstr("las-1.4"))));
+  EXPECT_THAT([] { find_cloud_format("cloud.las", "las-1.3"); },
+              ThrowsMessage<InvalidArgument>(AllOf(NamesField("format"), NamesField("las-1.4"))));
   EXPECT_THAT([] { find_cloud_format("cloud.las", "LAS-1.4"); },
-              ThrowsMessage<InvalidArgument>(HasSubstr("format = LAS-1.4")));
+              ThrowsMessage<InvalidArgument>(NamesField("format")));
 }
 
 TEST(CloudFormats, LazNeedsLaszip) {
@@ -71,7 +71,7 @@ TEST(CloudFormats, LazNeedsLaszip) {
     return;
   }
   EXPECT_THAT([] { find_cloud_format("cloud.laz", ""); },
-              ThrowsMessage<InvalidArgument>(AllOf(HasSubstr("LASzip"), HasSubstr(".las"))));
+              ThrowsMessage<InvalidArgument>(AllOf(NamesField("LASzip"), NamesField(".las"))));
   EXPECT_THROW(find_cloud_format("cloud.las", "laz"), InvalidArgument);
 }
 

@@ -24,7 +24,7 @@ constexpr std::string_view kHead =
 
 std::string table() {
   CloudHeader header;
-  header.has_own_covariance = header.has_point_source = true;
+  header.has_own_covariance = header.has_point_source = header.has_row = true;
   header.factors = {"one"};
   std::string text(kHead);
   for (const PointColumn& column : kPointColumns) {

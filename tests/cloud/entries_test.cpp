@@ -45,8 +45,8 @@ TEST(Entries, EveryFormatAsksForTheColumnsOfItsHeader) {
   const TestFolder folder;
   CloudHeader header;
   header.factors = {"range_offset_m"};
-  for (const char* name :
-       {"cloud.las", "cloud.ply", "cloud.csv", "cloud.npy", "cloud.nc", "cloud.bag"}) {
+  for (const char* name : {"cloud.las", "cloud.ply", "cloud.csv", "cloud.npy", "cloud.nc",
+                           "cloud.bag", "cloud.mcap"}) {
     const auto writer = create_cloud(folder.file(name), header);
     const auto run = [&](const auto& spoil) {
       Points points = make_points({"", 3, header});

@@ -753,7 +753,7 @@ TEST(Georeference, RefusesWhatCannotBe) {
   const MovingPlatform on_a_map{local, mount(), {}, "EPSG:32632"};
   EXPECT_NE(refusal([&] {
               Georeference(on_a_map, recordings::TimeReference::relative, 0);
-            }).find("frame of its own"),
+            }).find("in a local frame"),
             std::string::npos);
   const MovingPlatform bare{trajectory(1), mount(), {}, ""};
   const Georeference georeference(bare, recordings::TimeReference::relative, 0);

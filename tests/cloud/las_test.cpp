@@ -18,6 +18,7 @@
 #include "cloud/cloud_samples.hpp"
 #include "cloud/file_size_limit.hpp"
 #include "cloud/las_checker.hpp"
+#include "refusal.hpp"
 
 namespace risley::cloud::las_test {
 
@@ -251,7 +252,7 @@ TEST_F(LasTest, CoordinatesAtTheLimit) {
   expect_equal(las_checker::read(path()), points);
   points.x[1] = 2147483648.0;
   std::filesystem::remove(path());
-  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("point 2: X"));
+  EXPECT_THAT(refusal<InvalidArgument>(points), NamesField("point 2: X"));
 }
 
 TEST_F(LasTest, CoordinatesThatDoNotFit) {
@@ -261,14 +262,14 @@ TEST_F(LasTest, CoordinatesThatDoNotFit) {
     points.y[wrong] = -214748.4;
     const std::string message = refusal<InvalidArgument>(points, {400, 1, 602});
     EXPECT_THAT(message,
-                AllOf(HasSubstr("point " + std::to_string(wrong + 1) + ": Y = -214748.4 m"),
-                      HasSubstr("allowed -214748.3647 to 214748.3647 m")));
+                AllOf(NamesField("point " + std::to_string(wrong + 1) + ": Y = -214748.4 m"),
+                      NamesField("-214748.3647 to 214748.3647 m")));
     points.y[wrong] = 1.0;
     for (const double value :
          {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
       points.z[wrong] = value;
       EXPECT_THAT(refusal<InvalidArgument>(points),
-                  HasSubstr("point " + std::to_string(wrong + 1) + ": Z = "));
+                  NamesField("point " + std::to_string(wrong + 1) + ": Z"));
     }
   }
 }
@@ -288,16 +289,14 @@ TEST_F(LasTest, AfterARefusalTheFileCannotBeCompleted) {
 TEST_F(LasTest, RefusesReturnsThatDoNotFit) {
   Points points = random_points(header_, 600);
   points.number_of_returns[511] = points.return_number[511] = 0;
-  EXPECT_THAT(refusal<InvalidArgument>(points),
-              HasSubstr("point 512: number_of_returns = 0, allowed 1 to 15"));
+  EXPECT_THAT(refusal<InvalidArgument>(points), NamesField("point 512: number_of_returns = 0"));
   points.number_of_returns[511] = 3;
   EXPECT_THAT(refusal<InvalidArgument>(points),
-              HasSubstr("point 512: return_number = 0, allowed 1 to 3"));
+              AllOf(NamesField("point 512: return_number = 0"), NamesField("1 to 3")));
   points.return_number[511] = 4;
-  EXPECT_THAT(refusal<InvalidArgument>(points),
-              HasSubstr("point 512: return_number = 4, allowed 1 to 3"));
+  EXPECT_THAT(refusal<InvalidArgument>(points), NamesField("point 512: return_number = 4"));
   points.number_of_returns[511] = 16;
-  EXPECT_THAT(refusal<InvalidArgument>(points), HasSubstr("allowed 1 to 15"));
+  EXPECT_THAT(refusal<InvalidArgument>(points), NamesField("1 to 15"));
 }
 
 TEST_F(LasTest, AllReturnsThatLas14Counts) {
@@ -314,14 +313,14 @@ TEST_F(LasTest, AllReturnsThatLas14Counts) {
 
 TEST_F(LasTest, RefusesMoreFactorsAndProvenanceThanThereIsRoomFor) {
   header_.factors.assign(200, "factor");
-  EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("factors = 200, allowed up to 108"));
+  EXPECT_THAT(refusal<InvalidArgument>({}), NamesField("factors"));
   header_.factors.assign(108, "factor");
   const Points points = random_points(header_, 5);
   write(points);
   expect_equal(las_checker::read(path()), points);
   std::filesystem::remove(path());
   header_.provenance.emplace_back("command", std::string(70'000, 'x'));
-  EXPECT_THAT(refusal<InvalidArgument>({}), HasSubstr("provenance"));
+  EXPECT_THAT(refusal<InvalidArgument>({}), NamesField("provenance"));
 }
 
 TEST_F(LasTest, GpsTime) {

@@ -9,6 +9,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/trajectories/geodesy.hpp"
 
 #include "cloud/transverse_mercator.hpp"
 #include "refusal.hpp"
@@ -85,7 +86,7 @@ TEST(MapProjection, RefusesWhatIsNoMapInMetres) {
   };
   EXPECT_NE(refused("EPSG:999999").find("EPSG:999999"), std::string::npos);
   EXPECT_NE(refused("nonsense").find("EPSG:25832"), std::string::npos);
-  EXPECT_NE(refused("EPSG:4326").find("not a map"), std::string::npos);
+  EXPECT_NE(refused("EPSG:4326").find("latitudes"), std::string::npos);
   EXPECT_NE(refused("EPSG:4978").find("not a map"), std::string::npos);
   EXPECT_NE(refused("EPSG:2225").find("US survey foot"), std::string::npos);
   EXPECT_NE(refused("EPSG:32632", "EPSG:4326").find("three-dimensional"), std::string::npos);
@@ -107,6 +108,43 @@ TEST(MapProjection, HeightsNeverLackTheirGridSilently) {
     EXPECT_NEAR(mapped.z(), 300 - 46.5, 2) << "geoid of Germany";
   } catch (const InvalidArgument& error) {
     EXPECT_NE(std::string(error.what()).find("grid"), std::string::npos) << error.what();
+  }
+}
+
+TEST(MapProjection, NamesTheGridThatIsMissingAndWhereToGetIt) {
+  const std::string words = refusal([] { MapProjection("EPSG:6340+5703", ""); });  // NAVD88
+  if (words.empty()) GTEST_SKIP() << "the grid is installed";
+  EXPECT_NE(words.find("us_noaa_g"), std::string::npos) << words;
+  EXPECT_NE(words.find("https://"), std::string::npos) << words;
+  EXPECT_NE(words.find("PROJ_DATA"), std::string::npos) << words;
+}
+
+TEST(MapProjection, LatitudesAndLongitudesAreAnsweredWithTheZoneOfThePlace) {
+  const auto zone_for = [](const std::string& crs, double latitude_deg, double longitude_deg) {
+    try {
+      const MapProjection map(crs);
+    } catch (const GeographicSystem& system) {
+      const std::string words =
+          system.at(radians_from_degrees(latitude_deg), radians_from_degrees(longitude_deg)).what();
+      return words.substr(words.rfind("EPSG:"));
+    }
+    return std::string();
+  };
+  EXPECT_EQ(zone_for("EPSG:4258", 50, 9), "EPSG:25832");
+  EXPECT_EQ(zone_for("EPSG:4937", 50, 9), "EPSG:25832");
+  EXPECT_EQ(zone_for("EPSG:6318", 34, -117), "EPSG:6340");
+  EXPECT_EQ(zone_for("EPSG:4326", -33, 151), "EPSG:32756");
+}
+
+TEST(MapProjection, AMapOfItsOwnDatumNeedsNoChange) {
+  for (const char* crs : {"EPSG:25832", "EPSG:6340", "EPSG:31467", "EPSG:2056"}) {
+    const MapProjection map(crs, "");
+    const auto& area = *map.area();
+    const trajectories::Geodetic middle{0.5 * (area.south + area.north),
+                                        0.5 * (area.west + area.east), 300};
+    const Vector3d on_map = map.project(trajectories::geocentric_from_geodetic(middle));
+    EXPECT_LT((map.project(map.unproject(on_map)) - on_map).norm(), 1e-6) << crs;
+    EXPECT_EQ(map.operation(), "") << crs;
   }
 }
 

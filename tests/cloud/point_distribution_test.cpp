@@ -27,8 +27,6 @@
 
 namespace risley::cloud::point_distribution_test {
 
-using ::testing::HasSubstr;
-
 constexpr double kHalfField = radians_from_degrees(19.23);
 
 trajectories::Mount nadir_mount() {
@@ -405,8 +403,8 @@ TEST(PointDistribution, ReachIsThatOfTheFieldOnItsMount) {
   EXPECT_NEAR(tilted.left, std::tan(kHalfField + radians_from_degrees(20)), 5e-3);
   EXPECT_NEAR(tilted.right, std::tan(kHalfField - radians_from_degrees(20)), 5e-3);
   mount.nominal.setIdentity();  // forward
-  EXPECT_THAT(refusal([&] { return swath_reach(sensor, mount); }), HasSubstr("horizon"));
-  EXPECT_THAT(refusal([&] { return swath_reach({}, nadir_mount()); }), HasSubstr("prisms"));
+  EXPECT_THAT(refusal([&] { return swath_reach(sensor, mount); }), NamesField("horizon"));
+  EXPECT_THAT(refusal([&] { return swath_reach({}, nadir_mount()); }), NamesField("prisms"));
 }
 
 TEST(PointDistribution, RefusesWhatMakesNoSense) {
@@ -419,13 +417,13 @@ TEST(PointDistribution, RefusesWhatMakesNoSense) {
     return refusal([&] { return PointDistribution(lines, reach, options); });
   };
   EXPECT_EQ(made([](auto&, auto&, auto&) {}), "");
-  EXPECT_THAT(made([](auto&, auto&, auto& o) { o.empty_circle = 0; }), HasSubstr("circle"));
-  EXPECT_THAT(made([&](auto&, auto&, auto& o) { o.density_cell = nan; }), HasSubstr("cell"));
-  EXPECT_THAT(made([](auto&, auto&, auto& o) { o.most_ground = -1; }), HasSubstr("ground"));
-  EXPECT_THAT(made([](auto&, auto& r, auto&) { r.left = -1; }), HasSubstr("width"));
-  EXPECT_THAT(made([](auto&, auto& r, auto&) { r.ahead = -2; }), HasSubstr("field of view"));
-  EXPECT_THAT(made([](auto& l, auto&, auto&) { l[0].end = l[0].begin; }), HasSubstr("length"));
-  EXPECT_THAT(made([&](auto& l, auto&, auto&) { l[0].height = nan; }), HasSubstr("height"));
+  EXPECT_THAT(made([](auto&, auto&, auto& o) { o.empty_circle = 0; }), NamesField("circle"));
+  EXPECT_THAT(made([&](auto&, auto&, auto& o) { o.density_cell = nan; }), NamesField("cell"));
+  EXPECT_THAT(made([](auto&, auto&, auto& o) { o.most_ground = -1; }), NamesField("ground"));
+  EXPECT_THAT(made([](auto&, auto& r, auto&) { r.left = -1; }), NamesField("width"));
+  EXPECT_THAT(made([](auto&, auto& r, auto&) { r.ahead = -2; }), NamesField("field of view"));
+  EXPECT_THAT(made([](auto& l, auto&, auto&) { l[0].end = l[0].begin; }), NamesField("length"));
+  EXPECT_THAT(made([&](auto& l, auto&, auto&) { l[0].height = nan; }), NamesField("height"));
   const auto added = [&](double x, std::uint16_t first, std::uint16_t second) {
     PointDistribution distribution({line_at(0), line_at(1)}, kReach);
     const std::vector<double> xs{x, x}, zeros{0, 0};
@@ -434,14 +432,14 @@ TEST(PointDistribution, RefusesWhatMakesNoSense) {
     });
   };
   EXPECT_EQ(added(1, 1, 2), "");
-  EXPECT_THAT(added(1, 2, 1), HasSubstr("strips must ascend"));
-  EXPECT_THAT(added(1, 1, 3), HasSubstr("strip = 3"));
-  EXPECT_THAT(added(nan, 1, 1), HasSubstr("1000 km"));
-  EXPECT_THAT(added(2e6, 1, 1), HasSubstr("1000 km"));
+  EXPECT_THAT(added(1, 2, 1), NamesField("strips"));
+  EXPECT_THAT(added(1, 1, 3), NamesField("strip"));
+  EXPECT_THAT(added(nan, 1, 1), NamesField("1000 km"));
+  EXPECT_THAT(added(2e6, 1, 1), NamesField("1000 km"));
   PointDistribution distribution({line_at(0)}, kReach);
   const std::vector<double> one{1}, two{1, 1};
   EXPECT_THAT(refusal([&] { distribution.add(one, two, one, std::vector<std::uint16_t>{1}); }),
-              HasSubstr("y has 2 values"));
+              NamesField("y"));
   EXPECT_TRUE(PointDistribution({}, kReach).summary().strips.empty());
 }
 

@@ -525,6 +525,45 @@ INSTANTIATE_TEST_SUITE_P(Trains, PointsOfEveryTrain, ::testing::ValuesIn(point_c
                                   (one.param.origin ? "WithOrigin" : "FromZero");
                          });
 
+// Residuals are those of the parameters that directions are reported with, of a reflector, too.
+TEST(ComputePoints, ResidualsOfAReflectorAreThoseOfTheBelievedTrain) {
+  PointingModel model;
+  model.sensor = sensors::load_sensor("mid-360");
+  model.train = model.believed = model.sensor.train;
+  for (int place = 0; place < parameter_count(model.train.shape()); ++place) {
+    if (place == place::refractive_index_air()) continue;
+    model.train.set_place(place, model.train[place] + 1e-3 * std::sin(place + 1.0));
+  }
+  constexpr std::size_t kShots = 40;
+  Dice dice(4);
+  PointedShots shots;
+  shots.resize(model.train.prisms(), kShots);
+  for (std::size_t i = 0; i < kShots; ++i) {
+    for (auto& column : shots.rotation_angle) column[i] = dice.between(-20.0, 20.0);
+    shots.beam[i] = static_cast<std::uint8_t>(i % 4);
+    shots.zenith[i] = 1.2;
+    shots.range[i] = 7.0;
+  }
+  const auto at = [&](const PrismTrain& train, std::size_t i) {
+    std::vector<double> angles;
+    for (const auto& column : shots.rotation_angle) angles.push_back(column[i]);
+    return observe(train, angles, shots.beam[i]);
+  };
+  for (std::size_t i = 0; i < kShots; ++i) {
+    const Observation believed = at(model.believed, i);
+    shots.azimuth[i] = wrap_to_pi(believed.azimuth + 1e-4 * dice.normal());
+    shots.zenith[i] = believed.zenith + 1e-4 * dice.normal();
+  }
+  const Points points = points_of(model, header_of(model), shots);
+  for (std::size_t i = 0; i < kShots; ++i) {
+    SCOPED_TRACE(i);
+    const Observation believed = at(model.believed, i);
+    EXPECT_NEAR(points.azimuth_residual[i], wrap_to_pi(shots.azimuth[i] - believed.azimuth), 1e-11);
+    EXPECT_NEAR(points.zenith_residual[i], shots.zenith[i] - believed.zenith, 1e-11);
+    EXPECT_LT((point_of(points, i) - 7.0 * eigen(at(model.train, i).direction)).norm(), 1e-12);
+  }
+}
+
 // A point is the same whether its emitter has the train for itself or shares it.
 TEST(ComputePoints, EveryEmitterIsItself) {
   constexpr int kEmitters = 6;

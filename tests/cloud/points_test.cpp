@@ -49,7 +49,7 @@ void expect_rows(Points& points, const std::vector<std::size_t>& rows, bool all_
 CloudHeader full_header() {
   CloudHeader header;
   header.prisms = 3;
-  header.has_own_covariance = header.has_point_source = true;
+  header.has_own_covariance = header.has_point_source = header.has_row = true;
   header.factors = {"one", "two"};
   return header;
 }

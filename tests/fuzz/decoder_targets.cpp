@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "risley/bags/bag.hpp"
+#include "risley/bags/messages.hpp"
 #include "risley/recordings/livox/numbered_order.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
 
 #include "fuzz/invariants.hpp"
 #include "fuzz/targets.hpp"
-#include "recordings/formats/ros1_message.hpp"
-#include "recordings/formats/ros2_message.hpp"
+#include "recordings/formats/livox_messages.hpp"
 #include "trajectories/formats/ros_pose.hpp"
 
 namespace risley::fuzz {
@@ -85,14 +85,20 @@ void run_numbered_packets(std::span<const std::uint8_t> bytes) {
 }
 
 /// A message of each kind: the first byte says which.
-template <void (*decode)(bags::MessageKind, std::span<const std::uint8_t>,
-                         recordings::LidarMessage&)>
+template <bags::Serialisation Serialisation>
 void run_message(std::span<const std::uint8_t> bytes) {
   if (bytes.empty()) return;
   const auto kind = static_cast<bags::MessageKind>(bytes[0] % 3);
   recordings::LidarMessage message;
   try {
-    decode(kind, bytes.subspan(1), message);
+    recordings::decode_lidar_message(kind, Serialisation, bytes.subspan(1), message);
+    if (kind != bags::MessageKind::imu) {
+      const auto places = bags::point_places(kind, Serialisation, bytes.subspan(1));
+      require(places.count == message.points.size(), "points are where they are found");
+      for (std::size_t i = 0; i < places.count; ++i) {
+        bags::load_point(places, i, bytes.subspan(1));
+      }
+    }
   } catch (const bags::BadMessage&) {
     return;
   }
@@ -103,11 +109,11 @@ void run_message(std::span<const std::uint8_t> bytes) {
   }
   if (kind != bags::MessageKind::cloud) return;
   recordings::CloudTimeSearch search;
-  search.add(message.layout, message.data, message.time_ns);
+  search.add(message.cloud, message.time_ns);
   const auto time = search.found();
   if (!time) return;
   std::size_t times = 0;
-  recordings::for_each_time(*time, message.layout, message.data, message.time_ns,
+  recordings::for_each_time(*time, message.cloud, message.time_ns,
                             [&times](std::int64_t) { ++times; });
   require(times == message.points.size(), "a time for each point");
 }
@@ -135,8 +141,8 @@ void run_pose_message(std::span<const std::uint8_t> bytes) {
 std::vector<Target> decoder_targets() {
   return {{"packets", run_packets},
           {"numbered-packets", run_numbered_packets},
-          {"ros1-message", run_message<recordings::decode_ros1_message>},
-          {"ros2-message", run_message<recordings::decode_ros2_message>},
+          {"ros1-message", run_message<bags::Serialisation::ros1>},
+          {"ros2-message", run_message<bags::Serialisation::cdr>},
           {"pose-message", run_pose_message}};
 }
 

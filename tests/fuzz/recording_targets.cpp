@@ -81,7 +81,7 @@ void write_and_read(const Format& format, const recordings::RecordingHeader& hea
   const std::string path = folder.file("again" + std::string(format.ending));
   std::uint64_t written = 0;
   try {
-    const auto writer = format.create(path, header);
+    const auto writer = format.create(path, header, {});
     for (const Chunk& chunk : chunks) {
       writer->write(chunk);
       written += chunk.observations.size();
@@ -92,7 +92,8 @@ void write_and_read(const Format& format, const recordings::RecordingHeader& hea
     return;
   }
   try {
-    const auto reader = format.open(path, {});
+    const bool is_folder = &format == &recordings::kRos2BagFormat;
+    const auto reader = format.open(path + (is_folder ? "/again_0.db3" : ""), {});
     std::vector<Chunk> again;
     require(read_all(*reader, written + 64 * (written + 1), &again), "what is written can be read");
     std::uint64_t rows = 0;

@@ -89,6 +89,18 @@ TEST(Identify, RotorsThatTurnNearlyAlikeAreToldApartInALongerWindow) {
   EXPECT_TRUE(found.decided && found.fits);
 }
 
+TEST(Identify, OfARecordingWithAPauseTheLongestStretchIsUsed) {
+  Scan scan;
+  scan.wedge_deg = {18, 18};
+  scan.duration_s = 1.2;
+  estimation::AngleSeries series = scan.series();
+  const std::size_t pause = series.size() / 6;
+  for (std::size_t i = pause; i < series.size(); ++i) series.time_ns[i] += 5'000'000'000;
+  const Identification found = identify(series);
+  EXPECT_EQ(found.rows, series.size() - pause);
+  EXPECT_TRUE(is(found.best(), scan));
+}
+
 // A beam along the axis shows of the first prism only by how much it turns the beam aside.
 TEST(Identify, OneEmitterLeavesTheFacesOfTheFirstPrismOpen) {
   Scan scan;

@@ -12,6 +12,7 @@
 #include "risley/core/error.hpp"
 #include "risley/io/text_file.hpp"
 
+#include "refusal.hpp"
 #include "source_tree.hpp"
 
 namespace risley::io::yaml_map_test {
@@ -45,21 +46,19 @@ TEST(Yaml, ValuesKeepTheirLines) {
 
 TEST(Yaml, MistakesAreFoundWithTheirLine) {
   EXPECT_THAT(refusal("number: [1\n"), HasSubstr("is not valid YAML"));
-  EXPECT_THAT(refusal("- 1\n"), HasSubstr("expected a map, found a list"));
+  EXPECT_THAT(refusal("- 1\n"), NamesField("list"));
   EXPECT_THAT(refusal(""), HasSubstr("found nothing"));
-  EXPECT_THAT(refusal("number: 1\nlist: 2\nnumber: 1\n"),
-              HasSubstr("line 3: number appears twice"));
-  EXPECT_THAT(refusal("number: 1\nother: 2\n"),
-              HasSubstr("line 2: unknown field other, allowed here"));
-  EXPECT_THAT(refusal("numbr: 1\n"), HasSubstr("unknown field numbr, did you mean number?"));
-  EXPECT_THAT(refusal("number: 11\n"), HasSubstr("allowed 0 to 10"));
-  EXPECT_THAT(refusal("number: .nan\n"), HasSubstr("expected a finite number"));
+  EXPECT_THAT(refusal("number: 1\nlist: 2\nnumber: 1\n"), NamesField("number", 3));
+  EXPECT_THAT(refusal("number: 1\nother: 2\n"), NamesField("field other", 2));
+  EXPECT_THAT(refusal("numbr: 1\n"), NamesField("numbr"));
+  EXPECT_THAT(refusal("number: 11\n"), NamesField("0 to 10"));
+  EXPECT_THAT(refusal("number: .nan\n"), NamesField("finite number"));
   EXPECT_EQ(refusal("number: 1\n"), "accepted");
 }
 
 TEST(Yaml, ASecondDocumentIsRefused) {
-  EXPECT_THAT(refusal("number: 1\n---\nnumber: 2\n"), HasSubstr("line 2: a second document"));
-  EXPECT_THAT(refusal("number: 1\n...\n---\n{}\n"), HasSubstr("a second document"));
+  EXPECT_THAT(refusal("number: 1\n---\nnumber: 2\n"), NamesField("document", 2));
+  EXPECT_THAT(refusal("number: 1\n...\n---\n{}\n"), NamesField("document"));
   EXPECT_EQ(refusal("---\nnumber: 1\n...\n"), "accepted");
 }
 
@@ -74,7 +73,7 @@ TEST(Yaml, AliasesRepeatTheirNode) {
   ASSERT_EQ(tree.items[3].items.size(), 2U);
   EXPECT_EQ(tree.items[3].items[1].items[1].scalar, "2");
   EXPECT_EQ(tree.items[5].scalar, "2");
-  EXPECT_THAT(refusal("a: &one [1, *one]\n"), HasSubstr("line 1: an alias"));
+  EXPECT_THAT(refusal("a: &one [1, *one]\n"), NamesField("alias", 1));
 }
 
 TEST(Yaml, AnchorsWithinAnchorsAreBounded) {
@@ -82,7 +81,7 @@ TEST(Yaml, AnchorsWithinAnchorsAreBounded) {
   for (int depth = 0; depth < 100; ++depth) text += fmt::format("&a{} [", depth);
   for (int i = 0; i < 20'000; ++i) text += "1,";
   text += std::string(100, ']');
-  EXPECT_THAT(refusal(text), HasSubstr("has more values"));
+  EXPECT_THAT(refusal(text), NamesField("values"));
 }
 
 TEST(Yaml, ManyKeysTakeTimeInProportion) {
@@ -103,7 +102,7 @@ TEST(Yaml, AliasesThatRepeatAliasesAreBounded) {
     for (int i = 0; i < 9; ++i) text += std::string(i > 0 ? ", *" : "*") + char(name - 1);
     text += "]\n";
   }
-  EXPECT_THAT(refusal(text), HasSubstr("more values than 1000000"));
+  EXPECT_THAT(refusal(text), NamesField("1000000"));
 }
 
 }  // namespace risley::io::yaml_map_test

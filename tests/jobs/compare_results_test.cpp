@@ -19,6 +19,7 @@
 #include "risley/tables/table_file.hpp"
 
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 
 namespace risley::jobs::compare_results_test {
 
@@ -278,8 +279,7 @@ TEST_F(CompareResults, OfATableWithoutResultsSaysWhy) {
     compare_units({{table}, 0.01});
     FAIL();
   } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("none of its 1 rows leads to a result"));
-    EXPECT_THAT(error.what(), HasSubstr("nowhere"));
+    EXPECT_THAT(error.what(), ::testing::AllOf(NamesField("1 rows"), HasSubstr("nowhere")));
   }
 }
 
@@ -310,7 +310,7 @@ TEST_F(CompareResults, OfManyUnitsEachStandsBesideTheOthers) {
   ASSERT_EQ(fleet.units.size(), 6U);
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(fleet.fleet.units[i].outlier, i == 4) << i;
   ASSERT_EQ(found.left_out.size(), 1U);
-  EXPECT_THAT(found.left_out[0].reason, HasSubstr("could be of any of 6 units"));
+  EXPECT_THAT(found.left_out[0].reason, NamesField("6 units"));
   EXPECT_EQ(reported.back(), 1);
 
   // The same by their names, in order of time.
@@ -329,7 +329,7 @@ TEST_F(CompareResults, IsOfSensorsOfOneKind) {
     compare_results("mid-40", "horizon");
     FAIL();
   } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("the first has 2 prisms (PA-AP) and 1 emitters"));
+    EXPECT_THAT(error.what(), NamesField("2 prisms (PA-AP) and 1 emitters"));
   }
   // Six emitters, three prisms: all of it at once.
   EXPECT_EQ(compare_results("horizon", "horizon").beams.errors.total, 0);
@@ -340,8 +340,7 @@ TEST_F(CompareResults, SaysWhatIsMissing) {
     compare_results(folder_.path().string(), "mid-40");
     FAIL();
   } catch (const FileError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("calibration.yaml"));
-    EXPECT_THAT(error.what(), HasSubstr("is missing"));
+    EXPECT_THAT(error.what(), NamesField("calibration.yaml"));
   }
 }
 

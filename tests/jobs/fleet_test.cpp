@@ -124,6 +124,22 @@ TEST(Fleet, SeesWhatNoParameterShowsAlone) {
   EXPECT_THAT(worst_words(bent, fleet), ::testing::HasSubstr("vertical_deg and others"));
 }
 
+// Of five units, robust z follow Student's distribution of two degrees of freedom.
+TEST(Fleet, PValuesCountEveryParameterAndEverySum) {
+  FleetSettings settings;
+  settings.units = 5;
+  std::vector<sensors::Sensor> units = made(settings);
+  units[2].set(kFree[1], units[2].get(kFree[1]) + 5e-2);
+  const Fleet fleet = fleet_of(units, 0.01);
+  const double tests = 5.0 * static_cast<double>(kFree.size() + kFree.size());
+  ASSERT_EQ(fleet.combinations.cols(), static_cast<Eigen::Index>(kFree.size()));
+  const FleetUnit& bent = fleet.units[2];
+  const double z = std::abs(bent.worst_z);
+  const double beyond = 1 - z / std::sqrt(2 + z * z);
+  ASSERT_LT(tests * beyond, 0.5);
+  EXPECT_NEAR(bent.p_value / (tests * beyond), 1, 1e-6);
+}
+
 TEST(Fleet, OfUnitsThatAreAlikeHasNoOutlier) {
   FleetSettings settings;
   settings.units = 5;

@@ -55,6 +55,13 @@ TEST(BeamOriginMap, ACellHoldsAllOriginsOfItsDirections) {
   FAIL() << "no cell there";
 }
 
+// The optical axis is where four cells meet, and the field of view is as far up as down.
+TEST(BeamOriginMap, CellsStandAlikeOnAllSidesOfTheAxis) {
+  const BeamOriginMap map = beam_origin_map(ideal_mid_40(), kMid40, 361, kCell);
+  EXPECT_NEAR(least(map.azimuth) + greatest(map.azimuth), 0, 1e-12);
+  EXPECT_NEAR(least(map.zenith) + greatest(map.zenith), kPi, 1e-12);
+}
+
 TEST(BeamOriginMap, AgreesWithSingleRaysForAnyNumberOfPrisms) {
   for (const char* order : {"PA", "PA-AP", "PA-AP-AP"}) {
     const PrismTrain train = testing::imperfect_train(order, 0.5, 7);

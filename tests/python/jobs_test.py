@@ -178,6 +178,21 @@ def test_cloud(hall, calibration, folder):
     assert made.points > 10000 and pathlib.Path(made.output).stat().st_size > 0
 
 
+def test_cloud_of_stations(folder):
+    scans = [folder / "gate.nc", folder / "crane.nc"]
+    for seed, scan in enumerate(scans):
+        risley.simulate(scan, scene=DATA / "site.yaml", station=scan.stem, seed=seed, duration=4.0)
+    lines = (DATA / "site-stations.yaml").read_text(encoding="utf-8").split("  - name: ")
+    stations = folder / "stations.yaml"
+    stations.write_text("  - name: ".join(lines[:3]), encoding="utf-8")
+    made = risley.cloud([scans[0], risley.read(scans[1])], "mid-40", folder / "site.ply", station=stations)
+    written = command("cloud", *scans, "--calibration", "mid-40", "-o", folder / "site.ply", "--station", stations)
+    assert made.points == written["points"] > 10000
+    assert [one["position_m"] for one in made.stations] == [one["position_m"] for one in written["stations"]]
+    with pytest.raises(ValueError, match="mount is not for a sensor on stations"):
+        risley.cloud(scans, "mid-40", folder / "site.ply", station=stations, mount="m.yaml")
+
+
 def test_identify(folder):
     scan = folder / "scan.nc"
     risley.simulate(scan, rate=20000.0, duration=1.0, seed=2)
@@ -225,7 +240,7 @@ def test_campaign(folder):
     assert some["done"] == 1 and some["missing"] == [[0, 0], [2, 2]]
     whole = risley.campaign(folder / "plan.yaml", results, threads=1)
     printed = command("campaign", folder / "plan.yaml", "-o", results)
-    del printed["summary"]
+    del printed["summary"], printed["html"]
     assert_same(whole, printed)
     with pytest.raises(ValueError, match="chunk and merge"):
         risley.campaign(folder / "plan.yaml", results, chunk=(1, 3), merge=True)

@@ -55,8 +55,11 @@ def test_record_writes_what_was_sent(sensors, tmp_path):
     start("127.0.0.62", serial="PYTHON000000021", sensor="avia", seed=4)
     path = tmp_path / "live.lvx"
     wanted = ["PYTHON000000011", "PYTHON000000021"]
-    recorded = risley.record(path, interface=HOST, duration=2.0, serial=wanted)
+    recorded = risley.record(path, interface=HOST, duration=2.0, serial=wanted,
+                             publish="foxglove:0", frame_rate=10.0)
     truths = [truth["sensors"][0] for truth in end()]
+    assert recorded["viewers"]["connections"] == 0
+    assert all(one["publishing"]["frames"] > 0 for one in recorded["sensors"])
     assert recorded["output"] == str(path) and recorded["duration_s"] == pytest.approx(2.0, abs=0.5)
     for truth in truths:
         one = of_serial(recorded["sensors"], truth["serial"])
@@ -66,6 +69,11 @@ def test_record_writes_what_was_sent(sensors, tmp_path):
     assert len(recording) == sum(truth["rows"] for truth in truths)
     assert [device.serial for device in recording.header.devices] == sorted(wanted)
     assert np.isfinite(recording.azimuth).all()
+
+
+def test_points_go_somewhere(tmp_path):
+    with pytest.raises(ValueError, match="expected foxglove:PORT"):
+        risley.record(tmp_path / "live.lvx", interface=HOST, publish="here")
 
 
 def test_both_generations_are_recorded(sensors, tmp_path):

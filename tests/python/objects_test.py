@@ -100,6 +100,18 @@ def test_a_flight_in_memory(folder):
         risley.Trajectory.from_arrays(again.time_ns, again.position, again.position)
 
 
+def test_a_mount_has_the_numbers_of_its_file():
+    text = (DATA / "mount-nadir.yaml").read_text(encoding="utf-8")
+    for number in range(1, 8):
+        text = text.replace("sigma: 0,", f"sigma: 0.{number},", 1)
+    mount = risley.Mount.from_text(text)
+    np.testing.assert_allclose(np.degrees(mount.boresight), [0.8, -0.5, 0.3])
+    np.testing.assert_allclose(np.degrees(mount.boresight_sigma), [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(mount.lever_arm, [0.1, 0.05, 0.12])
+    np.testing.assert_allclose(mount.lever_arm_sigma, [0.4, 0.5, 0.6])
+    assert (mount.clock_offset, mount.clock_offset_sigma) == (0.0012, 0.7)
+
+
 def test_points_are_those_of_the_cloud(recording, calibration, points, folder):
     risley.cloud(recording, calibration, folder / "hall.npy", common_factors=True)
     cloud = np.load(folder / "hall.npy")
@@ -240,6 +252,16 @@ def test_results_show_themselves(estimate, calibration, points, recording, folde
     pyplot.switch_backend("agg")
     for one in (estimate, calibration, points, scan, compared):
         assert one.plot().has_data()
+    pyplot.close("all")
+
+
+def test_a_comparison_draws_its_last_pair():
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("agg")
+    pairs = [{"differences": {"a": {"value": 1.0, "sigma": 1.0}}},
+             {"differences": {"a": {"value": 6.0, "sigma": 2.0}, "held": {"value": 1.0, "sigma": 0.0}}}]
+    axes = risley._plots.answer("compare", {"pairs": pairs}, None)
+    assert [bar.get_width() for bar in axes.patches] == [3.0]
     pyplot.close("all")
 
 

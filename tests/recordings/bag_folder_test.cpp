@@ -12,12 +12,14 @@
 #include "bags/written_mcap.hpp"
 #include "recordings/format_tests.hpp"
 #include "recordings/ros2_messages.hpp"
+#include "refusal.hpp"
 
 namespace risley::recordings::bag_folder_test {
 
 using namespace ros2_messages;
 using namespace format_tests;
-using ::testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
 
 /// The small bag in three files of a folder; inertial samples stand in the second and third alone.
 class BagFolder {
@@ -106,8 +108,7 @@ TEST(BagFolder, FilesThatRosbag2CompressedAreReadOnceTheyAreUnpacked) {
     folder.write_metadata({first + ".zstd"}, 5, "FILE");
     EXPECT_EQ(folder.refused(), "") << "unpacked beside it";
     std::filesystem::rename(folder.file(first), folder.file(first + ".zstd"));
-    EXPECT_THAT(folder.refused(), ::testing::AllOf(HasSubstr("metadata.yaml: line 7"),
-                                                   HasSubstr("unzstd"), HasSubstr(first)));
+    EXPECT_THAT(folder.refused(), AllOf(NamesField("metadata.yaml: line 7"), NamesField(first)));
   }
 }
 
@@ -173,27 +174,25 @@ TEST(BagFolder, WhatIsWrongWithTheListIsSaid) {
     return folder.refused();
   };
   EXPECT_THAT(refused({first, "gone_1.mcap", "gone_2.mcap"}),
-              ::testing::AllOf(HasSubstr("metadata.yaml: line 8"),
-                               HasSubstr("not in the folder: gone_1.mcap, gone_2.mcap; copy")));
+              AllOf(NamesField("metadata.yaml: line 8"), NamesField("gone_1.mcap, gone_2.mcap")));
   for (const char* name : {"../x.mcap", "/etc/passwd", "sub/x.mcap", "..", "''"}) {
-    EXPECT_THAT(refused({first, name}), HasSubstr("expected the name of a file in this folder"));
+    EXPECT_THAT(refused({first, name}), NamesField("relative_file_paths", 8)) << name;
   }
-  EXPECT_THAT(refused({"../x/y.mcap"}, 3), HasSubstr("expected the name of a file"));
-  EXPECT_THAT(refused({"../x.mcap"}, 3), HasSubstr("not in the folder: x.mcap"));
-  EXPECT_THAT(refused({first, first}), HasSubstr("bag_0.mcap appears twice"));
+  EXPECT_THAT(refused({"../x/y.mcap"}, 3), NamesField("../x/y.mcap"));
+  EXPECT_THAT(refused({"../x.mcap"}, 3), NamesField(": x.mcap"));
+  EXPECT_THAT(refused({first, first}), NamesField("bag_0.mcap appears twice"));
   EXPECT_EQ(refused({first}, 5, "FILE"), "");  // unpacked since
   EXPECT_EQ(refused({first}, 5, "NONE"), "");
-  EXPECT_THAT(refused({}), HasSubstr("relative_file_paths: expected a list of files"));
-  EXPECT_THAT(refused({"metadata.yaml"}), HasSubstr("is not a ROS 2 bag"));
+  EXPECT_THAT(refused({}), NamesField("relative_file_paths"));
+  EXPECT_THAT(refused({"metadata.yaml"}), NamesField("metadata.yaml"));
   put_bytes(folder.file("metadata.yaml"), "other: 1\n");
-  EXPECT_THAT(folder.refused(), HasSubstr("rosbag2_bagfile_information is missing"));
+  EXPECT_THAT(folder.refused(), NamesField("rosbag2_bagfile_information"));
   std::filesystem::remove(folder.file("metadata.yaml"));
   EXPECT_THAT(folder.refused(),
-              HasSubstr("is a folder of bags (bag_0.mcap, bag_1.mcap, bag_2.mcap) without "
-                        "metadata.yaml"));
+              AllOf(NamesField("bag_0.mcap, bag_1.mcap, bag_2.mcap"), NamesField("metadata.yaml")));
   for (std::size_t part = 0; part < 3; ++part)
     std::filesystem::remove(folder.file(folder.name(part)));
-  EXPECT_THAT(folder.refused(), HasSubstr("is a folder; expected a file"));
+  EXPECT_THAT(folder.refused(), NamesField("folder"));
 }
 
 TEST(BagFolder, DamageInAFileKeepsTheFilesBefore) {
@@ -202,8 +201,7 @@ TEST(BagFolder, DamageInAFileKeepsTheFilesBefore) {
     put_bytes(folder.file(folder.name(1)), "no bag");
     Read read = read_folder(folder);
     EXPECT_EQ(read.rows.size(), 40U);
-    EXPECT_THAT(read.error,
-                HasSubstr(folder.name(1) + ": byte 0: expected a bag of the same kind"));
+    EXPECT_THAT(read.error, NamesField(folder.name(1) + ": byte 0"));
   }
   const BagFolder folder(true);
   std::string bytes = get_bytes(folder.file(folder.name(1)));
@@ -211,15 +209,14 @@ TEST(BagFolder, DamageInAFileKeepsTheFilesBefore) {
   Read read = read_folder(folder);
   EXPECT_EQ(read.error, "");
   EXPECT_EQ(read.rows.size(), 120U);
-  ASSERT_EQ(read.warnings.size(), 1U);
-  EXPECT_THAT(read.warnings[0].message, HasSubstr("bag_1.mcap: the file was not closed"));
+  EXPECT_THAT(read.warnings, ElementsAre(Warns(kWarning.cut_off, {"bag_1.mcap"})));
   // A damaged message is reported with its file.
   McapFile part(small_ros2_bag());
   part.messages[1].second = "no CDR";
   part.write(folder.file(folder.name(2)));
   read = read_folder(folder);
-  EXPECT_THAT(read.error, HasSubstr("bag_2.mcap: byte"));
-  EXPECT_THAT(read.error, HasSubstr("message 1 of topic /livox/lidar"));
+  EXPECT_THAT(read.error,
+              AllOf(NamesField("bag_2.mcap: byte"), NamesField("message 1 of topic /livox/lidar")));
   EXPECT_EQ(read.rows.size(), 80U);
 }
 

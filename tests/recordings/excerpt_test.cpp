@@ -17,6 +17,7 @@
 #include "recordings/format_tests.hpp"
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/las_bytes.hpp"
+#include "refusal.hpp"
 
 namespace risley::recordings::excerpt_test {
 
@@ -422,12 +423,12 @@ TEST_F(ExcerptTest, RefusesWhatMakesNoSense) {
     return std::string("was written");
   };
   EXPECT_THAT(problem(folder_.file("excerpt.lvx")),
-              AllOf(HasSubstr("excerpt.lvx"), HasSubstr("must end in .nc")));
-  EXPECT_THAT(problem(recording), HasSubstr("would replace the recording"));
-  EXPECT_THAT(problem(path_, {.longest = 0}), HasSubstr("longest = 0 s, allowed above 0"));
+              ::testing::AllOf(NamesField("excerpt.lvx"), NamesField(".nc")));
+  EXPECT_THAT(problem(recording), NamesField(recording));
+  EXPECT_THAT(problem(path_, {.longest = 0}), NamesField("longest"));
   EXPECT_THAT(problem(path_, {.longest = std::numeric_limits<double>::quiet_NaN()}),
-              HasSubstr("longest = nan"));
-  EXPECT_THAT(problem(path_, {.most_shots = 0}), HasSubstr("most_shots = 0"));
+              NamesField("longest"));
+  EXPECT_THAT(problem(path_, {.most_shots = 0}), NamesField("most_shots"));
   EXPECT_EQ(folder_.names().size(), 1U);  // the recording
 }
 

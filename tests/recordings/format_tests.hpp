@@ -19,6 +19,7 @@
 
 #include "io/test_folder.hpp"
 #include "recordings/formats/format.hpp"
+#include "warning_codes.hpp"
 
 namespace risley::recordings::format_tests {
 
@@ -90,11 +91,9 @@ inline Outcome read_text(const Format& format, std::string_view bytes,
   return read_all(format, path, chunk_rows);
 }
 
-/// The words of a recording's warnings.
-inline std::vector<std::string> warnings_of(const Outcome& outcome) {
-  std::vector<std::string> texts;
-  for (const Warning& warning : outcome.recording.warnings) texts.push_back(warning.message);
-  return texts;
+/// A recording's warnings.
+inline const std::vector<Warning>& warnings_of(const Outcome& outcome) {
+  return outcome.recording.warnings;
 }
 
 /// Reading ended at damage that is described in these words, after these rows, at this byte or
@@ -129,7 +128,7 @@ inline void expect_little_memory(const std::function<void()>& reading) {
 
 inline void write_all(const Format& format, const std::string& path, const RecordingHeader& header,
                       const Chunk& chunk) {
-  auto writer = format.create(path, header);
+  auto writer = format.create(path, header, {});
   writer->write(chunk);
   writer->close();
 }
@@ -140,7 +139,7 @@ inline std::string copy_of(const Format& format, const std::string& path, std::s
   const TestFolder folder;
   const std::string copy = folder.file("copy");
   auto reader = format.open(path, {});
-  auto writer = (target != nullptr ? *target : format).create(copy, reader->header());
+  auto writer = (target != nullptr ? *target : format).create(copy, reader->header(), {});
   Chunk chunk;
   while (reader->read(chunk, chunk_rows)) writer->write(chunk);
   writer->close();

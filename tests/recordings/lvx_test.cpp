@@ -23,7 +23,6 @@ namespace risley::recordings::lvx_test {
 using namespace format_tests;
 using ::testing::_;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using namespace lvx_bytes;
 
 constexpr std::uint8_t kMid40 = 1, kHorizon = 3, kMid70 = 6, kAvia = 7;
@@ -419,7 +418,7 @@ TEST_F(LvxTest, WhatLvxCannotHoldIsRefused) {
     Chunk changed = good;
     change(changed_header, changed, changed.observations);
     const std::string problem = refusal<InvalidArgument>([&] { write(changed_header, changed); });
-    for (const char* word : words) EXPECT_THAT(problem, HasSubstr(word));
+    for (const char* word : words) EXPECT_THAT(problem, NamesField(word));
   };
   using Header = RecordingHeader;
   write(header, good);
@@ -524,7 +523,7 @@ TEST_F(LvxTest, ACutAtAnyByteLosesOnlyTheTail) {
     if (in_package && left >= 11) {
       const std::size_t records[] = {30, 1, 100, 48, 30, 100, 1};
       EXPECT_EQ(warning.lost_records, records[packets]);
-      EXPECT_THAT(warning.message, HasSubstr("cut off"));
+      EXPECT_THAT(warning, Warns(kWarning.cut_off));
     } else {
       EXPECT_EQ(warning.lost_records, 0U);
     }
@@ -575,14 +574,14 @@ TEST_F(LvxTest, DamagedHeadersAreNamed) {
     for (const auto& [at, value] : changes) bytes[at] = value;
     const Outcome result = read(bytes);
     ASSERT_FALSE(result.opened);
-    for (const char* word : words) EXPECT_THAT(result.error->what(), HasSubstr(word));
+    for (const char* word : words) EXPECT_THAT(result.error->what(), NamesField(word));
   };
   refused({{16, 2}}, {"byte 16", "2.1.0.0"});
   refused({{17, 7}}, {"byte 16", "1.7.0.0"});
   refused({{20, 0}}, {"byte 20", "AC0EA767"});
   refused({{28, 0}}, {"byte 28", "devices = 0"});
   refused({{29 + 59 + 32, 9}}, {"device index 9", "twice"});
-  EXPECT_THAT(read(file.substr(0, 100)).error->what(), HasSubstr("device table"));
+  EXPECT_THAT(read(file.substr(0, 100)).error->what(), NamesField("device table"));
 }
 
 TEST_F(LvxTest, DamageInTheBodyIsReportedAfterTheSoundRows) {
@@ -594,15 +593,15 @@ TEST_F(LvxTest, DamageInTheBodyIsReportedAfterTheSoundRows) {
     std::size_t at;
     std::uint8_t value;
     std::size_t offset, packets;
-    const char* message;
+    const char* named;
   };
   const std::size_t second = frames[0] + 24 + 679;  // the IMU package
   const Case cases[] = {
       {"version", second + 1, 6, second + 1, 1, "version = 6"},
       {"device", second, 5, second, 1, "device 5"},
       {"first package", frames[0] + 24, 7, frames[0] + 24, 0, "device 7"},
-      {"position", frames[1], 1, frames[1], 4, "own position"},
-      {"too large a type", frames[1] + 24 + 10, 2, frames[1] + 24, 4, "does not fit"},
+      {"position", frames[1], 1, frames[1], 4, "position"},
+      {"too large a type", frames[1] + 24 + 10, 2, frames[1] + 24, 4, "fit"},
   };
   for (const Case& c : cases) {
     SCOPED_TRACE(c.name);
@@ -611,7 +610,7 @@ TEST_F(LvxTest, DamageInTheBodyIsReportedAfterTheSoundRows) {
     for (const std::size_t max_rows : {std::size_t{1}, kDefaultChunkRows}) {
       const Outcome result = read(damaged, max_rows);
       ASSERT_TRUE(result.opened);
-      expect_damage(result, HasSubstr(c.message), {}, c.offset);
+      expect_damage(result, NamesField(c.named), {}, c.offset);
       EXPECT_EQ(result.recording.data.packets.size(), c.packets);
       EXPECT_TRUE(is_prefix(result.rows(), whole.rows()));
     }
@@ -630,11 +629,11 @@ TEST_F(LvxTest, UnknownDataTypesAreSteppedOverToTheNextFrame) {
   EXPECT_THAT(types, ElementsAre(8, 7, 0, 6));
   ASSERT_EQ(result.recording.warnings.size(), 1U);
   EXPECT_EQ(result.recording.warnings[0].place.byte_offset, second);
-  EXPECT_THAT(result.recording.warnings[0].message, HasSubstr("data type 9"));
+  EXPECT_THAT(result.recording.warnings[0], Warns(kWarning.content_left_out, {"data type 9"}));
   file[frames[1] + 24 + 10] = 9;
   result = read(file);
   EXPECT_EQ(result.recording.warnings.size(), 1U);
-  EXPECT_THAT(result.recording.warnings[0].message, HasSubstr("its frame and of 1 more"));
+  EXPECT_THAT(result.recording.warnings[0], Warns(kWarning.content_left_out, {"1 more"}));
 }
 
 TEST_F(LvxTest, TheLastFrameMayBeLeftOpen) {
@@ -691,7 +690,7 @@ TEST_F(LvxTest, TheRateOfAnUnknownDeviceIsTakenFromItsPackets) {
     put_frame(file, packages, 0);
     const Outcome result = read(file);
     EXPECT_EQ(result.rows().time_ns[95], last);
-    EXPECT_THAT(warnings_of(result), ElementsAre(HasSubstr("type 99")));
+    EXPECT_THAT(warnings_of(result), ElementsAre(Warns(kWarning.devices_unclear, {"type 99"})));
     EXPECT_TRUE(copy(file) == file);
   }
 }

@@ -18,6 +18,7 @@ namespace risley::recordings::mcap_test {
 
 using namespace ros2_messages;
 using namespace format_tests;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -106,7 +107,7 @@ TEST(Mcap, OtherEncodingsAndVersionsAreNamed) {
   ASSERT_TRUE(outcome.error);
   EXPECT_FALSE(outcome.opened);
   EXPECT_EQ(outcome.error->place().byte_offset, 5U);
-  EXPECT_THAT(outcome.error->problem(), HasSubstr("expected version 0 of MCAP"));
+  EXPECT_THAT(outcome.error->problem(), NamesField("version 0"));
 }
 
 TEST(Mcap, CutAnywhereItGivesWhatIsWhole) {
@@ -136,8 +137,7 @@ TEST(Mcap, CutAnywhereItGivesWhatIsWhole) {
       ++opened;
       ASSERT_FALSE(cut.error) << cut.error->what();
       ASSERT_EQ(cut.recording.warnings.size(), 1U);
-      ASSERT_THAT(cut.recording.warnings[0].message,
-                  HasSubstr(fmt::format("it ends at byte {}", length)));
+      ASSERT_THAT(cut.recording.warnings[0].message, NamesField(fmt::format("byte {}", length)));
       ASSERT_LE(*cut.recording.warnings[0].place.byte_offset, length);
     }
     EXPECT_EQ(most, 60U);
@@ -200,10 +200,10 @@ TEST(Mcap, DamageKeepsWhatStandsBefore) {
   }
   ASSERT_EQ(chunks.size(), 5U);
   const auto refused = [&](const std::string& changed, std::size_t rows,
-                           std::optional<std::size_t> offset, const char* problem) {
-    SCOPED_TRACE(problem);
+                           std::optional<std::size_t> offset, const char* named) {
+    SCOPED_TRACE(named);
     const Outcome outcome = read_bytes(changed);
-    expect_damage(outcome, HasSubstr(problem), rows, offset);
+    expect_damage(outcome, NamesField(named), rows, offset);
     EXPECT_TRUE(outcome.error && outcome.error->place().byte_offset);
   };
   const auto changed = [&](std::size_t at, const std::string& by) {
@@ -213,22 +213,21 @@ TEST(Mcap, DamageKeepsWhatStandsBefore) {
   };
   const std::string huge(8, '\x7f');
   // Two messages of 20 points each stand in the two chunks before the third.
-  refused(changed(chunks[2] + 33, "\1\1\1\1"), 60, chunks[2], "the chunk has the checksum");
-  refused(changed(chunks[2] + 25, huge), 60, chunks[2], "at most 1073741824 bytes");
+  refused(changed(chunks[2] + 33, "\1\1\1\1"), 60, chunks[2], "checksum");
+  refused(changed(chunks[2] + 25, huge), 60, chunks[2], "1073741824 bytes");
   refused(changed(chunks[2] + 25, std::string("\0\0\0\x20\0\0\0\0", 8)), 60, chunks[2],
-          "of which they cannot come");
-  refused(changed(chunks[2] + 25, std::string("\1\0\0\0\0\0\0\0", 8)), 60, chunks[2],
-          "states 1 bytes when unpacked, found more");
+          "536870912 bytes");
+  refused(changed(chunks[2] + 25, std::string("\1\0\0\0\0\0\0\0", 8)), 60, chunks[2], "1 bytes");
   refused(changed(chunks[2] + 41, "zfoo"), 60, chunks[2], "found \"zfoo\"");
-  refused(changed(chunks[2] + 45, huge), 60, chunks[2], "bytes of records, found");
-  refused(changed(chunks[2] + 53, "????"), 60, chunks[2], "cannot be unpacked by Zstandard");
-  refused(changed(chunks[2] + 1, huge), 60, chunks[2], "expected a record that ends by byte");
+  refused(changed(chunks[2] + 45, huge), 60, chunks[2], "bytes of records");
+  refused(changed(chunks[2] + 53, "????"), 60, chunks[2], "Zstandard");
+  refused(changed(chunks[2] + 1, huge), 60, chunks[2], "record");
   refused(changed(chunks[2], std::string(1, '\0')), 60, chunks[2], "found type 0");
-  refused(changed(chunks[2], "\x45"), 100, std::nullopt, "its summary states 18");
+  refused(changed(chunks[2], "\x45"), 100, std::nullopt, "summary states 18");
   const std::size_t footer = bytes.size() - 37;
-  refused(changed(footer + 25, "\1\1\1\1"), 120, std::nullopt, "the summary that begins");
-  refused(changed(footer + 9, huge), 120, footer, "the summary begins at byte 9187201950");
-  refused(changed(bytes.size() - 1, "x"), 120, bytes.size() - 8, "expected the file to end");
+  refused(changed(footer + 25, "\1\1\1\1"), 120, std::nullopt, "summary");
+  refused(changed(footer + 9, huge), 120, footer, "summary begins at byte 9187201950435737471");
+  refused(changed(bytes.size() - 1, "x"), 120, bytes.size() - 8, "file");
 
   file.packing = "";
   file.data_checksum = true;
@@ -237,7 +236,7 @@ TEST(Mcap, DamageKeepsWhatStandsBefore) {
   const std::size_t end = other.rfind(std::string("\x0f\4\0\0\0\0\0\0\0", 9));
   ASSERT_NE(end, other.npos);
   other.replace(end + 9, 4, "\1\1\1\1");
-  refused(other, 120, end, "the file up to here has the checksum");
+  refused(other, 120, end, "checksum");
 }
 
 TEST(Mcap, RecordsThatContradictEachOther) {
@@ -256,19 +255,20 @@ TEST(Mcap, RecordsThatContradictEachOther) {
   EXPECT_EQ(problem(with(file.schema(0) + file.channel(0))), "none");
   McapFile renamed = file;
   renamed.topics[0].name = "/other";
-  EXPECT_THAT(problem(with(renamed.channel(0))), HasSubstr("channel 10 is of topic /other here"));
+  EXPECT_THAT(problem(with(renamed.channel(0))),
+              AllOf(NamesField("channel 10"), NamesField("/other")));
   renamed.topics[0].type = "other/msg/Type";
-  EXPECT_THAT(problem(with(renamed.schema(0))), HasSubstr("schema 1 is other/msg/Type here"));
+  EXPECT_THAT(problem(with(renamed.schema(0))),
+              AllOf(NamesField("schema 1"), NamesField("other/msg/Type")));
   std::string lost = file.message(0);
   lost[9] = '\x77';
-  EXPECT_THAT(problem(with(lost)), HasSubstr("a message of channel 119, which no record"));
-  EXPECT_THAT(problem(with(mcap_record(5, "short"))), HasSubstr("a message of at least 22 bytes"));
-  EXPECT_THAT(problem(with(mcap_record(15, "abcd"))),
-              HasSubstr("the record that ends the data is here, but"));
-  EXPECT_THAT(problem(with(mcap_chunk(mcap_record(6, ""), "", 0))), HasSubstr("record of type 6"));
-  EXPECT_THAT(problem(with(mcap_chunk("123", "lz4", 0))), HasSubstr("does not fit into its chunk"));
-  EXPECT_THAT(problem(with(mcap_record(6, "1234"))), HasSubstr("bytes of the chunk's times"));
-  EXPECT_THAT(problem(with(mcap_record(4, "1234"))), HasSubstr("topic"));
+  EXPECT_THAT(problem(with(lost)), NamesField("channel 119"));
+  EXPECT_THAT(problem(with(mcap_record(5, "short"))), NamesField("22 bytes"));
+  EXPECT_THAT(problem(with(mcap_record(15, "abcd"))), NamesField("ends the data"));
+  EXPECT_THAT(problem(with(mcap_chunk(mcap_record(6, ""), "", 0))), NamesField("type 6"));
+  EXPECT_THAT(problem(with(mcap_chunk("123", "lz4", 0))), NamesField("chunk"));
+  EXPECT_THAT(problem(with(mcap_record(6, "1234"))), NamesField("chunk's times"));
+  EXPECT_THAT(problem(with(mcap_record(4, "1234"))), NamesField("topic"));
 }
 
 TEST(Mcap, DamagedMessagesAreNamed) {
@@ -278,7 +278,7 @@ TEST(Mcap, DamagedMessagesAreNamed) {
     file.chunked = chunked;
     const std::string bytes = file.bytes();
     const Outcome outcome = read_bytes(bytes);
-    expect_damage(outcome, HasSubstr("message 3 of topic /livox/lidar"), 40,
+    expect_damage(outcome, NamesField("message 3 of topic /livox/lidar"), 40,
                   bytes.find("no CDR") - 31);
   }
 }
@@ -291,7 +291,7 @@ TEST(Mcap, InertialSamplesWithoutNumbersAreLeftOut) {
   const Outcome outcome = read_bytes(file.bytes());
   EXPECT_FALSE(outcome.error);
   EXPECT_EQ(outcome.recording.data.imu.size(), 5U);
-  EXPECT_THAT(warnings_of(outcome), ElementsAre(HasSubstr("are not finite numbers were left out")));
+  EXPECT_THAT(warnings_of(outcome), ElementsAre(Warns(kWarning.content_left_out)));
 }
 
 TEST(Mcap, AClaimedChunkCostsNoMemory) {
@@ -308,9 +308,7 @@ TEST(Mcap, AClaimedChunkCostsNoMemory) {
   std::string bytes = file.bytes();
   const std::size_t at = bytes.find(std::string("\x04\0\0\0zstd", 8));
   bytes.replace(at - 12, 8, std::string("\0\0\0\x40\0\0\0\0", 8));
-  expect_little_memory([&] {
-    expect_damage(read_bytes(bytes), HasSubstr("states 1073741824 bytes when unpacked, found"));
-  });
+  expect_little_memory([&] { expect_damage(read_bytes(bytes), NamesField("1073741824 bytes")); });
 }
 
 TEST(Mcap, OpeningAndReadingCanBeCancelled) {

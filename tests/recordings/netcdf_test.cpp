@@ -14,7 +14,7 @@
 namespace risley::recordings::netcdf_test {
 
 using namespace format_tests;
-using ::testing::HasSubstr;
+using ::testing::AllOf;
 
 RecordingHeader rich_header() {
   RecordingHeader header;
@@ -269,17 +269,17 @@ TEST(Netcdf, RefusesForeignFiles) {
   ASSERT_EQ(nc_def_var(id, "time", NC_DOUBLE, 1, &dimension, &variable), NC_NOERR);
   ASSERT_EQ(nc_close(id), NC_NOERR);
   EXPECT_TRUE(kNetcdfFormat.recognises(get_bytes(path)));
-  expect_damage(read_all(kNetcdfFormat, path), HasSubstr("risley_recording"));
+  expect_damage(read_all(kNetcdfFormat, path), NamesField("risley_recording"));
   ASSERT_EQ(nc_open(path.c_str(), NC_WRITE, &id), NC_NOERR);
   const unsigned int version = 2;
   ASSERT_EQ(nc_put_att_uint(id, NC_GLOBAL, "risley_recording", NC_UINT, 1, &version), NC_NOERR);
   ASSERT_EQ(nc_close(id), NC_NOERR);
-  expect_damage(read_all(kNetcdfFormat, path), HasSubstr("found 2"));
+  expect_damage(read_all(kNetcdfFormat, path), NamesField("found 2"));
   ASSERT_EQ(nc_open(path.c_str(), NC_WRITE, &id), NC_NOERR);
   const unsigned int known = 1;
   ASSERT_EQ(nc_put_att_uint(id, NC_GLOBAL, "risley_recording", NC_UINT, 1, &known), NC_NOERR);
   ASSERT_EQ(nc_close(id), NC_NOERR);
-  expect_damage(read_all(kNetcdfFormat, path), HasSubstr("time_reference"));
+  expect_damage(read_all(kNetcdfFormat, path), NamesField("time_reference"));
 
   EXPECT_FALSE(kNetcdfFormat.recognises("CDF\1"));
   EXPECT_TRUE(read_text(kNetcdfFormat, "\x89HDF\r\n\x1a\nnothing else").error);
@@ -323,14 +323,13 @@ class SpoiltRecording {
 TEST(HostileNetcdf, DevicesThatAreNotThere) {
   SpoiltRecording none;
   none.replace_dimension("device_entry", NC_UNLIMITED);
-  EXPECT_THAT(none.problem(), HasSubstr("dimension device_entry has length 0, allowed 1 to 256"));
+  EXPECT_THAT(none.problem(), AllOf(NamesField("device_entry"), NamesField("0, allowed 1 to 256")));
   SpoiltRecording many;
   many.replace_dimension("device_entry", 257);
-  EXPECT_THAT(many.problem(), HasSubstr("dimension device_entry has length 257"));
+  EXPECT_THAT(many.problem(), AllOf(NamesField("device_entry"), NamesField("257")));
   SpoiltRecording other;
   other.replace_dimension("device_entry", 2);
-  EXPECT_THAT(other.problem(),
-              HasSubstr("variable device_serial: expected dimension device_entry"));
+  EXPECT_THAT(other.problem(), AllOf(NamesField("device_serial"), NamesField("device_entry")));
   const std::size_t place = 3;
   const unsigned char third = 2;
   SpoiltRecording rows;
@@ -350,19 +349,19 @@ TEST(HostileNetcdf, NumbersThatCannotBe) {
     SpoiltRecording recording;
     ASSERT_EQ(nc_put_att_uint(recording.id(), NC_GLOBAL, "returns_per_shot", NC_UINT, 1, &returns),
               NC_NOERR);
-    EXPECT_THAT(recording.problem(), HasSubstr("returns_per_shot = "));
+    EXPECT_THAT(recording.problem(), NamesField("returns_per_shot"));
   }
   const std::size_t place = 2;
   SpoiltRecording packets;
   ASSERT_EQ(nc_put_var1_uint(packets.id(), packets.variable("packet_rows"), &place, &most),
             NC_NOERR);
-  EXPECT_THAT(packets.problem(), HasSubstr("the packets hold"));
+  EXPECT_THAT(packets.problem(), NamesField("packets"));
   SpoiltRecording serials;
   serials.replace_dimension("serial_length", std::size_t{1} << 50);
-  EXPECT_THAT(serials.problem(), HasSubstr("serial_length"));
+  EXPECT_THAT(serials.problem(), NamesField("serial_length"));
   SpoiltRecording axes;
   axes.replace_dimension("axis", 4);
-  EXPECT_THAT(axes.problem(), HasSubstr("dimension axis has length 4, expected 3"));
+  EXPECT_THAT(axes.problem(), AllOf(NamesField("axis"), NamesField("4, expected 3")));
 }
 
 TEST(HostileNetcdf, VariablesThatAreNotThere) {
@@ -370,7 +369,7 @@ TEST(HostileNetcdf, VariablesThatAreNotThere) {
     SpoiltRecording recording;
     ASSERT_EQ(nc_redef(recording.id()), NC_NOERR);
     ASSERT_EQ(nc_rename_var(recording.id(), recording.variable(name), "renamed"), NC_NOERR);
-    EXPECT_THAT(recording.problem(), HasSubstr(fmt::format("expected variable {} along", name)));
+    EXPECT_THAT(recording.problem(), NamesField(fmt::format("variable {}", name)));
   }
 }
 
@@ -378,13 +377,13 @@ TEST(Netcdf, RefusesPacketsThatDoNotFit) {
   const TestFolder folder;
   Chunk short_packet = packet_chunk(2);
   short_packet.packets[0].rows = 95;
-  EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), rich_header())->write(short_packet),
+  EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), rich_header(), {})->write(short_packet),
                InvalidArgument);
   Chunk no_sample = packet_chunk(3);
   no_sample.imu.clear();
-  EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), rich_header())->write(no_sample),
+  EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), rich_header(), {})->write(no_sample),
                InvalidArgument);
-  auto writer = kNetcdfFormat.create(folder.file("x.nc"), rich_header());
+  auto writer = kNetcdfFormat.create(folder.file("x.nc"), rich_header(), {});
   writer->write(packet_chunk(1));
   Chunk loose;
   append_rows(loose, 5);
@@ -392,9 +391,10 @@ TEST(Netcdf, RefusesPacketsThatDoNotFit) {
   writer.reset();
   RecordingHeader nobody = rich_header();
   nobody.devices.clear();
-  EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), nobody), InvalidArgument);
+  EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), nobody, {}), InvalidArgument);
   EXPECT_EQ(folder.names().size(), 0U) << "an unfinished writer must leave nothing";
-  EXPECT_THROW(kNetcdfFormat.create(folder.file("no/such/folder.nc"), rich_header()), FileError);
+  EXPECT_THROW(kNetcdfFormat.create(folder.file("no/such/folder.nc"), rich_header(), {}),
+               FileError);
 }
 
 }  // namespace risley::recordings::netcdf_test

@@ -21,7 +21,6 @@ namespace risley::recordings::numbered_capture_test {
 using namespace format_tests;
 using namespace numbered_packets;
 using ::testing::Contains;
-using ::testing::HasSubstr;
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -114,8 +113,10 @@ TEST(NumberedCapture, EverythingIsCountedAndNamed) {
             "azimuth 10 to 350 deg, elevation -5 to 50 deg");
   EXPECT_EQ(header.devices[1].type, kHap);
   EXPECT_TRUE(header.devices[1].type_inferred);
-  EXPECT_THAT(warnings_of(outcome), Contains(HasSubstr("47MDGEN2000001: 9 packets are missing")));
-  EXPECT_THAT(warnings_of(outcome), Contains(HasSubstr("47MDGEN2000001: 1 packets were captured")));
+  EXPECT_THAT(warnings_of(outcome),
+              Contains(Warns(kWarning.shots_lost, {"47MDGEN2000001", "9 packets"})));
+  EXPECT_THAT(warnings_of(outcome),
+              Contains(Warns(kWarning.content_left_out, {"47MDGEN2000001", "1 packets"})));
   TimeAudit audit(header);
   audit.add(outcome.recording.data);
   const TimeAuditResult result = audit.result();
@@ -136,7 +137,8 @@ TEST(NumberedCapture, EverythingIsCountedAndNamed) {
   EXPECT_EQ(again.rows().azimuth.size(), outcome.rows().azimuth.size());
   EXPECT_EQ(again.rows().intensity, outcome.rows().intensity);
   EXPECT_EQ(again.rows().tag, outcome.rows().tag);
-  EXPECT_THAT(warnings_of(again), Contains(HasSubstr("47MDGEN2000001: 9 packets are missing")));
+  EXPECT_THAT(warnings_of(again),
+              Contains(Warns(kWarning.shots_lost, {"47MDGEN2000001", "9 packets"})));
 }
 
 }  // namespace risley::recordings::numbered_capture_test

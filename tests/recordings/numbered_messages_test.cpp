@@ -10,8 +10,6 @@
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/livox_messages.hpp"
-#include "recordings/formats/ros1_message.hpp"
-#include "recordings/formats/ros2_message.hpp"
 #include "recordings/ros2_messages.hpp"
 #include "wire/hex.hpp"
 
@@ -20,7 +18,6 @@ namespace risley::recordings::numbered_messages_test {
 using namespace ros2_messages;
 using namespace format_tests;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using wire::bytes_of;
 
 constexpr std::uint64_t kTimebase = 1'700'000'000'123'456'789;
@@ -42,11 +39,10 @@ TEST(NumberedMessages, KnownMessages) {
       "881300000000000000000000000000003C0001";
   for (const bool first : {true, false}) {
     LidarMessage message;
-    if (first) {
-      decode_ros1_message(MessageKind::points, bytes_of(ros1), message);
-    } else {
-      decode_ros2_message(MessageKind::points, bytes_of(ros2), message);
-    }
+    const std::vector<std::uint8_t> bytes = bytes_of(first ? ros1 : ros2);
+    decode_lidar_message(MessageKind::points,
+                         first ? bags::Serialisation::ros1 : bags::Serialisation::cdr, bytes,
+                         message);
     EXPECT_EQ(message.time_ns, static_cast<std::int64_t>(kTimebase));
     EXPECT_EQ(message.lidar, 192);
     ASSERT_EQ(message.points.size(), 2U);
@@ -90,7 +86,7 @@ TEST(NumberedMessages, PointsArePutBackToWhenTheyWereFired) {
       EXPECT_TRUE(device.type_inferred);
       EXPECT_EQ(device.address, "192.168.1.112");
       EXPECT_EQ(outcome.recording.data.imu.size(), 3U);
-      EXPECT_THAT(warnings_of(outcome), ElementsAre(HasSubstr("divides the time")));
+      EXPECT_THAT(warnings_of(outcome), ElementsAre(Warns(kWarning.times_corrected)));
       const Observations& o = outcome.rows();
       std::size_t shot = 0;
       for (std::size_t row = 0; row < o.size(); ++row, ++shot) {

@@ -247,6 +247,19 @@ TEST(NumberedOrder, AfterAPauseAnyTimeThatGoesBackIsANewBeginning) {
   EXPECT_FALSE(order.gaps()[0].lost);
 }
 
+TEST(NumberedOrder, ASensorThatBeginsAnewSoonLosesNothing) {
+  for (const std::size_t back : {1U, 100U, 400U}) {  // packets, by which its time is less
+    std::vector<Sent> sent = stream(500, 0);
+    for (std::size_t i = 0; i < 500; ++i) {
+      sent.push_back({.number = static_cast<std::uint16_t>(i), .time_ns = time_of(500 - back + i)});
+    }
+    const PacketCounts counts = counts_of(sent);
+    EXPECT_EQ(counts.packets, 1000U);
+    EXPECT_EQ(counts.lost + counts.duplicates + counts.late, 0U);
+    EXPECT_EQ(counts.clock_jumps, 1U);
+  }
+}
+
 TEST(NumberedOrder, ClocksThatJumpLoseNothing) {
   NumberedOrder order;
   std::int64_t host_ns = 0;
@@ -262,6 +275,23 @@ TEST(NumberedOrder, ClocksThatJumpLoseNothing) {
   EXPECT_EQ(order.counts().clock_jumps, 2U);
   EXPECT_EQ(order.clock().stretches().size(), 3U);
   for (const PacketGap& gap : order.gaps()) EXPECT_EQ(gap.lost, 0U);
+}
+
+TEST(NumberedOrder, AClockThatIsSetLosesNothingHoweverFarItGoes) {
+  constexpr std::int64_t kLate = 9'000'000'000'000'000'000;  // ns
+  for (const std::int64_t period : {std::int64_t{1}, std::int64_t{480'000}, kLate / 300}) {
+    std::vector<Sent> sent;
+    for (std::size_t i = 0; i < 300; ++i) {
+      const auto place = static_cast<std::int64_t>(i);
+      const std::int64_t set = i % 3 == 0 ? 0 : kLate;
+      sent.push_back({.number = static_cast<std::uint16_t>(i),
+                      .time_ns = i < 10 ? place * period : set + place});
+    }
+    const PacketCounts counts = counts_of(sent);
+    EXPECT_EQ(counts.packets, 300U);
+    EXPECT_EQ(counts.lost, 0U);
+    EXPECT_GT(counts.clock_jumps, 100U);
+  }
 }
 
 TEST(NumberedOrder, NumbersThatBeginAnewWithEveryFrame) {

@@ -319,10 +319,10 @@ TEST(Openpylivox, ChoosesTheColumnsByTheHeader) {
     EXPECT_EQ(read_all(kOpenpylivoxCsvFormat, path).rows().valid[0], 1);
   }
   const auto& format = kOpenpylivoxCsvFormat;
-  EXPECT_THROW(format.create(folder.file("x"), foreign_header(true, 3, 7)), InvalidArgument);
+  EXPECT_THROW(format.create(folder.file("x"), foreign_header(true, 3, 7), {}), InvalidArgument);
   auto header = foreign_header(false, 1, 1);
   header.has_range = false;
-  EXPECT_THROW(format.create(folder.file("x"), header), InvalidArgument);
+  EXPECT_THROW(format.create(folder.file("x"), header, {}), InvalidArgument);
 }
 
 TEST(Openpylivox, RefusesWhatItCannotHoldAndDropsNulls) {
@@ -332,7 +332,7 @@ TEST(Openpylivox, RefusesWhatItCannotHoldAndDropsNulls) {
   write_all(format, path, foreign_header(false, 1, 1), one_row(0.0));
   EXPECT_EQ(read_all(format, path).rows().size(), 0U);
   const auto refuse = [&](const Chunk& chunk, bool cartesian = false) {
-    EXPECT_THROW(format.create(folder.file("x"), foreign_header(cartesian, 1, 1))->write(chunk),
+    EXPECT_THROW(format.create(folder.file("x"), foreign_header(cartesian, 1, 1), {})->write(chunk),
                  InvalidArgument);
   };
   for (const double range : {std::numeric_limits<double>::quiet_NaN(), -1.0,
@@ -364,7 +364,8 @@ TEST(OpenpylivoxCsv, PointsCloserThanTheStepAreCounted) {
     }
     chunk.observations.range = {5.0, 0.0001, 6.0};
     const TestFolder folder;
-    const auto writer = kOpenpylivoxCsvFormat.create(folder.file("out.openpylivox.csv"), header);
+    const auto writer =
+        kOpenpylivoxCsvFormat.create(folder.file("out.openpylivox.csv"), header, {});
     writer->write(chunk);
     writer->close();
     EXPECT_EQ(writer->left_out(), 1U);

@@ -244,7 +244,7 @@ TEST_F(PacketTest, AnglesThatNoSensorSendsAreDamage) {
       FAIL() << "an impossible angle was accepted";
     } catch (const FileError& error) {
       EXPECT_EQ(error.place().byte_offset, 88U + 24 + 19 + 9);
-      EXPECT_THAT(error.what(), ::testing::HasSubstr("18000"));
+      EXPECT_THAT(error.what(), NamesField("18000"));
     }
   }
 }
@@ -424,7 +424,7 @@ TEST_F(PacketTest, ValuesThatDoNotFitAreRefusedWithRowAndRange) {
       write(recording);
       ADD_FAILURE() << "was written";
     } catch (const InvalidArgument& error) {
-      EXPECT_THAT(error.what(), ::testing::HasSubstr("row 17"));
+      EXPECT_THAT(error.what(), NamesField("row 17"));
       for (const std::string& part : c.message) {
         EXPECT_THAT(error.what(), ::testing::HasSubstr(part));
       }

@@ -210,7 +210,7 @@ TEST(Ros1Bag, ManyPointsOfOneTimeAreNoReturns) {
   const Outcome outcome = bag.read();
   EXPECT_EQ(outcome.recording.header.returns_per_shot, 1);
   EXPECT_EQ(outcome.rows().return_number, std::vector<std::uint8_t>(300, 1));
-  EXPECT_THAT(warnings_of(outcome), ElementsAre(HasSubstr("same time")));
+  EXPECT_THAT(warnings_of(outcome), ElementsAre(Warns(kWarning.times_coarse)));
 }
 
 TEST(Ros1Bag, CloudOfTheDriver) {
@@ -229,7 +229,7 @@ TEST(Ros1Bag, CloudOfTheDriver) {
     ASSERT_EQ(outcome.rows().intensity[i], i % 100);
     ASSERT_EQ(outcome.rows().tag[i], 0x10);
   }
-  EXPECT_THAT(warnings_of(outcome), ElementsAre(HasSubstr("no times of their own")));
+  EXPECT_THAT(warnings_of(outcome), ElementsAre(Warns(kWarning.no_shot_times)));
 }
 
 TEST(Ros1Bag, CloudGridFollowsFromStampsAndCounts) {
@@ -237,15 +237,15 @@ TEST(Ros1Bag, CloudGridFollowsFromStampsAndCounts) {
     std::size_t points;  // in 100 ms
     int returns;
     double step_ns;
-    const char* warning;
+    const char* named;
   };
   const std::vector<Case> cases = {
-      {10'000, 1, 10'000.0, "10 us per shot, with one point per shot"},
-      {20'000, 2, 10'000.0, "10 us per shot, with 2 points per shot"},
-      {24'000, 1, 12'500.0 / 3, "4.1667 us per shot, with one point per shot"},
-      {48'000, 2, 12'500.0 / 3, "4.1667 us per shot, with 2 points per shot"},
-      {72'000, 3, 12'500.0 / 3, "4.1667 us per shot, with 3 points per shot"},
-      {3'000, 1, 10'000.0, "30000 points per second fit no known sensor"},
+      {10'000, 1, 10'000.0, "10 us"},
+      {20'000, 2, 10'000.0, "10 us per shot, with 2 points"},
+      {24'000, 1, 12'500.0 / 3, "4.1667 us"},
+      {48'000, 2, 12'500.0 / 3, "4.1667 us per shot, with 2 points"},
+      {72'000, 3, 12'500.0 / 3, "4.1667 us per shot, with 3 points"},
+      {3'000, 1, 10'000.0, "30000 points per second"},
   };
   for (const Case& c : cases) {
     SCOPED_TRACE(c.points);
@@ -257,7 +257,7 @@ TEST(Ros1Bag, CloudGridFollowsFromStampsAndCounts) {
     const Outcome outcome = bag.read();
     ASSERT_EQ(outcome.rows().size(), 3 * c.points);
     EXPECT_EQ(outcome.recording.header.returns_per_shot, c.returns);
-    EXPECT_THAT(warnings_of(outcome), ElementsAre(HasSubstr(c.warning)));
+    EXPECT_THAT(warnings_of(outcome), ElementsAre(Warns(kWarning.no_shot_times, {c.named})));
     for (std::size_t i = 0; i < c.points; ++i) {
       const std::size_t shot = i / static_cast<std::size_t>(c.returns);
       const auto since = outcome.rows().time_ns[i] - static_cast<std::int64_t>(kUtc);
@@ -272,7 +272,7 @@ TEST(Ros1Bag, OneCloudAlone) {
   bag.add(kTopic, cloud_message(kUtc, driver_cloud(12, 3)));
   const Outcome outcome = bag.read();
   EXPECT_EQ(outcome.rows().time_ns[3], static_cast<std::int64_t>(kUtc) + 12'500);
-  EXPECT_THAT(warnings_of(outcome), ElementsAre(HasSubstr("too few messages")));
+  EXPECT_THAT(warnings_of(outcome), ElementsAre(Warns(kWarning.no_shot_times)));
 }
 
 TEST(Ros1Bag, CloudFieldsStandAnywhere) {
@@ -362,7 +362,8 @@ TEST(Ros1Bag, EachTopicIsADevice) {
   ASSERT_EQ(outcome.recording.data.imu.size(), 3U);
   EXPECT_EQ(outcome.recording.data.imu[0].device, 1);
   EXPECT_THAT(warnings_of(outcome),
-              ElementsAre(HasSubstr("/cloud_registered"), HasSubstr("/camera/imu")));
+              ElementsAre(Warns(kWarning.content_left_out, {"/cloud_registered"}),
+                          Warns(kWarning.content_left_out, {"/camera/imu"})));
 }
 
 TEST(Ros1Bag, AnyTypeNameWithTheSameMd5) {
@@ -391,15 +392,13 @@ TEST(Ros1Bag, OpeningAndReadingCanBeCancelled) {
   EXPECT_THROW(open_recording(path, {}, progress), Cancelled);
 }
 
-TEST(Ros1Bag, OpensByContentAndIsNotWritten) {
+TEST(Ros1Bag, OpensByContent) {
   const TestFolder folder;
   const std::string path = folder.file("without_ending");
   small_bag().write(path);
   const Recording recording = load_recording(path);
   EXPECT_EQ(recording.header.format, "ros1-bag");
   EXPECT_EQ(recording.data.observations.size(), 120U);
-  EXPECT_THROW(create_recording(folder.file("out.bag"), recording.header), InvalidArgument);
-  EXPECT_THROW(create_recording(folder.file("out"), recording.header, "ros1-bag"), InvalidArgument);
   const std::string copy = folder.file("copy.nc");
   write_all(kNetcdfFormat, copy, recording.header, recording.data);
   EXPECT_TRUE(is_same(read_all(kNetcdfFormat, copy).rows(), recording.data.observations));
@@ -413,7 +412,7 @@ TEST(Ros1Bag, CutAnywhere) {
     for (std::size_t length = 0; length < bytes.size(); length += 97) {
       SCOPED_TRACE(length);
       const Outcome outcome = read_text(kRos1BagFormat, std::string_view(bytes).substr(0, length));
-      expect_damage(outcome, HasSubstr("rosbag reindex"), 0);
+      expect_damage(outcome, NamesField("rosbag reindex"), 0);
       ASSERT_TRUE(outcome.error->place().byte_offset);
     }
   }
@@ -437,12 +436,11 @@ TEST(Ros1Bag, SurvivesAnyChangedByte) {
 TEST(Ros1Bag, NotClosed) {
   std::string bytes = small_bag().bytes();
   bytes.replace(bytes.find("index_pos=") + 10, 8, 8, '\0');
-  expect_damage(read_text(kRos1BagFormat, bytes),
-                AllOf(HasSubstr("was not closed"), HasSubstr("rosbag reindex")));
+  expect_damage(read_text(kRos1BagFormat, bytes), NamesField("rosbag reindex"));
 }
 
 TEST(Ros1Bag, WithoutLidarMessages) {
-  expect_damage(Bag().read(), HasSubstr("found no topic"));
+  expect_damage(Bag().read(), NamesField("topic"));
 
   Bag bag;
   RawMessage message = custom(kPowerOn, shots(4));
@@ -452,31 +450,30 @@ TEST(Ros1Bag, WithoutLidarMessages) {
   const Outcome other = bag.read();
   ASSERT_TRUE(other.error);
   EXPECT_FALSE(other.opened);
-  EXPECT_THAT(other.error->problem(), HasSubstr("/imu (sensor_msgs/Imu)"));
-  EXPECT_THAT(
-      other.error->problem(),
-      HasSubstr("/livox/lidar (livox_ros_driver/CustomMsg with the unknown md5 0123456789"));
+  EXPECT_THAT(other.error->problem(), NamesField("/imu (sensor_msgs/Imu)"));
+  EXPECT_THAT(other.error->problem(), AllOf(NamesField("/livox/lidar (livox_ros_driver/CustomMsg"),
+                                            HasSubstr("md5 0123456789")));
 }
 
 TEST(Ros1Bag, DamagedMessagesAreNamed) {
   struct Case {
     const char* name;
     RawMessage message;
-    const char* problem;
+    const char* named;
   };
   std::vector<Case> cases;
   cases.push_back({"count", custom(kPowerOn, shots(4), 1),
-                   "expected 5 points of at least 19 bytes each, found 76 bytes"});
+                   "5 points of at least 19 bytes each, found 76 bytes"});
   cases.push_back({"huge count", custom(kPowerOn, shots(4), 4'294'967'000), "4294967004 points"});
-  cases.push_back({"fewer", custom(kPowerOn, shots(4), -1), "found 19 more bytes"});
-  cases.push_back({"time", custom(~std::uint64_t{0}, shots(4)), "before the year 2200"});
-  cases.push_back({"nan", custom(kPowerOn, shots(4)), "point 2 has a coordinate"});
+  cases.push_back({"fewer", custom(kPowerOn, shots(4), -1), "19 more bytes"});
+  cases.push_back({"time", custom(~std::uint64_t{0}, shots(4)), "2200"});
+  cases.push_back({"nan", custom(kPowerOn, shots(4)), "point 2"});
   const float nan = std::nanf("");
   std::memcpy(cases.back().message.bytes.data() + cases.back().message.bytes.size() - 3 * 19 + 4,
               &nan, sizeof nan);
-  cases.push_back({"frame name", custom(kPowerOn, shots(4)), "characters of the frame name"});
+  cases.push_back({"frame name", custom(kPowerOn, shots(4)), "frame name"});
   cases.back().message.bytes[14] = '\x7f';
-  cases.push_back({"nothing", custom(kPowerOn, {}), "expected 4 bytes of the sequence number"});
+  cases.push_back({"nothing", custom(kPowerOn, {}), "sequence number"});
   cases.back().message.bytes.clear();
   for (const Case& c : cases) {
     for (const std::size_t chunk_rows : {std::size_t{1}, kDefaultChunkRows}) {
@@ -488,7 +485,7 @@ TEST(Ros1Bag, DamagedMessagesAreNamed) {
       bag.add(kTopic, custom(kPowerOn, shots(4)));
       const Outcome outcome = bag.read(chunk_rows);
       expect_damage(outcome,
-                    AllOf(HasSubstr("message 2 of topic /livox/lidar"), HasSubstr(c.problem)), 4);
+                    AllOf(NamesField("message 2 of topic /livox/lidar"), NamesField(c.named)), 4);
       EXPECT_EQ(outcome.recording.data.imu.size(), 1U);
     }
   }
@@ -542,27 +539,24 @@ TEST(Ros1Bag, BigEndianCloudsWithPaddingAreRead) {
 }
 
 TEST(Ros1Bag, DamagedCloudsAreNamed) {
-  const auto check = [](const char* problem, auto&& change) {
-    SCOPED_TRACE(problem);
+  const auto check = [](const char* named, auto&& change) {
+    SCOPED_TRACE(named);
     Cloud cloud = driver_cloud(4);
     change(cloud);
     Bag bag;
     bag.add(kTopic, cloud_message(kPowerOn, driver_cloud(4)));
     bag.add(kTopic, cloud_message(kPowerOn + 40'000, cloud));
     expect_damage(bag.read(),
-                  AllOf(HasSubstr("message 2 of topic /livox/lidar"), HasSubstr(problem)), 4);
+                  AllOf(NamesField("message 2 of topic /livox/lidar"), NamesField(named)), 4);
   };
-  check("expected the fields x, y and z in the point cloud, found x, y",
-        [](Cloud& c) { c.fields.resize(2); });
+  check("found x, y", [](Cloud& c) { c.fields.resize(2); });
   check("found none", [](Cloud& c) { c.fields.clear(); });
-  check("datatype in [1, 8] for the field z, found 9", [](Cloud& c) { c.fields[2].datatype = 9; });
-  check("the field z takes bytes 15 to 18, but a point has only 18 bytes",
-        [](Cloud& c) { c.fields[2].offset = 15; });
-  check("the field line takes", [](Cloud& c) { c.fields[5].offset = ~0U; });
+  check("field z, found 9", [](Cloud& c) { c.fields[2].datatype = 9; });
+  check("field z takes bytes 15 to 18", [](Cloud& c) { c.fields[2].offset = 15; });
+  check("field line", [](Cloud& c) { c.fields[5].offset = ~0U; });
   check("1 x 5 points of 18 bytes, found 72 bytes", [](Cloud& c) { c.width = 5; });
   check("4294967295 x 4 points of 18 bytes", [](Cloud& c) { c.height = c.row_step = ~0U; });
-  check("rows of at least 36 bytes in the point cloud, found 0",
-        [](Cloud& c) { c.height = c.width = 2; });
+  check("36 bytes in the point cloud, found 0", [](Cloud& c) { c.height = c.width = 2; });
 }
 
 TEST(Ros1Bag, AClaimedChunkCostsNoMemory) {
@@ -574,7 +568,7 @@ TEST(Ros1Bag, AClaimedChunkCostsNoMemory) {
   const std::size_t at = bytes.find("size=", bytes.find("compression=bz2") - 64) + 5;
   bytes.replace(at, 4, std::string("\0\0\0\x40", 4));  // 1 GiB
   expect_little_memory(
-      [&] { expect_damage(read_text(kRos1BagFormat, bytes), HasSubstr("of the unpacked chunk")); });
+      [&] { expect_damage(read_text(kRos1BagFormat, bytes), NamesField("unpacked chunk")); });
 }
 
 TEST(Ros1Bag, ReadersOfSeveralThreadsLeaveTheLoggingAsItWas) {
@@ -635,7 +629,7 @@ TEST(Ros1Bag, OffsetsThatGrowOverMessagesCountFromTheFirst) {
     ASSERT_EQ(rows.time_ns[row],
               static_cast<std::int64_t>(kPowerOn + row / 10 * kMessage + row % 10 * 10'000));
   }
-  EXPECT_THAT(warnings_of(outcome), ElementsAre(HasSubstr("times are at fault")));
+  EXPECT_THAT(warnings_of(outcome), ElementsAre(Warns(kWarning.times_corrected)));
 }
 
 TEST(Ros1Bag, StampsInUtcBesideTimesFromPowerOnAreCompared) {

@@ -20,7 +20,6 @@ using namespace ros2_messages;
 using namespace format_tests;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 struct Bag : Ros2BagFile {
   std::string bytes() const {
@@ -90,7 +89,6 @@ TEST(Ros2Bag, InertialSamplesAndMessagesStayWhole) {
   EXPECT_THAT(samples[1].angular_velocity, ElementsAre(0.25F, -0.5F, 0.125F));
   EXPECT_THAT(samples[1].acceleration_g, ElementsAre(0.0625F, -0.03125F, 1.0F));
   EXPECT_EQ(folder.names().size(), 1U);  // nothing was written beside it
-  EXPECT_THROW(create_recording(folder.file("out.db3"), reader->header()), InvalidArgument);
 }
 
 TEST(Ros2Bag, ReadsWhatIsStillInTheJournal) {
@@ -107,7 +105,7 @@ TEST(Ros2Bag, ReadsWhatIsStillInTheJournal) {
 }
 
 TEST(Ros2Bag, WithoutLidarMessages) {
-  expect_damage(Bag().read(), HasSubstr("found no topic"));
+  expect_damage(Bag().read(), NamesField("topic"));
 
   Bag bag;
   bag.topic("/imu", kImuType);
@@ -115,8 +113,8 @@ TEST(Ros2Bag, WithoutLidarMessages) {
   const Outcome other = bag.read();
   ASSERT_TRUE(other.error);
   EXPECT_FALSE(other.opened);
-  EXPECT_THAT(other.error->problem(), HasSubstr("/imu (sensor_msgs/msg/Imu)"));
-  EXPECT_THAT(other.error->problem(), HasSubstr("stored as \"protobuf\" instead of cdr"));
+  EXPECT_THAT(other.error->problem(), NamesField("/imu (sensor_msgs/msg/Imu)"));
+  EXPECT_THAT(other.error->problem(), NamesField("\"protobuf\""));
 
   bag.topic("/points", kCloudType);
   const Outcome no_message = bag.read();
@@ -132,24 +130,23 @@ TEST(Ros2Bag, OtherDatabasesAreRefused) {
   sqlite3_exec(database, "CREATE TABLE topics(id, title)", nullptr, nullptr, nullptr);
   sqlite3_close(database);
   const Outcome outcome = read_all(kRos2BagFormat, path);
-  expect_damage(outcome, HasSubstr("cannot be read as a ROS 2 bag"));
+  expect_damage(outcome, NamesField("ROS 2 bag"));
 }
 
 TEST(Ros2Bag, DamagedMessagesAreNamed) {
   struct Case {
     const char* name;
     std::string message;
-    const char* problem;
+    const char* named;
   };
   const std::string sound = custom(kPowerOn, shots(4));
   std::vector<Case> cases;
-  cases.push_back({"count", custom(kPowerOn, shots(4), 1), "expected 5 points of at least 19"});
-  cases.push_back(
-      {"huge", custom(kPowerOn, shots(4), 4'294'967'000), "expected 4294967004 points"});
-  cases.push_back({"time", custom(~std::uint64_t{0}, shots(4)), "before the year 2200"});
-  cases.push_back({"nan", custom(kPowerOn, {{0, std::nanf(""), 0.0F, 0.0F}}), "point 1 has a"});
-  cases.push_back({"nothing", "", "as plain CDR does"});
-  cases.push_back({"mark", sound, "as plain CDR does"});
+  cases.push_back({"count", custom(kPowerOn, shots(4), 1), "5 points of at least 19"});
+  cases.push_back({"huge", custom(kPowerOn, shots(4), 4'294'967'000), "4294967004 points"});
+  cases.push_back({"time", custom(~std::uint64_t{0}, shots(4)), "2200"});
+  cases.push_back({"nan", custom(kPowerOn, {{0, std::nanf(""), 0.0F, 0.0F}}), "point 1"});
+  cases.push_back({"nothing", "", "CDR"});
+  cases.push_back({"mark", sound, "CDR"});
   cases.back().message[1] = '\7';
   for (std::size_t length = 4; length + 3 < sound.size(); length += 3) {
     cases.push_back({"cut", sound.substr(0, length), "expected"});
@@ -164,14 +161,14 @@ TEST(Ros2Bag, DamagedMessagesAreNamed) {
       bag.add(lidar, sound);
       const Outcome outcome = bag.read(chunk_rows);
       expect_damage(outcome,
-                    AllOf(HasSubstr("message row 2 of topic /livox/lidar"), HasSubstr(c.problem)),
+                    AllOf(NamesField("message row 2 of topic /livox/lidar"), NamesField(c.named)),
                     4);
     }
   }
   Bag bag;
   const std::size_t lidar = bag.topic(kTopic, kCloudType);
   bag.add(lidar, cloud(kPowerOn, 4, 4000));
-  expect_damage(bag.read(), AllOf(HasSubstr("message row 1"), HasSubstr("4000 values of data")));
+  expect_damage(bag.read(), AllOf(NamesField("message row 1"), NamesField("4000 values")));
 }
 
 TEST(Ros2Bag, CutAnywhere) {
@@ -179,7 +176,7 @@ TEST(Ros2Bag, CutAnywhere) {
   for (std::size_t length = 0; length < bytes.size(); length += 97) {
     SCOPED_TRACE(length);
     expect_damage(read_text(kRos2BagFormat, std::string_view(bytes).substr(0, length)),
-                  HasSubstr("cut off"), 0, length);
+                  NamesField("cut off"), 0, length);
   }
 }
 
@@ -243,18 +240,18 @@ TEST(Ros2Bag, OnlyStoredTablesAreRead) {
       " FROM c");
   ASSERT_TRUE(endless.error);
   EXPECT_FALSE(endless.opened);
-  EXPECT_THAT(endless.error->problem(), HasSubstr("expected a table messages"));
-  EXPECT_THAT(endless.error->problem(), HasSubstr("found a view"));
+  EXPECT_THAT(endless.error->problem(), NamesField("table messages"));
+  EXPECT_THAT(endless.error->problem(), NamesField("view"));
 
   const Outcome topics =
       read_changed("ALTER TABLE topics RENAME TO t; CREATE VIEW Topics AS SELECT * FROM t");
-  expect_damage(topics, HasSubstr("expected a table topics"));
+  expect_damage(topics, NamesField("table topics"));
 
   const Outcome computed = read_changed(
       "ALTER TABLE messages RENAME TO m; CREATE TABLE messages(id INTEGER PRIMARY KEY,"
       " topic_id INTEGER, data BLOB AS (zeroblob(1000000)) VIRTUAL);"
       "INSERT INTO messages(topic_id) SELECT topic_id FROM m");
-  expect_damage(computed, HasSubstr("the column data of the table messages"));
+  expect_damage(computed, NamesField("column data of the table messages"));
 }
 
 TEST(Ros2Bag, MessagesOutOfOrderAreDamage) {
@@ -262,7 +259,7 @@ TEST(Ros2Bag, MessagesOutOfOrderAreDamage) {
   const Outcome outcome = read_changed(
       "ALTER TABLE messages RENAME TO m; CREATE TABLE messages(id, topic_id, timestamp, data);"
       "INSERT INTO messages SELECT * FROM m; INSERT INTO messages SELECT * FROM m WHERE id > 4");
-  expect_damage(outcome, HasSubstr("message row 5 follows row 5"), 40);
+  expect_damage(outcome, NamesField("message row 5"), 40);
 }
 
 }  // namespace risley::recordings::ros2_bag_test

@@ -16,12 +16,13 @@
 #include "risley/recordings/writer.hpp"
 
 #include "recordings/format_tests.hpp"
+#include "refusal.hpp"
 
 namespace risley::recordings::source_test {
 
 using format_tests::TestFolder;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 /// Packets of 5 rows, each third one with an inertial sample instead.
 Recording recording_of(std::size_t packets) {
@@ -175,17 +176,17 @@ TEST(SourceTest, DamageThatAQuestionMeetsIsKept) {
 TEST(SourceTest, WrongColumnsAreNamed) {
   EXPECT_EQ(problem_of([](Recording&) {}), "none");
   EXPECT_THROW(Source(nullptr, "memory"), InvalidArgument);
-  EXPECT_THAT(problem_of([](Recording& r) { r.header.devices.clear(); }), HasSubstr("no device"));
+  EXPECT_THAT(problem_of([](Recording& r) { r.header.devices.clear(); }), NamesField("device"));
   EXPECT_THAT(problem_of([](Recording& r) { r.data.observations.device[3] = 1; }),
-              HasSubstr("device = 1 in row 3, allowed 0 to 0"));
+              NamesField("device"));
   EXPECT_THAT(problem_of([](Recording& r) { r.data.observations.range.pop_back(); }),
-              HasSubstr("range has 14 values, expected 15"));
+              NamesField("range"));
   EXPECT_THAT(problem_of([](Recording& r) { r.data.observations.zenith[2] = 4; }),
-              HasSubstr("zenith = 4 rad in row 2"));
+              NamesField("zenith"));
   EXPECT_THAT(problem_of([](Recording& r) { r.data.packets.pop_back(); }),
-              HasSubstr("rows of packets has 10 values, expected 15"));
+              AllOf(NamesField("packets"), NamesField("10 values, expected 15")));
   EXPECT_THAT(problem_of([](Recording& r) { r.data.imu.clear(); }),
-              HasSubstr("inertial samples of packets"));
+              NamesField("inertial samples of packets"));
 }
 
 }  // namespace risley::recordings::source_test

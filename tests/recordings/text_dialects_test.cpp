@@ -11,7 +11,6 @@
 namespace risley::recordings::text_dialects_test {
 
 using namespace format_tests;
-using ::testing::HasSubstr;
 
 Recording load(const std::string& bytes) {
   const TestFolder folder;
@@ -123,8 +122,8 @@ TEST(TextDialects, FilesThatStandForOthersAreRefusedByTheirRemedy) {
     return std::string();
   };
   EXPECT_THAT(problem("version https://git-lfs.github.com/spec/v1\noid sha256:c8\nsize 599\n"),
-              HasSubstr("git lfs pull"));
-  EXPECT_THAT(problem(std::string("\x1F\x8B\x08\x00\x01", 5)), HasSubstr("gunzip"));
+              NamesField("git lfs pull"));
+  EXPECT_THAT(problem(std::string("\x1F\x8B\x08\x00\x01", 5)), NamesField("gunzip"));
 }
 
 }  // namespace risley::recordings::text_dialects_test

@@ -229,6 +229,16 @@ TEST(TimeAudit, AJumpWithTheSourceOfTimeIsAResetAndNoGap) {
   EXPECT_EQ(result.gaps.count, 1U);
 }
 
+TEST(TimeAudit, PacketsOfEveryDataTypeAreCounted) {
+  Chunk chunk = packets_at({{0}, {kMs}, {2 * kMs}});
+  chunk.packets[0].data_type = 0;
+  chunk.packets[1].data_type = 17;  // the last one that there is
+  chunk.packets[2].data_type = 18;
+  const TimeAuditResult result = audit(chunk);
+  EXPECT_EQ(result.packets_by_data_type.front(), 1U);
+  EXPECT_EQ(result.packets_by_data_type.back(), 1U);
+}
+
 TEST(TimeAudit, AFileIsAuditedWithItsWrapsAndSamples) {
   const lvx_bytes::TestFolder folder;
   std::mt19937 random(1);

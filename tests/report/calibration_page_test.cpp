@@ -1,9 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <functional>
 #include <limits>
-#include <regex>
-#include <set>
 #include <string>
 #include <tuple>
 
@@ -18,11 +17,18 @@
 #include "risley/report/report_file.hpp"
 #include "risley/sensors/preset.hpp"
 
+#include "refusal.hpp"
+#include "report/page_reading.hpp"
+
 namespace risley::report::calibration_page_test {
 
 using calibration::Calibration;
+using testing::chart;
+using testing::expect_sound;
+using testing::GoldenPage;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using testing::series;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNoise = 0.015;  // of the distances, m
@@ -122,7 +128,7 @@ Calibration example() {
   c.datum_without_common = {deg(0.002), deg(0.01), deg(0.008), deg(0.013), deg(0.0021), deg(0.013)};
   c.prior_tests = {{"flipped <180>", true, deg(0.02), 4.5, 3, 21.1},
                    {"ceiling", false, deg(0.4), 80.5, 2, 18.4},
-                   {"nobody knows", false, kNaN, kNaN, 2, 18.4},
+                   {"untested wall", false, kNaN, kNaN, 2, 18.4},
                    {"unseen", true, 0, 0, 0, 0}};
   c.pointing_error = {{deg(0.07), deg(0.35), 0, 0, deg(0.3571), deg(0.3502), deg(0.0231), {}},
                       deg(0.0016),
@@ -195,204 +201,76 @@ jobs::BeamComparison example_truth() {
   return truth;
 }
 
-/// The page's own part: no style, no scripts.
-std::string visible(const std::string& html) {
-  const std::size_t first = html.find("<main>"), last = html.find("</main>");
-  EXPECT_NE(first, std::string::npos);
-  EXPECT_NE(last, std::string::npos);
-  return html.substr(first, last - first);
+TEST(CalibrationPage, MatchesItsGoldenText) {
+  Page whole(20000);
+  whole.truth = example_truth();
+  GoldenPage golden("calibration", whole.html());
+  const auto differs = [&](const std::string& when, const std::function<void(Page&)>& change) {
+    Page page = whole;
+    change(page);
+    golden.differs(when, page.html());
+  };
+  const auto verdict = [&](calibration::CalibrationCode code) {
+    return [=](Page& page) {
+      page.calibration.verdict = {code, "directions are off", "use the calibration"};
+    };
+  };
+  differs("no truth", [](Page& page) { page.truth.reset(); });
+  differs("bent", verdict(calibration::CalibrationCode::bent));
+  differs("not better", verdict(calibration::CalibrationCode::not_better));
+  differs("within the tolerance", verdict(calibration::CalibrationCode::off_within_tolerance));
+  differs("warnings", [](Page& page) {
+    page.calibration.warnings = {{kWarning.uneven_plane, "the walls are uneven"}};
+    page.warnings = {{kWarning.shots_lost, "a gap of 2 s", {{}, 3}}};
+  });
+  differs("a datum that is good enough", [](Page& page) {
+    page.calibration.datum.sigma_pitch = deg(0.03);
+    page.calibration.datum.sigma_yaw = deg(0.039);
+  });
+  differs("a poor datum", [](Page& page) {
+    page.calibration.datum.sigma_pitch = deg(0.03);
+    page.calibration.datum.sigma_yaw = deg(0.041);
+  });
+  differs("an unknown datum", [](Page& page) { page.calibration.datum.sigma_yaw = kNaN; });
+  differs("a single parameter", [](Page& page) {
+    Calibration& c = page.calibration;
+    c.free = estimation::free_parameters({"prism_tilt_a_vertical_deg"}, {2});
+    c.parameters = Eigen::VectorXd::Constant(1, deg(0.3));
+    c.covariance = Eigen::MatrixXd::Constant(1, 1, deg(0.02) * deg(0.02));
+    c.believed.set("prism_tilt_a_vertical_deg", deg(0.11));
+    page.truth->truth.set("prism_tilt_a_vertical_deg", deg(0.22));
+  });
+  differs("held ranges", [](Page& page) { page.calibration.numbers.clear(); });
+  differs("a failure", [](Page& page) {
+    page.calibration = Calibration();
+    page.sample.clear();
+    page.calibration.sensor = sensors::load_sensor("mid-40");
+    page.calibration.believed = page.calibration.sensor.train;
+    page.calibration.reason = "the walls do not determine pitch & yaw";
+    page.calibration.warnings = {{kWarning.poor_datum, "a single wall"}};
+    page.calibration.rms_after = kNaN;
+    page.calibration.datum.sigma_pitch = std::numeric_limits<double>::infinity();
+    page.calibration.unobservable = {
+        {{{"prism_tilt_a_vertical_deg", 0.8}, {"incident_beam_vertical_deg", -0.6}}, 1e-9, 40}};
+    page.truth->before.azimuth_rmse = kNaN;
+  });
 }
 
-std::string data_text(const std::string& html) {
-  const std::string start = "<script type=\"application/json\" id=\"page-data\">";
-  const std::size_t first = html.find(start) + start.size();
-  return html.substr(first, html.find("</script>", first) - first);
-}
-
-nlohmann::json data(const std::string& html) { return nlohmann::json::parse(data_text(html)); }
-
-/// Titles of the diagrams, in the order of their data.
-std::vector<std::string> titles(const std::string& html) {
-  std::vector<std::string> found;
-  const std::regex caption("<figcaption>([^<]*)</figcaption>");
-  for (std::sregex_iterator i(html.begin(), html.end(), caption), end; i != end; ++i) {
-    found.push_back((*i)[1]);
-  }
-  return found;
-}
-
-nlohmann::json chart(const std::string& html, const std::string& title) {
-  const std::string shown = visible(html);
-  const std::vector<std::string> all = titles(shown);
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (all[i] == title) return data(html).at(i);
-  }
-  ADD_FAILURE() << "no diagram " << title;
-  return {};
-}
-
-nlohmann::json series(const nlohmann::json& chart, const std::string& label) {
-  for (const auto& one : chart.at("series")) {
-    if (one.at("label") == label) return one;
-  }
-  throw std::runtime_error("no series " + label);
-}
-
-void expect_sound(const std::string& html) {
-  const std::string shown = visible(html);
-  const std::regex not_finite("(^|[^A-Za-z])(nan|inf)([^A-Za-z]|$)", std::regex::icase);
-  std::smatch found;
-  EXPECT_FALSE(std::regex_search(shown, found, not_finite)) << found.prefix().str().substr(
-      found.prefix().length() > 200 ? static_cast<std::size_t>(found.prefix().length() - 200) : 0);
-  EXPECT_FALSE(std::regex_search(data_text(html), not_finite));
-
-  const nlohmann::json charts = data(html);
-  EXPECT_EQ(charts.size(), titles(shown).size());
-  const std::set<std::string> colours = {"a", "b", "c", "d", "ink", "bad"};
-  for (const auto& one : charts) {
-    EXPECT_THAT(shown, HasSubstr("class=\"plot\" id=\"" + one.at("id").get<std::string>() + "\""));
-    for (const auto& drawn : one.at("series")) {
-      EXPECT_EQ(drawn.at("x").size(), drawn.at("y").size());
-      EXPECT_TRUE(colours.contains(drawn.at("colour").get<std::string>()));
-      for (const auto& x : drawn.at("x")) EXPECT_TRUE(x.is_number());
-    }
-  }
-}
-
-TEST(CalibrationPage, SaysFirstThatAGoodCalibrationIsHealthy) {
-  Page page;
-  page.truth = example_truth();
-  const std::string html = page.html(), shown = visible(html);
-  expect_sound(html);
-  EXPECT_THAT(shown, HasSubstr("class=\"verdict ok\""));
-  EXPECT_THAT(shown, HasSubstr("21.4 mm thick before and 15.1 mm after"));
-  EXPECT_THAT(shown, HasSubstr("80\u202f000 points"));
-  EXPECT_THAT(shown, HasSubstr("roll is 0.0041°, of pitch 0.012°"));
-  EXPECT_THAT(shown, Not(HasSubstr("must not be trusted")));
-  EXPECT_THAT(shown, HasSubstr("The sensor points where it believes."));
-  EXPECT_THAT(shown, HasSubstr("walls &lt;confirm&gt; the belief"));
-  EXPECT_LT(shown.find("class=\"verdict"), shown.find("<h2>"));
-}
-
-TEST(CalibrationPage, OfABentUnitSaysByHowMuchAndWhere) {
-  Page page;
-  page.calibration.verdict = {calibration::CalibrationCode::bent, "directions are off",
-                              "use the calibration"};
-  const std::string html = page.html(), shown = visible(html);
-  expect_sound(html);
-  EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
-  EXPECT_THAT(shown, HasSubstr("does not point where it believes: use this calibration"));
-  EXPECT_THAT(shown, HasSubstr("<td>0.3571</td><td>0.0016</td><td>187.0</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>0.02310</td><td>0.00031</td><td>12.1</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>0.05120</td><td>0.00060</td><td>26.8</td>"));
-  // The map's mean is what its beams are off by.
-  const nlohmann::json charts = data(html);
-  ASSERT_EQ(charts[0].at("title"), "Error of reported directions over the field of view");
-  for (const auto& value : charts[0].at("series")[0].at("value")) {
+TEST(CalibrationPage, TheMapsMeanIsWhatItsBeamsAreOffBy) {
+  const auto map = chart(Page().html(), "Error of reported directions over the field of view");
+  for (const auto& value : map.at("series")[0].at("value")) {
     EXPECT_NEAR(value.get<double>(), 0.2, 0.01);
   }
-  page.calibration.verdict.code = calibration::CalibrationCode::not_better;
-  EXPECT_THAT(visible(page.html()), HasSubstr("class=\"verdict bad\""));
-  page.calibration.verdict.code = calibration::CalibrationCode::off_within_tolerance;
-  const std::string within = visible(page.html());
-  EXPECT_THAT(within, HasSubstr("off, but within the tolerance"));
-  EXPECT_THAT(within, HasSubstr("<code>off_within_tolerance</code>"));
-}
-
-TEST(CalibrationPage, HasEverySection) {
-  Page page(20000);
-  page.truth = example_truth();
-  const std::string shown = visible(page.html());
-  for (const char* text :
-       {"<h2>Where the sensor points</h2>", "<h2>Parameters</h2>", "<h2>Datum</h2>",
-        "Against the truth", "against the data", "<h2>Walls</h2>", "Steps on the walls",
-        "<h2>Thickness of the walls</h2>", "<h2>What was taken for a wall</h2>",
-        "<h2>Correlations of the parameters</h2>", "<h2>Times of the recording</h2>",
-        "<h2>How to make it again</h2>", "every range is longer by", "The walls wave by 1.4 mm"}) {
-    EXPECT_THAT(shown, HasSubstr(text));
-  }
-  EXPECT_THAT(
-      titles(shown),
-      ::testing::ElementsAre(
-          "Error of reported directions over the field of view",
-          "The same without the rotation that all beams share", "Errors of the azimuth before",
-          "Errors of the zenith angle before", "Errors of the azimuth after",
-          "Errors of the zenith angle after", "Walls before the calibration: room &lt;1&gt;.lvx",
-          "Walls after the calibration: room &lt;1&gt;.lvx",
-          "Walls before the calibration: hall.lvx", "Walls after the calibration: hall.lvx",
-          "Thickness over the angle of incidence", "Thickness over the rotation angle of prism A",
-          "Thickness over the rotation angle of prism B",
-          "Histogram of the distances from the planes",
-          "Distances from the planes over the azimuth",
-          "Mean distance from the planes over the field of view, before",
-          "Mean distance from the planes over the field of view, after",
-          "Field of view: room &lt;1&gt;.lvx", "From above: room &lt;1&gt;.lvx",
-          "From the side: room &lt;1&gt;.lvx", "Field of view: hall.lvx", "From above: hall.lvx",
-          "From the side: hall.lvx"));
 }
 
 TEST(CalibrationPage, EscapesNames) {
   Page page;
   page.warnings = {{kWarning.shots_lost, "<script>alert(1)</script>"}};
-  const std::string html = page.html(), shown = visible(html);
+  const std::string html = page.html();
   expect_sound(html);
-  EXPECT_THAT(shown, HasSubstr("front &lt;wall&gt; &amp; door"));
-  EXPECT_THAT(shown, HasSubstr("flipped &lt;180&gt;"));
-  EXPECT_THAT(shown, HasSubstr("1PQD&amp;7"));
   EXPECT_THAT(html, HasSubstr("<title>risley calibrate: room &lt;1&gt;.lvx and 1 more</title>"));
   EXPECT_THAT(html, Not(HasSubstr("<wall>")));
   EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
-}
-
-TEST(CalibrationPage, AnyWarningAsksForCare) {
-  Page page;
-  page.calibration.warnings = {{kWarning.uneven_plane, "the walls are uneven"}};
-  page.warnings = {{kWarning.shots_lost, "a gap of 2 s", {{}, 3}}};
-  const std::string shown = visible(page.html());
-  EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
-  EXPECT_THAT(shown, HasSubstr("<li>a gap of 2 s (line 3)</li><li>the walls are uneven</li>"));
-}
-
-TEST(CalibrationPage, APoorDatumSaysWhatHelps) {
-  Page page;
-  page.calibration.datum.sigma_pitch = deg(0.03);
-  page.calibration.datum.sigma_yaw = deg(0.039);
-  EXPECT_THAT(visible(page.html()), HasSubstr("class=\"verdict ok\""));
-  page.calibration.datum.sigma_yaw = deg(0.041);
-  std::string shown = visible(page.html());
-  EXPECT_THAT(shown, HasSubstr("class=\"verdict care\""));
-  EXPECT_THAT(shown, HasSubstr("must not be trusted"));
-  EXPECT_THAT(shown, HasSubstr("option stations"));
-  EXPECT_THAT(shown, HasSubstr("option planes"));
-  page.calibration.datum.sigma_yaw = kNaN;  // an unknown one is no better
-  shown = visible(page.html());
-  EXPECT_THAT(shown, HasSubstr("must not be trusted"));
-  expect_sound(page.html());
-}
-
-TEST(CalibrationPage, AFailureSaysWhyAndWhatToDo) {
-  Page page;
-  page.calibration = Calibration();
-  page.sample.clear();
-  page.calibration.sensor = sensors::load_sensor("mid-40");
-  page.calibration.believed = page.calibration.sensor.train;
-  page.calibration.reason = "the walls do not determine pitch & yaw";
-  page.calibration.warnings = {{kWarning.poor_datum, "a single wall"}};
-  page.calibration.rms_after = kNaN;
-  page.calibration.datum.sigma_pitch = std::numeric_limits<double>::infinity();
-  page.calibration.unobservable = {
-      {{{"prism_tilt_a_vertical_deg", 0.8}, {"incident_beam_vertical_deg", -0.6}}, 1e-9, 40}};
-  page.truth = example_truth();
-  page.truth->before.azimuth_rmse = kNaN;
-  const std::string html = page.html(), shown = visible(html);
-  expect_sound(html);
-  EXPECT_THAT(shown, HasSubstr("class=\"verdict bad\""));
-  EXPECT_THAT(shown, HasSubstr("the walls do not determine pitch &amp; yaw"));
-  EXPECT_THAT(shown, HasSubstr("<li>a single wall</li>"));
-  EXPECT_THAT(shown, HasSubstr("What to do:"));
-  EXPECT_THAT(shown, HasSubstr("0.80 prism_tilt_a_vertical_deg - 0.60 incident_beam_vertical_deg"));
-  EXPECT_THAT(shown, HasSubstr("There are no points to draw."));
-  EXPECT_EQ(data(html).size(), 4u);  // against the truth, and nothing else
 }
 
 TEST(CalibrationPage, NumbersThatAreNotFiniteAreDashes) {
@@ -411,44 +289,6 @@ TEST(CalibrationPage, NumbersThatAreNotFiniteAreDashes) {
   c.profiles[0].from[1] = kNaN;
   c.profiles[1].rms_before.assign(36, kNaN);
   expect_sound(page.html());
-}
-
-TEST(CalibrationPage, ParametersStandBesideWhatWasBelievedAndTrue) {
-  Page page;
-  page.truth = example_truth();
-  Calibration& c = page.calibration;
-  c.free = estimation::free_parameters({"prism_tilt_a_vertical_deg"}, {2});
-  c.parameters = Eigen::VectorXd::Constant(1, deg(0.3));
-  c.covariance = Eigen::MatrixXd::Constant(1, 1, deg(0.02) * deg(0.02));
-  c.believed.set("prism_tilt_a_vertical_deg", deg(0.11));
-  page.truth->truth.set("prism_tilt_a_vertical_deg", deg(0.22));
-  const std::string shown = visible(page.html());
-  EXPECT_THAT(shown, HasSubstr("<td>0.300</td><td>0.020</td><td>deg</td><td>0</td><td>0.110</td>"
-                               "<td>0.190</td><td>0.220</td><td>0.080</td>"
-                               "<td class=\"far\">4.00</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>-12.3</td><td>2.1</td><td>50</td><td>mm</td>"));
-  c.numbers.clear();  // it was held
-  EXPECT_THAT(visible(page.html()), Not(HasSubstr("every range is longer by")));
-}
-
-TEST(CalibrationPage, WithoutTruthThereAreNoTruthColumns) {
-  const std::string shown = visible(Page().html());
-  EXPECT_THAT(shown, Not(HasSubstr("truth")));
-}
-
-TEST(CalibrationPage, JudgesWhatWasKnownBefore) {
-  const std::string shown = visible(Page().html());
-  EXPECT_THAT(shown, HasSubstr("<td>fits</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td class=\"far\">contradicts the data</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>2</td><td>18.4</td><td>not tested</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>0</td><td>0</td><td>not tested</td>"));
-}
-
-TEST(CalibrationPage, AStepStandsWithItsHeightAndPlace) {
-  EXPECT_THAT(visible(Page().html()),
-              HasSubstr("front &lt;wall&gt; &amp; door in room &lt;1&gt;.lvx: 21.3 mm towards the "
-                        "sensor, about 2.5° wide, around azimuth 3.2° and zenith 91.5°, 341 "
-                        "points"));
 }
 
 TEST(CalibrationPage, RotationAnglesRunFromZeroToAFullTurn) {
@@ -492,7 +332,6 @@ TEST(CalibrationPage, CellMeansShowAPlaneThatIsBent) {
   for (std::size_t i = 0; i < cells.at("x").size(); ++i) {
     EXPECT_NEAR(cells.at("value").at(i), cells.at("x").at(i) > 0 ? 1.0 : -1.0, 1e-6);
   }
-  EXPECT_THAT(visible(html), HasSubstr("root mean square of 1.00 mm"));
   // Both pictures have the same colours, or they could not be compared.
   const auto before = chart(html, "Mean distance from the planes over the field of view, before");
   EXPECT_EQ(before.at("value_range"), drawn.at("value_range"));
@@ -510,8 +349,8 @@ TEST(CalibrationPage, WallsInSpaceStandOffTheirPlanesByTheirEnlargedMeans) {
     point.before = 0.004;
   }
   const std::string html = page.html();
-  const auto before = chart(html, "Walls before the calibration: room &lt;1&gt;.lvx");
-  const auto after = chart(html, "Walls after the calibration: room &lt;1&gt;.lvx");
+  const auto before = chart(html, "Walls before the calibration: room <1>.lvx");
+  const auto after = chart(html, "Walls after the calibration: room <1>.lvx");
   EXPECT_EQ(before.at("kind"), "space");
   const auto& lifted = before.at("series").at(0);
   ASSERT_GT(lifted.at("x").size(), 100u);
@@ -521,8 +360,6 @@ TEST(CalibrationPage, WallsInSpaceStandOffTheirPlanesByTheirEnlargedMeans) {
     EXPECT_NEAR(after.at("series").at(0).at("x").at(i), 8.0, 1e-5);
     EXPECT_NEAR(lifted.at("value").at(i), 4.0, 1e-5);
   }
-  EXPECT_THAT(visible(html), HasSubstr("drawn 10 times as large"));
-  EXPECT_THAT(html, HasSubstr("ECharts GL"));
 }
 
 TEST(CalibrationPage, ErrorsOfBeamsWithKnownTruthAreCountedBeforeAndAfter) {
@@ -541,16 +378,15 @@ TEST(CalibrationPage, ErrorsOfBeamsWithKnownTruthAreCountedBeforeAndAfter) {
 TEST(CalibrationPage, ViewsAreThinnedAndSayHow) {
   Page page(20000);
   const std::string html = page.html();
-  const auto drawn = chart(html, "From above: room &lt;1&gt;.lvx");
+  const auto drawn = chart(html, "From above: room <1>.lvx");
   std::size_t points = 0;
   for (const auto& one : drawn.at("series")) points += one.at("x").size();
   EXPECT_LE(points, 4001u);
-  EXPECT_THAT(visible(html), HasSubstr("One in 3 of the 10\u202f000 sample points is drawn."));
   EXPECT_EQ(series(drawn, "no plane").at("colour"), "ink");
   EXPECT_EQ(series(drawn, "front <wall> & door").at("colour"), "a");
   EXPECT_EQ(series(drawn, "sensor").at("x").at(0), 0);
   // Every point of the floor, which rises by 2 degrees, stands where it is below the sensor.
-  const auto floor = series(chart(html, "From the side: room &lt;1&gt;.lvx"), "floor");
+  const auto floor = series(chart(html, "From the side: room <1>.lvx"), "floor");
   ASSERT_GT(floor.at("x").size(), 10u);
   for (std::size_t i = 0; i < floor.at("x").size(); ++i) {
     const auto x = floor.at("x")[i].get<double>(), above = floor.at("y")[i].get<double>();
@@ -563,7 +399,7 @@ std::string error_of(const std::string& text) {
   try {
     report_page(parse_report(text, "folder/report.json"));
   } catch (const FileError& found) {
-    EXPECT_THAT(found.what(), HasSubstr("folder/report.json"));
+    EXPECT_EQ(found.path(), "folder/report.json");
     return found.what();
   }
   return "";
@@ -585,12 +421,12 @@ TEST(ReportFile, AReportComesBackAsItWas) {
 
 TEST(ReportFile, WhatIsNoReportIsRefused) {
   const std::string text = report_text(Page().report());
-  EXPECT_THAT(error_of(text.substr(0, text.size() / 2)), HasSubstr("byte"));
-  EXPECT_THAT(error_of("[1, 2]"), HasSubstr("expected object, found array"));
-  EXPECT_THAT(error_of("{\"format\": \"a dog\"}"), HasSubstr("is missing"));
+  EXPECT_THAT(error_of(text.substr(0, text.size() / 2)), NamesField("byte"));
+  EXPECT_THAT(error_of("[1, 2]"), NamesField("array"));
+  EXPECT_THAT(error_of("{\"format\": \"a dog\"}"), NamesField("format_version"));
   EXPECT_THAT(error_of("{\"format\": \"risley report\", \"format_version\": 1}"),
-              HasSubstr("run the command that made the result again"));
-  EXPECT_THAT(error_of("{\"format\": 1e999}"), HasSubstr("the JSON cannot be read"));
+              NamesField("format_version"));
+  EXPECT_THAT(error_of("{\"format\": 1e999}"), NamesField("JSON"));
 }
 
 TEST(ReportFile, WhatIsMissingOrWrongIsNamed) {
@@ -599,30 +435,30 @@ TEST(ReportFile, WhatIsMissingOrWrongIsNamed) {
   const json::Json sound = page.report().json;
   const json::Json cell_chart = sound["charts"]["pointing"][0];
   ASSERT_EQ(cell_chart["series"][0]["kind"], "cells");
-  for (const auto& [place, value, words] :
+  for (const auto& [place, value, named] :
        std::vector<std::tuple<std::string, json::Json, std::string>>{
-           {"/verb", "dog", "verb: expected one of"},
-           {"/points", -17, "points: expected 0 or more, found -17"},
-           {"/points", 1.5, "points: expected integer, found 1.5"},
-           {"/points", "many", "points: expected integer, found string"},
-           {"/converged", false, "reason: expected"},
-           {"/page/prisms", 99, "page.prisms: expected 4 or less"},
+           {"/verb", "dog", "verb"},
+           {"/points", -17, "found -17"},
+           {"/points", 1.5, "found 1.5"},
+           {"/points", "many", "points"},
+           {"/converged", false, "reason"},
+           {"/page/prisms", 99, "page.prisms: expected 4"},
            {"/page/emitters", -1, "page.emitters"},
-           {"/page/recordings/0/format", 7, "page.recordings[0].format: expected string"},
-           {"/planes/0/normal", {1, 2}, "planes[0].normal: 2 values"},
+           {"/page/recordings/0/format", 7, "page.recordings[0].format"},
+           {"/planes/0/normal", {1, 2}, "planes[0].normal: 2"},
            {"/datum/sigma_yaw_deg", -1, "datum.sigma_yaw_deg"},
-           {"/provenance/0", {"command"}, "provenance[0]: 1 values"},
-           {"/charts/pointing/0/kind", "clouds", "charts.pointing[0].kind: expected one of"},
-           {"/charts/pointing/0/kind", "space", "series[0].z: 0 values"},
-           {"/charts/pointing/0/value_range", {1}, "value_range: 1 values"},
-           {"/charts/pointing/0/grows_for", -1, "grows_for: expected 0 or more"},
-           {"/charts/pointing/0/series/0/colour", "x", "series[0].colour: expected one of"},
-           {"/charts/pointing/0/series/0/y", {1}, "series[0].y: 1 values, expected"},
-           {"/charts/pointing/0/series/0/value", json::Json::array(), "series[0].value: 0 values"},
+           {"/provenance/0", {"command"}, "provenance[0]: 1"},
+           {"/charts/pointing/0/kind", "clouds", "charts.pointing[0].kind"},
+           {"/charts/pointing/0/kind", "space", "series[0].z: 0"},
+           {"/charts/pointing/0/value_range", {1}, "value_range: 1"},
+           {"/charts/pointing/0/grows_for", -1, "grows_for: expected 0"},
+           {"/charts/pointing/0/series/0/colour", "x", "series[0].colour"},
+           {"/charts/pointing/0/series/0/y", {1}, "series[0].y: 1"},
+           {"/charts/pointing/0/series/0/value", json::Json::array(), "series[0].value: 0"},
            {"/charts/pointing/0/series/0/cell_width", -1, "cell_width"}}) {
     json::Json damaged = sound;
     damaged[json::Json::json_pointer(place)] = value;
-    EXPECT_THAT(error_of(damaged.dump()), HasSubstr(words)) << place;
+    EXPECT_THAT(error_of(damaged.dump()), NamesField(named)) << place;
   }
 }
 

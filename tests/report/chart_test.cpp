@@ -21,6 +21,18 @@ TEST(Charts, APeakSurvivesThinning) {
   EXPECT_TRUE(std::is_sorted(line.x.begin(), line.x.end()));
 }
 
+TEST(Charts, APeakSurvivesShotsWithoutAValue) {
+  constexpr std::size_t kRows = 60000, kBin = 100, kPeak = 54321, kDip = 45678;
+  const Series line = peak_line(
+      "", "a", kRows, [](std::size_t i) { return double(i); },
+      [](std::size_t i) {
+        if (i % kBin == 0) return std::numeric_limits<double>::quiet_NaN();
+        return i == kPeak ? 5.0 : (i == kDip ? -7.0 : 0.0);
+      });
+  EXPECT_EQ(std::count(line.y.begin(), line.y.end(), 5.0), 1);
+  EXPECT_EQ(std::count(line.y.begin(), line.y.end(), -7.0), 1);
+}
+
 TEST(Charts, AShortLineIsDrawnWhole) {
   const Series line = peak_line(
       "", "a", 700, [](std::size_t i) { return double(i); }, [](std::size_t) { return 1.0; });

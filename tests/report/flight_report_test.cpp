@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
-#include <regex>
-#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -22,14 +21,21 @@
 #include "risley/sensors/preset.hpp"
 
 #include "calibration/flights.hpp"
+#include "refusal.hpp"
+#include "report/page_reading.hpp"
 
 namespace risley::report::flight_report_test {
 
 using calibration::FlightCalibration;
 using calibration::FlightUnknown;
 using calibration::FlightUnknowns;
+using testing::chart;
+using testing::expect_sound;
+using testing::GoldenPage;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using testing::series;
+using testing::visible;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -224,171 +230,57 @@ jobs::FlightTruth truth_example(const Flight& flight) {
   return truth;
 }
 
-/// The page's own part: no style, no scripts.
-std::string visible(const std::string& html) {
-  const std::size_t first = html.find("<main>"), last = html.find("</main>");
-  EXPECT_NE(first, std::string::npos);
-  EXPECT_NE(last, std::string::npos);
-  return html.substr(first, last - first);
-}
-
-std::string data_text(const std::string& html) {
-  const std::string start = "<script type=\"application/json\" id=\"page-data\">";
-  const std::size_t first = html.find(start) + start.size();
-  return html.substr(first, html.find("</script>", first) - first);
-}
-
-nlohmann::json data(const std::string& html) { return nlohmann::json::parse(data_text(html)); }
-
-std::vector<std::string> titles(const std::string& html) {
-  std::vector<std::string> found;
-  const std::regex caption("<figcaption>([^<]*)</figcaption>");
-  for (std::sregex_iterator i(html.begin(), html.end(), caption), end; i != end; ++i) {
-    found.push_back((*i)[1]);
-  }
-  return found;
-}
-
-nlohmann::json chart(const std::string& html, const std::string& title) {
-  for (const auto& one : data(html)) {
-    if (one.at("title") == title) return one;
-  }
-  ADD_FAILURE() << "no diagram " << title;
-  return {};
-}
-
-nlohmann::json series(const nlohmann::json& chart, const std::string& label) {
-  for (const auto& one : chart.at("series")) {
-    if (one.at("label") == label) return one;
-  }
-  ADD_FAILURE() << "no series " << label;
-  return {};
-}
-
-void expect_sound(const std::string& html) {
-  const std::string shown = visible(html);
-  const std::regex not_finite("(^|[^A-Za-z])(nan|inf)([^A-Za-z]|$)", std::regex::icase);
-  std::smatch found;
-  EXPECT_FALSE(std::regex_search(shown, found, not_finite)) << found.suffix().str().substr(0, 200);
-  EXPECT_FALSE(std::regex_search(data_text(html), not_finite));
-  const nlohmann::json charts = data(html);
-  EXPECT_EQ(charts.size(), titles(shown).size());
-  const std::set<std::string> colours = {"a", "b", "c", "d", "ink", "bad"};
-  for (const auto& one : charts) {
-    EXPECT_THAT(shown, HasSubstr("class=\"plot\" id=\"" + one.at("id").get<std::string>() + "\""));
-    for (const auto& drawn : one.at("series")) {
-      EXPECT_EQ(drawn.at("x").size(), drawn.at("y").size());
-      EXPECT_TRUE(colours.contains(drawn.at("colour").get<std::string>()));
-      for (const auto& x : drawn.at("x")) EXPECT_TRUE(x.is_number());
-    }
-  }
-}
-
-TEST(FlightPage, SaysFirstWhatTheFlightFoundAndHowWell) {
-  Flight flight;
-  const std::string html = flight.html(), shown = visible(html);
-  expect_sound(html);
-  EXPECT_THAT(shown, HasSubstr("class=\"verdict ok\""));
-  EXPECT_THAT(shown, HasSubstr("341.2 mm apart before and 5.4 mm after"));
-  EXPECT_THAT(shown, HasSubstr("over 6 pairs of them"));
-  EXPECT_THAT(shown, HasSubstr("X 6.0021° ± 0.0020°"));
-  EXPECT_THAT(shown, HasSubstr("to 0.0039° (5.5 mm at 80 m)"));
-  EXPECT_THAT(shown, HasSubstr("200\u202f000 shots with a range, 190\u202f000 of them used"));
-  EXPECT_THAT(shown, HasSubstr("on hexacopter"));
-  EXPECT_LT(shown.find("class=\"verdict"), shown.find("<h2>"));
-}
-
-TEST(FlightPage, HasEverySectionAndDiagram) {
-  const std::string shown = visible(Flight().html());
-  for (const char* text :
-       {"<h2>How well the beams are known</h2>", "<h2>Mount, ranges and clock</h2>",
-        "<h2>What this flight does not determine</h2>", "<h2>Strips before and after</h2>",
-        "<h2>The flight</h2>", "<h2>Ground</h2>", "<h2>Residuals</h2>",
-        "<h2>Corrections of the trajectory</h2>", "<h2>Prisms</h2>",
-        "<h2>Correlations of the parameters</h2>", "<h2>Times of the recording</h2>",
-        "<h2>How to make it again</h2>"}) {
-    EXPECT_THAT(shown, HasSubstr(text));
-  }
-  EXPECT_THAT(titles(shown),
-              ::testing::ElementsAre(
-                  "All strips, before", "All strips, after", "All strips, after, finer colours",
-                  "Strip 2 minus strip 1, before", "Strip 2 minus strip 1, after",
-                  "Strip 2 minus strip 1, after, finer colours", "Strip 3 minus strip 1, before",
-                  "Strip 3 minus strip 1, after", "Strip 3 minus strip 1, after, finer colours",
-                  "Strip 4 minus strip 1, before", "Strip 4 minus strip 1, after",
-                  "Strip 4 minus strip 1, after, finer colours", "The strips from above",
-                  "How rough the ground is", "How steep the ground is", "How many strips saw it",
-                  "Residuals along time", "Correction to the north", "Correction to the east",
-                  "Correction of the height", "Correction of the tilt about north",
-                  "Correction of the tilt about east", "Correction of the heading"));
-}
-
-TEST(FlightPage, UnknownsStandWithTheirPriorsAndTwins) {
-  Flight flight;
-  const std::string shown = visible(flight.html());
-  // Name, value, sigma, unit, before, change, sigma before, share, twin.
-  EXPECT_THAT(shown, HasSubstr("boresight_x_deg</span></th><td>6.0021</td><td>0.0020</td>"
-                               "<td>deg</td><td>0.0000</td><td>6.0021</td><td>0.2</td>"
-                               "<td>0 %</td><td class=\"text\">β<sub>Y</sub> (-0.43)</td>"));
-  EXPECT_THAT(shown, HasSubstr("lever_arm_z_m</span></th><td>0.052</td><td>–</td><td>m</td>"
-                               "<td>0.05</td><td>0.002</td><td>0.02</td>"
-                               "<td class=\"text\" colspan=\"2\">held</td>"));
-  EXPECT_THAT(shown, HasSubstr("clock_offset_s</span></th><td>72.00</td><td>0.20</td><td>ms</td>"));
-  // No prior at all: a dash.
-  EXPECT_THAT(shown, HasSubstr("range_offset_m</span></th><td>62.00</td><td>0.20</td><td>mm</td>"
-                               "<td>60.00</td><td>2.00</td><td>–</td>"));
-  // Prisms have a nominal value.
-  EXPECT_THAT(shown, HasSubstr("<th>nominal</th>"));
-  EXPECT_THAT(shown, HasSubstr("X, its optical axis, points down, its Y to the left and its Z "
-                               "forward. Reference point of the trajectory: centre of the IMU."));
-}
-
-TEST(FlightPage, WhatIsHeldAndMayBeOffSaysSo) {
-  Flight flight;
-  flight.calibration.unknowns.back().held = true;
-  EXPECT_THAT(visible(flight.html()), HasSubstr("held, but uncertain"));
-}
-
-TEST(FlightPage, SaysInWordsWhatIsNotTold) {
-  Flight flight;
-  std::string shown = visible(flight.html());
-  EXPECT_THAT(shown, HasSubstr("<li>0.71 lever arm forward - 0.70 clock offset: 98 % of the σ "
-                               "before remains. At one speed"));
-  EXPECT_THAT(shown, HasSubstr("<li>boresight about the sensor&#39;s X against the heading of the "
-                               "trajectory: 93 %"));
-  flight.calibration.not_told = {
-      {"1.00 boresight_x_deg", 1}, {"1.00 boresight_y_deg", 1}, {"1.00 lever_arm_z_m", 1}};
-  shown = visible(flight.html());
-  EXPECT_THAT(shown, HasSubstr("Flat ground does not show a rotation about the vertical"));
-  EXPECT_THAT(shown, HasSubstr("Strips in opposite or crossing directions"));
-  EXPECT_THAT(shown, HasSubstr("points of known height"));
-  flight.calibration.not_told.clear();
-  EXPECT_THAT(visible(flight.html()),
-              HasSubstr("The flight adds to what was known of every free unknown"));
-}
-
-TEST(FlightPage, KnownGroundStandsWithWhatTheStripsSee) {
-  Flight flight;
-  EXPECT_THAT(visible(flight.html()), Not(HasSubstr("Known ground")));
-  flight.calibration.control = {{"yard <1>", 812, true, 0.0031, 0.005, false},
-                                {"field", 640, true, -0.0417, 0.005, true},
-                                {"far away", 0, false, 0, 0.01, false}};
-  const std::string shown = visible(flight.html());
-  EXPECT_THAT(shown, HasSubstr("Known ground"));
-  EXPECT_THAT(shown, HasSubstr("yard &lt;1&gt;</th><td>812</td><td>3.1</td><td>5.0</td><td></td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>-41.7</td><td>5.0</td><td>contradicts the flight</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>–</td><td>10.0</td><td>left out</td>"));
-}
-
-TEST(FlightPage, PairsOfStripsStandBeforeAndAfter) {
-  Flight flight;
-  const std::string shown = visible(flight.html());
-  EXPECT_THAT(
-      shown, HasSubstr("strip 2 minus strip 1</th><td class=\"text\">before</td><td>1\u202f001</td>"
-                       "<td>-102.4</td><td>341.2</td><td>170.6 ± 6.8</td><td>–</td>"
-                       "<td>34.1 ± 3.4</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td class=\"text\">after</td><td>1\u202f001</td><td>-1.6</td>"
-                               "<td>5.4</td>"));
+TEST(FlightPage, MatchesItsGoldenText) {
+  GoldenPage golden("flight", Flight().html());
+  const auto differs = [&](const std::string& when, const std::function<void(Flight&)>& change) {
+    Flight flight;
+    change(flight);
+    golden.differs(when, flight.html());
+  };
+  differs("a held unknown that may be off",
+          [](Flight& flight) { flight.calibration.unknowns.back().held = true; });
+  differs("what flights over flat ground do not tell", [](Flight& flight) {
+    flight.calibration.not_told = {
+        {"1.00 boresight_x_deg", 1}, {"1.00 boresight_y_deg", 1}, {"1.00 lever_arm_z_m", 1}};
+  });
+  differs("all told", [](Flight& flight) { flight.calibration.not_told.clear(); });
+  differs("known ground", [](Flight& flight) {
+    flight.calibration.control = {{"yard <1>", 812, true, 0.0031, 0.005, false},
+                                  {"field", 640, true, -0.0417, 0.005, true},
+                                  {"far away", 0, false, 0, 0.01, false}};
+  });
+  differs("one pair of strips", [](Flight& flight) {
+    flight.calibration.pairs_before.resize(1);
+    flight.calibration.pairs_after.resize(1);
+    flight.details.pairs.resize(1);
+    flight.details.pair_count = 1;
+  });
+  differs("no pair", [](Flight& flight) {
+    flight.calibration.pairs_before.clear();
+    flight.calibration.pairs_after.clear();
+    flight.details = {};
+  });
+  differs("a failure", [](Flight& flight) {
+    FlightCalibration failed;
+    failed.unknowns = flight.calibration.unknowns;  // every result has them
+    failed.covariance.setZero(flight.calibration.covariance.rows(),
+                              flight.calibration.covariance.cols());
+    flight.calibration = failed;
+    flight.calibration.sensor = sensors::load_sensor("mid-40");
+    flight.calibration.reason = "the adjustment had not converged & more";
+    flight.calibration.rms_before = flight.calibration.rms_after = kNaN;
+    flight.calibration.warnings = {{kWarning.shots_lost, "a warning"}};
+    flight.details = {};
+  });
+  differs("a poor datum", [](Flight& flight) {
+    flight.calibration.datum.rotation = flight.calibration.datum.total = deg(3);
+  });
+  differs("strips that fit no better", [](Flight& flight) { flight.calibration.rms_after = 0.35; });
+  differs("warnings", [](Flight& flight) {
+    flight.calibration.warnings = {{kWarning.shots_lost, "one"}};
+    flight.warnings = {{kWarning.shots_lost, "two"}};
+  });
+  differs("the truth", [](Flight& flight) { flight.truth = truth_example(flight); });
 }
 
 TEST(FlightPage, ManyPairsAreThoseWithTheMostGround) {
@@ -407,22 +299,6 @@ TEST(FlightPage, ManyPairsAreThoseWithTheMostGround) {
   EXPECT_THAT(shown, Not(HasSubstr("strip 2 minus strip 1<")));
 }
 
-TEST(FlightPage, OnePairAndNoPairAreSaid) {
-  Flight flight;
-  flight.calibration.pairs_before.resize(1);
-  flight.calibration.pairs_after.resize(1);
-  flight.details.pairs.resize(1);
-  flight.details.pair_count = 1;
-  EXPECT_THAT(visible(flight.html()), HasSubstr("over one pair of them"));
-  expect_sound(flight.html());
-  flight.calibration.pairs_before.clear();
-  flight.calibration.pairs_after.clear();
-  flight.details = {};
-  const std::string html = flight.html();
-  expect_sound(html);
-  EXPECT_THAT(visible(html), HasSubstr("No two strips saw the same ground."));
-}
-
 TEST(FlightPage, BothPicturesOfADifferenceHaveTheSameColours) {
   const std::string html = Flight().html();
   for (const std::string who : {"All strips", "Strip 2 minus strip 1"}) {
@@ -438,7 +314,6 @@ TEST(FlightPage, BothPicturesOfADifferenceHaveTheSameColours) {
   EXPECT_EQ(after.at("x"), nlohmann::json::array({-2.0}));
   EXPECT_EQ(after.at("value"), nlohmann::json::array({4.0}));
   EXPECT_EQ(after.at("cell_width"), 4.0);
-  EXPECT_THAT(html, HasSubstr("Squares of 4 m, colours in mm."));
   // Without any each picture has its own.
   Flight flight;
   flight.details.pairs[0].after = {kNaN, kNaN, 0.001};
@@ -503,41 +378,6 @@ TEST(FlightPage, LongFlightsAreThinned) {
   EXPECT_THAT(visible(html), HasSubstr("One in 42 of the 50\u202f000 knots is drawn"));
 }
 
-TEST(FlightPage, AFailureSaysWhyAndWhatToDo) {
-  Flight flight;
-  FlightCalibration failed;
-  failed.unknowns = flight.calibration.unknowns;  // every result has them
-  failed.covariance.setZero(flight.calibration.covariance.rows(),
-                            flight.calibration.covariance.cols());
-  flight.calibration = failed;
-  flight.calibration.sensor = sensors::load_sensor("mid-40");
-  flight.calibration.reason = "the adjustment had not converged & more";
-  flight.calibration.rms_before = flight.calibration.rms_after = kNaN;
-  flight.calibration.warnings = {{kWarning.shots_lost, "a warning"}};
-  flight.details = {};
-  const std::string html = flight.html(), shown = visible(html);
-  expect_sound(html);
-  EXPECT_THAT(shown, HasSubstr("class=\"verdict bad\""));
-  EXPECT_THAT(shown, HasSubstr("the adjustment had not converged &amp; more"));
-  EXPECT_THAT(shown, HasSubstr("<li>a warning</li>"));
-  EXPECT_THAT(shown, HasSubstr("What to do:"));
-  EXPECT_EQ(data(html).size(), 0u);
-}
-
-TEST(FlightPage, APoorResultAsksForCare) {
-  Flight flight;
-  flight.calibration.datum.rotation = flight.calibration.datum.total = deg(3);
-  EXPECT_THAT(visible(flight.html()), HasSubstr("The directions of the beams are poorly known"));
-  EXPECT_THAT(visible(flight.html()), HasSubstr("class=\"verdict care\""));
-  flight = {};
-  flight.calibration.rms_after = 0.35;
-  EXPECT_THAT(visible(flight.html()), HasSubstr("The strips fit no better than before"));
-  flight = {};
-  flight.calibration.warnings = {{kWarning.shots_lost, "one"}};
-  flight.warnings = {{kWarning.shots_lost, "two"}};
-  EXPECT_THAT(visible(flight.html()), HasSubstr("<li>two</li><li>one</li>"));
-}
-
 TEST(FlightPage, NumbersThatAreNotFiniteAreDashes) {
   Flight flight;
   FlightCalibration& c = flight.calibration;
@@ -556,23 +396,6 @@ TEST(FlightPage, NumbersThatAreNotFiniteAreDashes) {
   expect_sound(flight.html());
 }
 
-TEST(FlightPage, TruthStandsBesideWhatIsStated) {
-  Flight flight;
-  EXPECT_THAT(visible(flight.html()), Not(HasSubstr("truth")));
-  flight.truth = truth_example(flight);
-  const std::string shown = visible(flight.html());
-  EXPECT_THAT(shown, HasSubstr("error before, against the truth</th><td>4.1</td>"));
-  EXPECT_THAT(shown, HasSubstr("error after, against the truth</th><td>0.00303</td><td>0.003</td>"
-                               "<td>0.0004</td><td>0.001</td><td>-0.002</td><td>0.0015</td>"
-                               "<td>4.2</td><td>0.6</td>"));
-  // Truth, error, error over sigma.
-  EXPECT_THAT(shown, HasSubstr("<td>5.0000</td><td>1.0021</td><td class=\"far\">501.05</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>0.04150</td><td>0.00050</td><td>2.50</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>61.70</td><td>0.30</td><td>1.50</td>"));
-  EXPECT_THAT(shown, HasSubstr("<td>70.00</td><td>2.00</td><td class=\"far\">10.00</td>"));
-  EXPECT_THAT(shown, HasSubstr("held</td><td>0</td><td>0.052</td><td>–</td>"));
-}
-
 TEST(FlightPage, EscapesNames) {
   Flight flight;
   const std::string bad = "<script>alert(1)</script>";
@@ -585,7 +408,6 @@ TEST(FlightPage, EscapesNames) {
   expect_sound(html);
   EXPECT_THAT(html, Not(HasSubstr("<script>alert")));
   EXPECT_THAT(visible(html), HasSubstr("on &lt;script&gt;alert(1)"));
-  EXPECT_THAT(html, HasSubstr("Content-Security-Policy"));
 }
 
 TEST(FlightReport, NeedsDetailsOfTheJob) {
@@ -597,13 +419,13 @@ TEST(FlightReport, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
   flight.truth = truth_example(flight);
   const json::Json sound = flight.report().json;
   EXPECT_EQ(report_page(parse_report(sound.dump(), "f")), flight.html());
-  for (const auto& [place, value, words] :
+  for (const auto& [place, value, named] :
        std::vector<std::tuple<std::string, json::Json, std::string>>{
-           {"/unknowns/boresight_x_deg/sigma", -1, "unknowns.boresight_x_deg.sigma: expected 0"},
-           {"/unknowns/boresight_x_deg/value", "x", "unknowns.boresight_x_deg.value: expected"},
-           {"/page/mount/body_from_sensor/1", {1, 2}, "body_from_sensor[1]: 2 values"},
-           {"/page/strips/0", {{"strip", 1}}, "page.strips[0].begin_s is missing"},
-           {"/strips/pairs/0/first", 0, "strips.pairs[0].first: expected 1 or more"},
+           {"/unknowns/boresight_x_deg/sigma", -1, "unknowns.boresight_x_deg.sigma"},
+           {"/unknowns/boresight_x_deg/value", "x", "unknowns.boresight_x_deg.value"},
+           {"/page/mount/body_from_sensor/1", {1, 2}, "body_from_sensor[1]: 2"},
+           {"/page/strips/0", {{"strip", 1}}, "page.strips[0].begin_s"},
+           {"/strips/pairs/0/first", 0, "strips.pairs[0].first: expected 1"},
            {"/charts", {{"strips", {}}}, "charts.strips"}}) {
     json::Json damaged = sound;
     damaged[json::Json::json_pointer(place)] = value;
@@ -611,7 +433,7 @@ TEST(FlightReport, WhatAPageCannotBeDrawnFromIsRefusedWithItsPlace) {
       report_page(parse_report(damaged.dump(), "folder/report.json"));
       ADD_FAILURE() << place;
     } catch (const FileError& error) {
-      EXPECT_THAT(error.what(), HasSubstr(words));
+      EXPECT_THAT(error.what(), NamesField(named));
     }
   }
 }
@@ -634,7 +456,7 @@ TEST(FlightReport, OfARealCalibrationMakesTheSamePageAgain) {
   const std::string text = report_text(report), html = report_page(parse_report(text, "f"));
   EXPECT_EQ(html, report_page(report));
   expect_sound(html);
-  EXPECT_THAT(visible(html), HasSubstr("Strip 4 minus strip 1, after"));
+  chart(html, "Strip 4 minus strip 1, after");  // throws where there is none
   EXPECT_LT(text.size(), 3'000'000u);
 }
 

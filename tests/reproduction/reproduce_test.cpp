@@ -168,7 +168,8 @@ TEST(ReproductionPage, SaysTheVerdictInWords) {
   all.tables = {{"table_x", "Table X", "A method.", {good, bad}}};
   Figure figure{"figure_x", "table_x", "Fig. X"};
   const report::Series cells{
-      "mm", "a", report::SeriesKind::cells, {0.0, 0.5}, {90.0, 90.5}, {}, {-1.0, 2.0}, 0.5, 0.5};
+      "mm", "a", report::SeriesKind::cells, {0.0, 0.5}, {90.0, 90.5}, {}, {-1.0, 2.0}, {},
+      0.5,  0.5};
   figure.charts = {histogram_chart("samples", "deg", std::vector<double>{1, 2, 2, 3}),
                    field_of_view_chart("corrections", cells)};
   all.figures = {figure};

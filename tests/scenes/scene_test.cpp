@@ -54,7 +54,7 @@ TEST(Scene, ReadsPlanesAndStations) {
   EXPECT_DOUBLE_EQ(flipped.sigma, radians_from_degrees(0.02));
   EXPECT_EQ(scene.station("").position.x, 0.0);
   EXPECT_THAT(refusal([&] { static_cast<void>(scene.station("sideways")); }),
-              HasSubstr("upright, flipped"));
+              NamesField("upright, flipped"));
 }
 
 TEST(Scene, BundledRoomIsClosedTowardsTheFront) {

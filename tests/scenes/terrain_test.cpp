@@ -565,7 +565,7 @@ TEST(Terrain, AVillageKeepsItsDistancesAndRanges) {
   EXPECT_NE(other.roofs[0].center, parts.roofs[0].center);
   settings.roofs = 200;
   EXPECT_THAT(refusal([&] { add_village(settings, other); }),
-              AllOf(HasSubstr("of 200 roofs fit within +-50 m at 12 m"), HasSubstr("fewer")));
+              AllOf(NamesField("of 200 roofs"), NamesField("+-50 m at 12 m")));
 }
 
 TEST(Terrain, HousesStandOnTheGroundBelowThem) {
@@ -593,21 +593,20 @@ TEST(Terrain, RefusesPartsThatMakeNoSense) {
             "relief.wavelength_x = 0 m, allowed 0.1 to 1000000");
   EXPECT_EQ(refused([](auto& p) { p.ground->waves.resize(100); }),
             "ground.relief and ground.waves = 101 entries, allowed 0 to 64");
-  EXPECT_THAT(refused([](auto& p) { p.roofs[0].pitch = 2; }), HasSubstr("open.pitch = 2 rad"));
+  EXPECT_THAT(refused([](auto& p) { p.roofs[0].pitch = 2; }), NamesField("open.pitch"));
   EXPECT_THAT(refused([](auto& p) { p.roofs[0].ridge_height = 1; }),
-              HasSubstr("open: its eaves are 2.21 m below the ground; raise ridge_height"));
-  EXPECT_THAT(refused([](auto& p) { p.buildings[0].size[1] = -1; }),
-              HasSubstr("box.size[1] = -1 m"));
-  EXPECT_THAT(refused([](auto& p) { p.bushes[0].radius = 0; }), HasSubstr("shrub.radius = 0 m"));
+              AllOf(NamesField("open"), NamesField("2.21 m"), NamesField("ridge_height")));
+  EXPECT_THAT(refused([](auto& p) { p.buildings[0].size[1] = -1; }), NamesField("box.size[1]"));
+  EXPECT_THAT(refused([](auto& p) { p.bushes[0].radius = 0; }), NamesField("shrub.radius"));
   EXPECT_THAT(refused([](auto& p) { p.bushes[0].center[0] = INFINITY; }),
-              HasSubstr("shrub.center[0] = inf m"));
+              NamesField("shrub.center[0]"));
   EXPECT_THAT(refused([](auto& p) {
                 p.origin = MapOrigin{2, 0, 0};
               }),
-              HasSubstr("origin.latitude = 2 rad"));
+              NamesField("origin.latitude"));
   const Terrain terrain(hamlet());
   EXPECT_THAT(refusal([&] { static_cast<void>(terrain.surface_name(terrain.surfaces())); }),
-              HasSubstr("surface = "));
+              NamesField("surface"));
 }
 
 const std::string kVillage = R"(
@@ -658,38 +657,31 @@ TEST(Terrain, IsReadFromASceneBesidePlanes) {
   EXPECT_THAT(refusal([&] {
                 static_cast<void>(nearest_hit(scene, {0, 0, 9}, {1, 0, 0}, 1.0));
               }),
-              HasSubstr("penetration = 1, allowed above 0 and below 1"));
+              NamesField("penetration"));
 }
 
 TEST(Terrain, MistakesInAFileAreToldWithTheirLine) {
   const auto message = [](const std::string& from, const std::string& to) {
     return line_and_problem([&] { parse_scene(replaced(kVillage, from, to), "village.yaml"); });
   };
-  EXPECT_THAT(message("pitch_deg: 30", "pitch: 30"),
-              HasSubstr("11: unknown field terrain.roofs[0].pitch"));
-  EXPECT_THAT(message("length_m: 8, ", ""), HasSubstr("11: terrain.roofs[0].length_m is missing"));
+  EXPECT_THAT(message("pitch_deg: 30", "pitch: 30"), NamesField("terrain.roofs[0].pitch", 11));
+  EXPECT_THAT(message("length_m: 8, ", ""), NamesField("terrain.roofs[0].length_m", 11));
   EXPECT_THAT(message("pitch_deg: 30", "pitch_deg: 95"),
-              HasSubstr("11: terrain.roofs[0].pitch_deg = 95 deg, allowed 1 to 89"));
-  EXPECT_THAT(message("[0, 0], length", "[0], length"),
-              HasSubstr("terrain.roofs[0].center_m: expected a list of 2 numbers in m"));
-  EXPECT_THAT(message("walls: yes", "walls: maybe"),
-              HasSubstr("terrain.roofs[0].walls = \"maybe\", allowed yes and no"));
-  EXPECT_THAT(message("name: garage", "name: barn"),
-              HasSubstr("14: terrain.buildings[0].name = \"barn\" appears twice"));
-  EXPECT_THAT(message("name: garage", "name: tower"), HasSubstr("appears twice"));
-  EXPECT_THAT(
-      message("[20, 45]", "[45, 20]"),
-      HasSubstr("terrain.village.pitch_deg = [45, 20] deg, expected the least value first"));
-  EXPECT_THAT(message("roofs: 5", "roofs: 5000"), HasSubstr("roofs fit within +-50 m"));
+              NamesField("terrain.roofs[0].pitch_deg", 11));
+  EXPECT_THAT(message("[0, 0], length", "[0], length"), NamesField("terrain.roofs[0].center_m"));
+  EXPECT_THAT(message("walls: yes", "walls: maybe"), NamesField("terrain.roofs[0].walls"));
+  EXPECT_THAT(message("name: garage", "name: barn"), NamesField("terrain.buildings[0].name", 14));
+  EXPECT_THAT(message("name: garage", "name: tower"), NamesField("tower"));
+  EXPECT_THAT(message("[20, 45]", "[45, 20]"), NamesField("terrain.village.pitch_deg"));
+  EXPECT_THAT(message("roofs: 5", "roofs: 5000"), NamesField("+-50 m"));
   EXPECT_THAT(message("ridge_height_m: 8", "ridge_height_m: 2"),
-              HasSubstr("barn: its eaves are 0.5 m below the ground"));
+              AllOf(NamesField("barn"), NamesField("0.5 m")));
   EXPECT_THAT(message("wavelength_m: 1.5", "wavelength_m: 0.001"),
-              HasSubstr("9: terrain.ground.waves[0].wavelength_m = 0.001 m, allowed 0.1 to 1e+06"));
+              NamesField("terrain.ground.waves[0].wavelength_m", 9));
   EXPECT_EQ(message("wavelength_m: 1.5", "wavelength_m: 0.1"), "");
   EXPECT_THAT(message("latitude_deg: 50.1", "latitude_deg: 95"),
-              HasSubstr("5: terrain.origin.latitude_deg = 95 deg"));
-  EXPECT_THAT(message("buildings:\n", "building:\n"),
-              HasSubstr("13: unknown field terrain.building"));
+              NamesField("terrain.origin.latitude_deg", 5));
+  EXPECT_THAT(message("buildings:\n", "building:\n"), NamesField("terrain.building", 13));
 }
 
 }  // namespace risley::scenes::terrain_test

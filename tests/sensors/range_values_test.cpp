@@ -43,9 +43,9 @@ TEST(RangeValues, EveryNumberOfTheErrorsHasAName) {
 TEST(RangeValues, OfAnotherSensorAreRefused) {
   Sensor sensor = load_sensor("mid-40");
   EXPECT_THAT(refusal([&] { set_range_value(sensor, "range_emitter_2_m", 1); }),
-              HasSubstr("unknown value \"range_emitter_2_m\""));
+              NamesField("\"range_emitter_2_m\""));
   EXPECT_THAT(refusal([&] { get_range_value(sensor, "range_nearr_m"); }),
-              HasSubstr("range_near_m"));
+              NamesField("range_near_m"));
   EXPECT_EQ(refusal([&] { set_range_value(sensor, "range_near_m", 200); }),
             "range_near_m = 200 m, allowed -100 to 100");
   EXPECT_EQ(refusal([&] { set_range_value(sensor, "range_near_m", NAN); }),
@@ -85,12 +85,10 @@ TEST(RangeValues, MistakesInPresetsAreNamedWithTheirLine) {
     return std::string();
   };
   EXPECT_EQ(problem("range_near_m: {value: 0.01, unit: m}"), "");
-  EXPECT_THAT(problem("range_near_mm: {value: 10, unit: mm}"),
-              HasSubstr("unknown field range.range_near_mm"));
-  EXPECT_THAT(problem("range_emitter_2_m: {value: 0, unit: m}"), HasSubstr("unknown field"));
-  EXPECT_THAT(problem("range_incidence: {value: 1, unit: m}"), HasSubstr("expected \"1\""));
-  EXPECT_THAT(problem("range_incidence: {value: 1000, unit: '1'}"),
-              HasSubstr("allowed -100 to 100"));
+  EXPECT_THAT(problem("range_near_mm: {value: 10, unit: mm}"), NamesField("range.range_near_mm"));
+  EXPECT_THAT(problem("range_emitter_2_m: {value: 0, unit: m}"), NamesField("range_emitter_2_m"));
+  EXPECT_THAT(problem("range_incidence: {value: 1, unit: m}"), NamesField("expected \"1\""));
+  EXPECT_THAT(problem("range_incidence: {value: 1000, unit: '1'}"), NamesField("-100 to 100"));
 }
 
 TEST(Footprint, LiesAcrossTheBeamAndLevel) {

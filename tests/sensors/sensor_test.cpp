@@ -31,7 +31,7 @@ TEST(Sensor, RefusesWhatItDoesNotHaveAndWhatIsOutOfBounds) {
   EXPECT_THROW(sensor.get("rotation_angle_a_deg"), InvalidArgument);
   EXPECT_THROW(sensor.set("wedge_angle_c_deg", 0.1), InvalidArgument);
   EXPECT_THAT(refusal([&] { sensor.set("wedge_angle_a_deg", radians_from_degrees(95.0)); }),
-              HasSubstr("wedge_angle_a_deg = 95 deg, allowed 0 to 60"));
+              NamesField("wedge_angle_a_deg"));
   EXPECT_NEAR(sensor.get("wedge_angle_a_deg"), radians_from_degrees(18.0), 1e-15);
 }
 

@@ -22,7 +22,6 @@
 namespace risley::simulation::platform_test {
 
 using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 using Real = long double;
 using Vector = std::array<Real, 3>;
@@ -347,13 +346,10 @@ TEST(Platform, RefusesWhatItHasNoPosesFor) {
     return refusal([&] { Scanner scanner(s); });
   };
   EXPECT_EQ(refused([](auto&) {}), "");
-  EXPECT_THAT(
-      refused([](auto& s) { s.duration = 5; }),
-      AllOf(HasSubstr("the recording lasts from 7.000300 s to 12.000200 s of the "
-                      "trajectory's time, and the trajectory from 7.000000 s to 11.000000 s"),
-            HasSubstr("shorter")));
+  EXPECT_THAT(refused([](auto& s) { s.duration = 5; }),
+              AllOf(NamesField("12.000200 s"), NamesField("11.000000 s")));
   EXPECT_THAT(refused([](auto& s) { s.platform->begin_ns = 6'000'000'000; }),
-              HasSubstr("the recording lasts from 6.000300 s"));
+              NamesField("6.000300 s"));
   EXPECT_THAT(refused([](auto& s) {
                 auto holed = std::make_shared<trajectories::Trajectory>(*s.platform->trajectory);
                 const auto cut = [](auto& column) {
@@ -364,23 +360,21 @@ TEST(Platform, RefusesWhatItHasNoPosesFor) {
                 cut(holed->attitude);
                 s.platform->trajectory = holed;
               }),
-              HasSubstr("the trajectory has no records from 8.495000 s to 8.700000 s"));
+              NamesField("8.495000 s to 8.700000 s"));
   EXPECT_THAT(refused([](auto& s) {
                 const OnEarth earth;
                 s.platform->trajectory = flown(4.0, &earth);
               }),
-              HasSubstr("give its terrain an origin"));
-  EXPECT_THAT(refused([](auto& s) { s.platform->trajectory = nullptr; }),
-              HasSubstr("a platform needs a trajectory"));
-  EXPECT_THAT(refused([](auto& s) { s.platform->clock_drift = 0.5; }),
-              HasSubstr("clock_drift = 0.5"));
-  EXPECT_THAT(refused([](auto& s) { s.platform->mount.nominal.setZero(); }), HasSubstr("nominal"));
-  EXPECT_THAT(refused([](auto& s) { s.scene.reset(); }), HasSubstr("needs a scene"));
+              NamesField("origin"));
+  EXPECT_THAT(refused([](auto& s) { s.platform->trajectory = nullptr; }), NamesField("trajectory"));
+  EXPECT_THAT(refused([](auto& s) { s.platform->clock_drift = 0.5; }), NamesField("clock_drift"));
+  EXPECT_THAT(refused([](auto& s) { s.platform->mount.nominal.setZero(); }), NamesField("nominal"));
+  EXPECT_THAT(refused([](auto& s) { s.scene.reset(); }), NamesField("scene"));
   EXPECT_THAT(refused([](auto& s) {
                 s.scene->stations.push_back({"roof", {0, 0, 0}});
                 s.station = "roof";
               }),
-              HasSubstr("or stands at station \"roof\", not both"));
+              NamesField("\"roof\""));
 }
 
 }  // namespace risley::simulation::platform_test

@@ -111,6 +111,24 @@ TEST(Scanner, AddsTheSensorsRangeOffset) {
   }
 }
 
+// Noise does not bring it back.
+TEST(Scanner, ARangeBelowZeroIsNoReturn) {
+  SimulationSettings settings = exact("mid-40-table3");
+  settings.duration = 0.01;
+  settings.scene = wall_at(10);
+  settings.truth.range_offset = -10.9;
+  settings.range_noise = 1.0;
+  const Whole whole = scan(settings);
+  int below = 0;
+  for (std::size_t i = 0; i < whole.rows.size(); ++i) {
+    if (whole.truth.range[i] > 10.9) continue;
+    ++below;
+    EXPECT_EQ(whole.rows.range[i], 0);
+    EXPECT_EQ(whole.rows.valid[i], 0);
+  }
+  EXPECT_GT(below, 100);
+}
+
 TEST(Scanner, SameNumbersForAnyThreadCountAndAnyPieces) {
   SimulationSettings settings;
   settings.truth = sensors::load_sensor("mid-40-table3");

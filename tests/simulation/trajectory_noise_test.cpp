@@ -19,7 +19,6 @@
 
 namespace risley::simulation::trajectory_noise_test {
 
-using ::testing::HasSubstr;
 using trajectories::ErrorModel;
 using trajectories::Trajectory;
 
@@ -153,7 +152,7 @@ TEST(TrajectoryNoise, AsksForSigmas) {
   ErrorModel m = model();
   m.terms[0].sigma.reset();
   EXPECT_THAT(refusal([&] { with_errors(standing(5, trajectories::Frame::local), m, 1); }),
-              HasSubstr("sigma"));
+              NamesField("sigma"));
 }
 
 }  // namespace risley::simulation::trajectory_noise_test

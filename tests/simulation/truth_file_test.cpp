@@ -156,8 +156,10 @@ SimulationSettings flying() {
   s.truth = sensors::load_sensor("mid-40-table3");
   s.duration = 0.2;
   s.scene = scenes::load_scene(in_source_tree("data/village.yaml"));
-  const trajectories::FlightPlan plan =
+  trajectories::FlightPlan plan =
       trajectories::load_flight_plan(in_source_tree("data/flight-s4.yaml"));
+  plan.origin.reset();
+  plan.start = 0;
   trajectories::Flight flight = trajectories::fly(plan);
   Platform platform;
   platform.trajectory = std::make_shared<trajectories::Trajectory>(std::move(flight.trajectory));

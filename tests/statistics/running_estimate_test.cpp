@@ -221,6 +221,28 @@ TEST(RunningEstimate, AUnitThatIsNotTheSensorIsToldOf) {
   }
 }
 
+// A piece finds more glass where the wedge that it holds is too small. A calibration that knows
+// both together far better than each says so by their correlation.
+TEST(RunningEstimate, WhatACalibrationKnowsTogetherCounts) {
+  const auto sigma_of_glass = [](double correlation) {
+    RunningOptions options = watching("mid-40");
+    const double glass = 0.0014, wedge = radians_from_degrees(0.05);
+    const double both = correlation * glass * wedge;
+    options.sensor.covariance_names = {"refractive_index", "wedge_angle_deg"};
+    options.sensor.covariance = Eigen::Matrix2d{{glass * glass, both}, {both, wedge * wedge}};
+    simulation::SimulationSettings settings = hunting("mid-40", 1.2);
+    settings.rate = 20'000;
+    RunningEstimate running(options);
+    follow(settings, running);
+    const auto& found = running.state().parameters;
+    const auto one = std::ranges::find(found, "refractive_index", &RunningParameter::name);
+    return one == found.end() ? 0.0 : one->off_sensor_sigma;
+  };
+  const double opposed = sigma_of_glass(-0.999), alike = sigma_of_glass(0.999);
+  EXPECT_GT(opposed, 0);
+  EXPECT_LT(opposed, 0.3 * alike);
+}
+
 TEST(RunningEstimate, AnotherSensorWaitsAndSaysWhy) {
   RunningEstimate running(watching("mid-40"));
   follow(hunting("avia", 1.2), running);

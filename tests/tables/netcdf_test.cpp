@@ -17,6 +17,7 @@
 #include "risley/core/error.hpp"
 
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 #include "source_tree.hpp"
 
 namespace risley::tables::netcdf_test {
@@ -154,7 +155,7 @@ TEST(Netcdf, WrongCallsAreRefused) {
   EXPECT_THROW(file.define_texts("label", axis, "", {"one"}), InvalidArgument);
   const auto time = file.define<double>("time", {&row}, {10, false, false});
   EXPECT_THROW(file.set_fill(time, 0.0F), InvalidArgument);
-  EXPECT_THAT(refusal([&] { file.define<double>("time", {&row}, {}); }), HasSubstr("time"));
+  EXPECT_THAT(refusal([&] { file.define<double>("time", {&row}, {}); }), NamesField("time"));
   file.end_definitions();
   EXPECT_THROW(file.put(place, 0, std::vector<float>(4)), InvalidArgument);
   EXPECT_THROW(file.put(place, 0, std::vector<double>(3)), InvalidArgument);
@@ -215,24 +216,25 @@ TEST(HostileNetcdf, MissingThingsAndOthersOfTheirName) {
   const auto of = [&](const char* name) {
     return refusal([&] { file->variable<double>(name, {&rows}); });
   };
-  EXPECT_THAT(of("missing"), AllOf(HasSubstr("variable missing"), HasSubstr("row = 4")));
-  EXPECT_THAT(of("bytes"), AllOf(HasSubstr("variable bytes"), HasSubstr("ubyte")));
-  EXPECT_THAT(of("texts"), AllOf(HasSubstr("variable texts"), HasSubstr("string")));
-  EXPECT_THAT(of("scalar"), AllOf(HasSubstr("variable scalar"), HasSubstr("0 dimensions")));
-  EXPECT_THAT(of("cube"), AllOf(HasSubstr("variable cube"), HasSubstr("3 dimensions")));
-  EXPECT_THAT(of("along"), AllOf(HasSubstr("variable along"), HasSubstr("other = 4")));
-  EXPECT_THAT(refusal([&] { file->dimension("missing"); }), HasSubstr("dimension missing"));
-  EXPECT_THAT(refusal([&] { file->dimension("row", 3); }), HasSubstr("expected 3"));
+  EXPECT_THAT(of("missing"), AllOf(NamesField("variable missing"), NamesField("row")));
+  EXPECT_THAT(of("bytes"), AllOf(NamesField("variable bytes"), NamesField("ubyte")));
+  EXPECT_THAT(of("texts"), AllOf(NamesField("variable texts"), NamesField("string")));
+  EXPECT_THAT(of("scalar"), AllOf(NamesField("variable scalar"), NamesField("0 dimensions")));
+  EXPECT_THAT(of("cube"), AllOf(NamesField("variable cube"), NamesField("3 dimensions")));
+  EXPECT_THAT(of("along"), AllOf(NamesField("variable along"), NamesField("other")));
+  EXPECT_THAT(refusal([&] { file->dimension("missing"); }), NamesField("dimension missing"));
+  EXPECT_THAT(refusal([&] { file->dimension("row", 3); }),
+              AllOf(NamesField("row"), NamesField("expected 3")));
   for (const char* name : {"pair", "negative", "missing", "words"}) {
-    EXPECT_THAT(refusal([&] { file->number(name); }), HasSubstr(name));
-    EXPECT_THAT(refusal([&] { file->text(name); }), HasSubstr(name));
+    EXPECT_THAT(refusal([&] { file->number(name); }), NamesField(name));
+    EXPECT_THAT(refusal([&] { file->text(name); }), NamesField(name));
   }
-  EXPECT_THAT(refusal([&] { file->text_group("missing"); }), HasSubstr("group missing"));
+  EXPECT_THAT(refusal([&] { file->text_group("missing"); }), NamesField("group missing"));
   EXPECT_FALSE(file->has_variable("missing"));
   EXPECT_FALSE(file->has_attribute("missing"));
   const auto along = file->variable<double>("along", {&others});
   std::vector<double> values;
-  EXPECT_THAT(refusal([&] { file->get(along, 3, 2, values); }), HasSubstr("variable along"));
+  EXPECT_THAT(refusal([&] { file->get(along, 3, 2, values); }), NamesField("variable along"));
   std::vector<float> wrong;
   EXPECT_THROW(file->get(along, 0, 1, wrong), InvalidArgument);
 }
@@ -254,17 +256,17 @@ TEST(HostileNetcdf, NothingIsLargerThanItsFile) {
   const auto along = file->dimension("huge"), pair = file->dimension("few");
   const auto nothing = file->dimension("grown");
   EXPECT_THAT(refusal([&] { file->variable<double>("chunked", {&along}); }),
-              AllOf(HasSubstr("variable chunked"), HasSubstr("huge = 1099511627776")));
+              AllOf(NamesField("variable chunked"), NamesField("huge")));
   EXPECT_THAT(refusal([&] {
                 file->variable<double>("wide", {&pair, &along});
               }),
-              AllOf(HasSubstr("variable wide"), HasSubstr("huge = 1099511627776")));
+              AllOf(NamesField("variable wide"), NamesField("huge")));
   EXPECT_THAT(refusal([&] {
                 file->variable<double>("product", {&along, &along});
               }),
-              HasSubstr("variable product"));
+              NamesField("variable product"));
   EXPECT_THAT(refusal([&] { file->variable<double>("in_one_block", {&nothing}); }),
-              AllOf(HasSubstr("variable in_one_block"), HasSubstr("1073741824 bytes")));
+              AllOf(NamesField("variable in_one_block"), NamesField("1073741824 bytes")));
   EXPECT_NO_THROW(file->variable<double>("blocks", {&pair, &pair}));
 }
 
@@ -281,7 +283,7 @@ TEST(HostileNetcdf, EmptyDimensionsGiveNothing) {
   const auto place = file->variable<float>("place", {&rows, &axes});
   file->get(place, 0, 0, values);
   EXPECT_THAT(values, IsEmpty());
-  EXPECT_THAT(refusal([&] { file->get(place, 0, 1, values); }), HasSubstr("variable place"));
+  EXPECT_THAT(refusal([&] { file->get(place, 0, 1, values); }), NamesField("variable place"));
   const auto turned = file->variable<float>("turned", {&axes, &rows});
   file->get(turned, 0, 3, values);
   EXPECT_THAT(values, IsEmpty());
@@ -289,13 +291,14 @@ TEST(HostileNetcdf, EmptyDimensionsGiveNothing) {
 
 TEST(HostileNetcdf, OtherFiles) {
   const io::TestFolder folder;
-  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("missing")}; }), HasSubstr("no such file"));
-  EXPECT_THAT(refusal([&] { NetcdfInput{folder.path().string()}; }), HasSubstr("is a folder"));
+  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("missing")}; }), NamesField("missing"));
+  EXPECT_THAT(refusal([&] { NetcdfInput{folder.path().string()}; }),
+              NamesField(folder.path().string()));
   std::ofstream(folder.file("text")) << "no NetCDF at all";
-  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("text")}; }), HasSubstr("cannot be opened"));
+  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("text")}; }), NamesField("text"));
   std::ofstream(folder.file("head")) << "\x89HDF\r\n\x1a\n and nothing else";
-  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("head")}; }), HasSubstr("cannot be opened"));
-  EXPECT_THAT(refusal([&] { NetcdfInput{std::string("/dev/null")}; }), HasSubstr("not a regular"));
+  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("head")}; }), NamesField("head"));
+  EXPECT_THAT(refusal([&] { NetcdfInput{std::string("/dev/null")}; }), NamesField("/dev/null"));
 }
 
 /// What reading all of a file's named variables comes to; a crash or an endless loop of the
@@ -318,7 +321,7 @@ std::string reading(const std::string& name) {
 
 TEST(HostileNetcdf, ACrashOfTheLibraryIsAFileError) {
   ::setenv("MALLOC_PERTURB_", "190", 1);
-  EXPECT_THAT(reading("hdf5-link-table.nc"), HasSubstr("cannot be"));
+  EXPECT_THAT(reading("hdf5-link-table.nc"), NamesField("hdf5-link-table.nc"));
   ::unsetenv("MALLOC_PERTURB_");
 }
 
@@ -332,8 +335,7 @@ TEST(HostileNetcdf, NothingIsReadFromOtherFiles) {
   const hid_t linked = H5Fcreate(folder.file("linked.nc").c_str(), H5F_ACC_TRUNC, 0, 0);
   EXPECT_GE(H5Lcreate_external("secret.nc", "/time", linked, "time", 0, 0), 0);
   H5Fclose(linked);
-  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("linked.nc")}; }),
-              HasSubstr("time refers to another file"));
+  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("linked.nc")}; }), NamesField("time"));
   const hid_t stored = H5Fcreate(folder.file("stored.nc").c_str(), H5F_ACC_TRUNC, 0, 0);
   const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
   H5Pset_external(properties, "/etc/hostname", 0, 4);
@@ -345,8 +347,7 @@ TEST(HostileNetcdf, NothingIsReadFromOtherFiles) {
   H5Sclose(space);
   H5Pclose(properties);
   H5Fclose(stored);
-  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("stored.nc")}; }),
-              HasSubstr("flag refers to another file"));
+  EXPECT_THAT(refusal([&] { NetcdfInput{folder.file("stored.nc")}; }), NamesField("flag"));
 }
 
 TEST(Netcdf, DevicesSurvive) {

@@ -18,11 +18,11 @@
 #include "risley/tables/netcdf.hpp"
 
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 
 namespace risley::tables::table_file_test {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 const std::vector<TableColumn> kColumns = {{"input", CellKind::text, "", "path"},
                                            {"exit_status", CellKind::integer, "1", "status"},
@@ -46,6 +46,18 @@ TEST(TableFile, WritesText) {
             "\"a, \"\"b\"\".lvx\",0,0.3333333333333333\n"
             "\"ä\nb.lvx\",,\n"
             ",9007199254740993,2\n");
+}
+
+TEST(TableFile, AnyEndOfALineWithinATextIsQuoted) {
+  const io::TestFolder folder;
+  TableFile table(folder.file("t.csv"), kColumns, {});
+  table.add({"a\rb", std::int64_t{0}, kThird});
+  table.add({"a\nb", std::int64_t{0}, kThird});
+  table.close();
+  EXPECT_EQ(io::read_text_file(folder.file("t.csv")),
+            "input,exit_status,wedge_angle_deg\n"
+            "\"a\rb\",0,0.3333333333333333\n"
+            "\"a\nb\",0,0.3333333333333333\n");
 }
 
 TEST(TableFile, WritesNetcdf) {
@@ -102,7 +114,7 @@ TEST(TableFile, RefusesWhatDoesNotFit) {
   try {
     TableFile::check_name("t");
   } catch (const InvalidArgument& error) {
-    EXPECT_THAT(error.what(), HasSubstr(".csv"));
+    EXPECT_THAT(error.what(), NamesField(".csv"));
   }
 }
 

@@ -15,11 +15,11 @@
 #include "risley/tables/netcdf.hpp"
 
 #include "io/test_folder.hpp"
+#include "refusal.hpp"
 
 namespace risley::tables::table_input_test {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 const std::vector<TableColumn> kColumns = {{"input", CellKind::text, "", "path"},
                                            {"exit_status", CellKind::integer, "1", "status"},
@@ -90,15 +90,15 @@ TEST(TableInput, NamesWhereTextIsDamaged) {
     io::write_text_file(path, text);
     return problem_of(path);
   };
-  EXPECT_THAT(of(""), HasSubstr("none of the columns input, exit_status, wedge_angle_deg"));
-  EXPECT_THAT(of("x,y\n1,2\n"), HasSubstr("none of the columns"));
-  EXPECT_THAT(of("input,input\n"), HasSubstr("the column input stands twice"));
-  EXPECT_THAT(of("input,x\na,1\nb\n"), HasSubstr("line 3: expected 2 fields, found 1"));
-  EXPECT_THAT(of("input,x\na,1\n\"b\nc,2\n"), HasSubstr("line 3: expected the quotes"));
-  EXPECT_THAT(of("exit_status\n1.5\n"), HasSubstr("line 2: "));
-  EXPECT_THAT(of("wedge_angle_deg\nwide\n"), HasSubstr("wedge_angle_deg"));
+  EXPECT_THAT(of(""), NamesField("input, exit_status, wedge_angle_deg"));
+  EXPECT_THAT(of("x,y\n1,2\n"), NamesField("input, exit_status, wedge_angle_deg"));
+  EXPECT_THAT(of("input,input\n"), NamesField("column input"));
+  EXPECT_THAT(of("input,x\na,1\nb\n"), NamesField("found 1", 3));
+  EXPECT_THAT(of("input,x\na,1\n\"b\nc,2\n"), NamesField("quotes", 3));
+  EXPECT_THAT(of("exit_status\n1.5\n"), NamesField("exit_status", 2));
+  EXPECT_THAT(of("wedge_angle_deg\nwide\n"), NamesField("wedge_angle_deg", 2));
   EXPECT_THAT(of("input\n\"" + std::string(40'000, 'a') + "\n" + std::string(40'000, 'a') + "\"\n"),
-              HasSubstr("at most 65536 bytes"));
+              NamesField("65536 bytes"));
 }
 
 TEST(TableInput, RefusesOtherKinds) {
@@ -111,7 +111,7 @@ TEST(TableInput, RefusesOtherKinds) {
     file.end_definitions();
     file.close();
   }
-  EXPECT_THAT(problem_of(folder.file("t.nc")), HasSubstr("expected texts in variable input"));
+  EXPECT_THAT(problem_of(folder.file("t.nc")), NamesField("variable input"));
   EXPECT_THROW(read_table(folder.file("t.nc"), {kColumns[1]}), FileError);
 }
 

@@ -17,8 +17,6 @@
 
 namespace risley::trajectories::error_process_test {
 
-using ::testing::HasSubstr;
-
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
 const std::string kStated = R"(risley_trajectory_errors: 1
@@ -116,17 +114,13 @@ std::string mistake(const std::string& what, const std::string& by) {
 
 TEST(ErrorModel, MistakesAreNamedWithTheirLine) {
   EXPECT_THAT(mistake("risley_trajectory_errors: 1", "a: 1"),
-              HasSubstr("is not a file of trajectory errors"));
-  EXPECT_THAT(mistake("tilt_north_deg", "tilt_nort_deg"),
-              HasSubstr("did you mean tilt_north_deg?"));
-  EXPECT_THAT(mistake("correlation_time_s: 60, ", ""),
-              HasSubstr("line 5: up_m.correlation_time_s is missing"));
-  EXPECT_THAT(mistake("correlation_time_s: 60", "correlation_time_s: 0"),
-              HasSubstr("= 0 s, allowed"));
-  EXPECT_THAT(mistake("sigma: 0.03", "sigma: -1"), HasSubstr("up_m.sigma = -1 m, allowed 0"));
-  EXPECT_THAT(mistake("sample_interval_s: 0.005\n", ""), HasSubstr("sample_interval_s is missing"));
-  EXPECT_THAT(mistake("source: assumed", "source: \"\""),
-              HasSubstr("line 8: heading_deg.source is empty"));
+              NamesField("risley_trajectory_errors"));
+  EXPECT_THAT(mistake("tilt_north_deg", "tilt_nort_deg"), NamesField("tilt_north_deg"));
+  EXPECT_THAT(mistake("correlation_time_s: 60, ", ""), NamesField("up_m.correlation_time_s", 5));
+  EXPECT_THAT(mistake("correlation_time_s: 60", "correlation_time_s: 0"), NamesField("= 0 s"));
+  EXPECT_THAT(mistake("sigma: 0.03", "sigma: -1"), NamesField("up_m.sigma"));
+  EXPECT_THAT(mistake("sample_interval_s: 0.005\n", ""), NamesField("sample_interval_s"));
+  EXPECT_THAT(mistake("source: assumed", "source: \"\""), NamesField("heading_deg.source", 8));
   EXPECT_EQ(mistake("sigma: 0.03, ", ""), "");
 }
 
@@ -143,16 +137,13 @@ TEST(ErrorModel, EntriesRefuseWhatMakesNoSense) {
   EXPECT_EQ(run([](ErrorModel& m) { m.terms[0].sigma = -1; }),
             "sigma of north_m = -1, allowed 0 and above");
   EXPECT_THAT(run([](ErrorModel& m) { m.terms[5].correlation_time = 0; }),
-              HasSubstr("correlation time of heading_deg = 0 s"));
+              NamesField("correlation time of heading_deg"));
   EXPECT_THAT(run([](ErrorModel& m) { m.terms[3].white = std::nan(""); }),
-              HasSubstr("white part of tilt_north_deg = nan"));
-  EXPECT_THAT(run([](ErrorModel& m) { m.sample_interval = 0; }),
-              HasSubstr("sample_interval = 0 s"));
-  EXPECT_THAT(
-      refusal([&] { ErrorProcess(assumed_error_model(), t); }),
-      HasSubstr("sigma of north_m, east_m, up_m, tilt_north_deg, tilt_east_deg, heading_deg "
-                "is not stated"));
-  EXPECT_THAT(refusal([&] { ErrorProcess(assumed_error_model(), {}); }), HasSubstr("records = 0"));
+              NamesField("white part of tilt_north_deg"));
+  EXPECT_THAT(run([](ErrorModel& m) { m.sample_interval = 0; }), NamesField("sample_interval"));
+  EXPECT_THAT(refusal([&] { ErrorProcess(assumed_error_model(), t); }),
+              NamesField("north_m, east_m, up_m, tilt_north_deg, tilt_east_deg, heading_deg"));
+  EXPECT_THAT(refusal([&] { ErrorProcess(assumed_error_model(), {}); }), NamesField("records"));
 }
 
 }  // namespace risley::trajectories::error_process_test

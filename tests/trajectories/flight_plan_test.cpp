@@ -21,7 +21,14 @@ namespace risley::trajectories::flight_plan_test {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-FlightPlan bundled() { return load_flight_plan(in_source_tree("data/flight-v4.yaml")); }
+/// On a map of its own, from second 0 on.
+FlightPlan bundled() {
+  FlightPlan plan = load_flight_plan(in_source_tree("data/flight-v4.yaml"));
+  EXPECT_TRUE(plan.origin);
+  plan.origin.reset();
+  plan.start = 0;
+  return plan;
+}
 
 FlightPlan smooth(FlightPlan plan) {
   plan.attitude = {};
@@ -239,34 +246,27 @@ TEST(FlightPlan, MistakesAreToldWithTheirLine) {
   const auto message = [](const std::string& from, const std::string& to) {
     return line_and_problem([&] { parse_flight_plan(replaced(kText, from, to), "plan.yaml"); });
   };
-  EXPECT_THAT(message("rate_hz", "rate"),
-              AllOf(HasSubstr("6: unknown field rate"), HasSubstr("did you mean rate_hz?")));
-  EXPECT_THAT(message("risley_flight: 1", "risley_flight: 2"), HasSubstr("2: risley_flight = 2"));
+  EXPECT_THAT(message("rate_hz", "rate"), AllOf(NamesField("rate", 6), NamesField("rate_hz")));
+  EXPECT_THAT(message("risley_flight: 1", "risley_flight: 2"), NamesField("risley_flight", 2));
   EXPECT_THAT(message("gps-second-of-week", "gps-second-of-weak"),
-              AllOf(HasSubstr("4: start.scale = \"gps-second-of-weak\""),
-                    HasSubstr("did you mean gps-second-of-week?")));
-  EXPECT_THAT(message("scale: gps-second-of-week", "scale: gps"),
-              HasSubstr("start.gps_week belongs to the scale gps-second-of-week"));
-  EXPECT_THAT(message("height_m: 60", "height_m: up"),
-              HasSubstr("7: height_m: expected a finite number"));
+              AllOf(NamesField("start.scale", 4), NamesField("gps-second-of-week")));
+  EXPECT_THAT(message("scale: gps-second-of-week", "scale: gps"), NamesField("start.gps_week"));
+  EXPECT_THAT(message("height_m: 60", "height_m: up"), NamesField("height_m", 7));
   EXPECT_THAT(message("headings_deg: [90, 0]", "heading_deg: 1, headings_deg: [90, 0]"),
-              HasSubstr("found both"));
-  EXPECT_THAT(message("headings_deg: [90, 0], ", ""),
-              HasSubstr("12: expected either strips[0].headings_deg, for strips"));
+              AllOf(NamesField("heading_deg"), NamesField("headings_deg")));
+  EXPECT_THAT(message("headings_deg: [90, 0], ", ""), NamesField("strips[0].headings_deg", 12));
   EXPECT_THAT(message("headings_deg: [90, 0]", "headings_deg: []"),
-              HasSubstr("strips[0].headings_deg: expected a list in deg"));
+              NamesField("strips[0].headings_deg"));
   EXPECT_THAT(message("spacing_m: 20, ", ""),
-              HasSubstr("13: strips[1].count and strips[1].spacing_m need each other"));
-  EXPECT_THAT(message("length_m: 70", "length_m: 0.5"),
-              HasSubstr("14: strips[2].length_m = 0.5 m, allowed 1 to 100000"));
-  EXPECT_THAT(message("name: last", "name: strip 3"),
-              HasSubstr("two strips have the name \"strip 3\""));
+              AllOf(NamesField("strips[1].count", 13), NamesField("strips[1].spacing_m")));
+  EXPECT_THAT(message("length_m: 70", "length_m: 0.5"), NamesField("strips[2].length_m", 14));
+  EXPECT_THAT(message("name: last", "name: strip 3"), NamesField("\"strip 3\""));
   EXPECT_THAT(message("highest_hz: 1,", "highest_hz: 0.1,"),
-              HasSubstr("motion.attitude.highest_hz = 0.1 Hz"));
+              NamesField("motion.attitude.highest_hz"));
   EXPECT_EQ(message("length_m: 70", "length_m: 1, speed_m_per_s: 0.01"), "");
   EXPECT_THAT(message("length_m: 70", "length_m: 100000, speed_m_per_s: 0.01"),
-              HasSubstr("records of the flight"));
-  EXPECT_THAT(message("strips:\n", "strips: none\nx:\n"), HasSubstr("unknown field x"));
+              NamesField("records of the flight"));
+  EXPECT_THAT(message("strips:\n", "strips: none\nx:\n"), NamesField("x"));
 }
 
 TEST(FlightPlan, StripTimesAreWritten) {
@@ -286,23 +286,22 @@ TEST(FlightPlan, RefusesPlansThatMakeNoSense) {
   };
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refused([](auto& p) { p.strips.resize(1); }), "");
-  EXPECT_THAT(refused([](auto& p) { p.strips.clear(); }), HasSubstr("strips of the flight = 0"));
+  EXPECT_THAT(refused([](auto& p) { p.strips.clear(); }), NamesField("strips of the flight"));
   EXPECT_THAT(refused([](auto& p) { p.strips[1].speed = 0; }),
-              HasSubstr("speed of strip \"strip 2\" = 0 m/s"));
+              NamesField("speed of strip \"strip 2\""));
   EXPECT_THAT(refused([](auto& p) { p.strips[1].heading = kNan; }),
-              HasSubstr("heading of strip \"strip 2\" = nan"));
-  EXPECT_THAT(refused([](auto& p) { p.rate = 0; }), HasSubstr("rate = 0 Hz"));
-  EXPECT_THAT(refused([](auto& p) { p.turn_duration = 0; }), HasSubstr("turn_duration = 0 s"));
-  EXPECT_THAT(refused([](auto& p) { p.attitude.rms[0] = 2; }),
-              HasSubstr("attitude motion rms = 114"));
+              NamesField("heading of strip \"strip 2\""));
+  EXPECT_THAT(refused([](auto& p) { p.rate = 0; }), NamesField("rate"));
+  EXPECT_THAT(refused([](auto& p) { p.turn_duration = 0; }), NamesField("turn_duration"));
+  EXPECT_THAT(refused([](auto& p) { p.attitude.rms[0] = 2; }), NamesField("attitude motion rms"));
   EXPECT_THAT(refused([](auto& p) { p.velocity.sinusoids = 0; }),
-              HasSubstr("velocity motion sinusoids = 0"));
-  EXPECT_THAT(refused([](auto& p) { p.origin = Geodetic{2, 0, 0}; }), HasSubstr("latitude"));
+              NamesField("velocity motion sinusoids"));
+  EXPECT_THAT(refused([](auto& p) { p.origin = Geodetic{2, 0, 0}; }), NamesField("latitude"));
   EXPECT_THAT(refused([](auto& p) {
                 p.strips[0].length = 1e5;
                 p.strips[0].speed = 0.5;
               }),
-              HasSubstr("records of the flight"));
+              NamesField("records of the flight"));
 }
 
 }  // namespace risley::trajectories::flight_plan_test

@@ -26,6 +26,7 @@
 #include "io/test_folder.hpp"
 #include "refusal.hpp"
 #include "trajectories/known_flight.hpp"
+#include "warning_codes.hpp"
 
 namespace risley::trajectories::ros_bags_test {
 
@@ -33,8 +34,10 @@ using namespace bags::written;
 using bags::BagKind;
 using Eigen::Vector3d;
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 constexpr std::int64_t kBegin_ns = 1'600'000'000'123'456'789;  // 2020
 
@@ -198,8 +201,8 @@ TEST(RosBags, OdometryIsPosesAndVelocities) {
     require_trajectory(t);
     ASSERT_EQ(t.size(), flown.size());
     EXPECT_EQ(t.format, bags::name_of(kind));
-    EXPECT_THAT(t.source, AllOf(HasSubstr("topic /odom"), HasSubstr("Odometry"),
-                                HasSubstr("frame \"odom\""), HasSubstr("body \"base_link\"")));
+    EXPECT_THAT(t.source, AllOf(NamesField("topic /odom"), NamesField("Odometry"),
+                                NamesField("\"odom\""), NamesField("\"base_link\"")));
     EXPECT_EQ(t.frame, Frame::local);
     EXPECT_EQ(t.time_scale, TimeScale::utc_unix);
     EXPECT_TRUE(t.accuracy.empty());  // zeros state nothing
@@ -315,9 +318,8 @@ TEST(RosBags, WhatStatesNoAccuracyStatesNone) {
     const Trajectory t =
         load_trajectory(write(BagKind::ros1, {{"/a", Type::pose_with_covariance, flown}}));
     EXPECT_TRUE(t.accuracy.empty());
-    ASSERT_EQ(t.warnings.size(), 1U);
-    EXPECT_THAT(t.warnings[0].message,
-                HasSubstr("1 of 12 messages of topic /a state no accuracies"));
+    EXPECT_THAT(t.warnings,
+                ElementsAre(Warns(kWarning.columns_unused, {"1 of 12 messages", "/a"})));
   }
 }
 
@@ -329,19 +331,16 @@ TEST(RosBags, VelocitiesInOtherAxesAndNoneAreTold) {
     }
   }
   const Trajectory turned = load_trajectory(write(BagKind::ros1, {{"/a", Type::odometry, flown}}));
-  ASSERT_EQ(turned.warnings.size(), 1U);
-  EXPECT_THAT(turned.warnings[0].message,
-              AllOf(HasSubstr("stated as forward-left-up of the body and differ"),
-                    HasSubstr("as east-north-up they would")));
+  EXPECT_THAT(turned.warnings,
+              ElementsAre(Warns(kWarning.velocity_frame, {"forward-left-up", "east-north-up"})));
   for (Sample& s : flown) s.twist = {0, 0, 0};
   const Trajectory none = load_trajectory(write(BagKind::ros1, {{"/a", Type::odometry, flown}}));
   EXPECT_TRUE(none.velocity.empty());
   flown[7].twist[1] = std::numeric_limits<double>::quiet_NaN();
   const Trajectory part = load_trajectory(write(BagKind::ros1, {{"/a", Type::odometry, flown}}));
   EXPECT_TRUE(part.velocity.empty());
-  ASSERT_EQ(part.warnings.size(), 1U);
-  EXPECT_THAT(part.warnings[0].message,
-              HasSubstr("1 of 300 messages of topic /a state no velocit"));
+  EXPECT_THAT(part.warnings,
+              ElementsAre(Warns(kWarning.columns_unused, {"1 of 300 messages", "/a"})));
 }
 
 TEST(RosBags, OneTopicIsTakenAndOfSeveralOneIsNamed) {
@@ -353,26 +352,24 @@ TEST(RosBags, OneTopicIsTakenAndOfSeveralOneIsNamed) {
                                           {"/slam/pose", Type::pose, moved},
                                           {"/twist", Type::twist, flown}});
     EXPECT_THROW(load_trajectory(path), InvalidArgument);
-    EXPECT_THAT(fault(path), AllOf(HasSubstr("option trajectory_topic is missing"),
-                                   HasSubstr("2 topics of poses"), HasSubstr("/odom (nav_msgs"),
-                                   HasSubstr("/slam/pose (geometry_msgs"), HasSubstr("poses.")));
+    EXPECT_THAT(fault(path), AllOf(NamesField("option trajectory_topic"), NamesField("/odom"),
+                                   NamesField("/slam/pose"), Not(NamesField("/twist"))));
     EXPECT_EQ(load_trajectory(path, {}, "/slam/pose").position[0].z(), moved[0].position[2]);
     EXPECT_EQ(load_trajectory(path, {}, "/odom").position[0].z(), flown[0].position[2]);
     for (const char* wrong : {"/twist", "/odo", "odom"}) {
       EXPECT_THROW(load_trajectory(path, {}, wrong), InvalidArgument);
       EXPECT_THAT(fault(path, wrong),
-                  AllOf(HasSubstr(fmt::format("topic = {}", wrong)), HasSubstr("/odom (nav_msgs")));
+                  AllOf(NamesField(fmt::format("topic = {}", wrong)), NamesField("/odom")));
     }
     const std::string without = write(kind, {{"/twist", Type::twist, flown}});
     EXPECT_EQ(trajectory_file_kind(without), TrajectoryFileKind::none);
     EXPECT_THROW(load_trajectory(without), FileError);
-    EXPECT_THAT(fault(without),
-                AllOf(HasSubstr("holds no poses"), HasSubstr("/twist (geometry_msgs")));
+    EXPECT_THAT(fault(without), NamesField("/twist"));
   }
   const std::string csv = folder().file("a.csv");
   write_trajectory(csv, trajectory_of(KnownFlight(), 5));
   EXPECT_THROW(load_trajectory(csv, {}, "/odom"), InvalidArgument);
-  EXPECT_THAT(fault(csv, "/odom"), HasSubstr("is not a ROS bag"));
+  EXPECT_THAT(fault(csv, "/odom"), NamesField("a.csv"));
 }
 
 TEST(RosBags, ABagWithALidarIsARecordingWhosePosesCanBeRead) {
@@ -421,15 +418,12 @@ TEST(RosBags, TimesThatRunBackAreSortedOrRefused) {
     const Trajectory t = load_trajectory(write(kind, {{"/a", Type::pose, flown}}));
     EXPECT_EQ(t.size(), 30U);
     EXPECT_EQ(t.time_order.moved, 1U);
-    ASSERT_EQ(t.warnings.size(), 1U);
-    EXPECT_THAT(t.warnings[0].message, HasSubstr("records that come after later ones: 1 of 30"));
+    EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.rows_sorted, {"1 of 30"})));
     flown[20].time_ns -= 5'000'000'000;
-    EXPECT_THAT(fault(kind, flown), AllOf(HasSubstr("record 21: time jumps back by 4.99"),
-                                          ::testing::Not(HasSubstr("byte"))));
+    EXPECT_THAT(fault(kind, flown), AllOf(NamesField("record 21"), Not(NamesField("byte"))));
     flown = samples(5);
     for (Sample& s : flown) s.time_ns = 0;
-    EXPECT_THAT(fault(kind, flown),
-                AllOf(HasSubstr("has the time stamp 0"), HasSubstr("time stamps were not set")));
+    EXPECT_THAT(fault(kind, flown), NamesField("time stamp 0"));
   }
 }
 
@@ -438,33 +432,33 @@ TEST(RosBags, PosesThatAreNoneAreRefusedWithTheirMessage) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
   struct Case {
     std::function<void(Sample&)> change;
-    const char* said;
+    const char* named;
   };
   const std::vector<Case> cases{
-      {[=](Sample& s) { s.xyzw[2] = kNan; }, "expected an orientation of length 1"},
+      {[=](Sample& s) { s.xyzw[2] = kNan; }, "orientation"},
       {[](Sample& s) {
          s.xyzw = {0, 0, 0, 0};
        },
-       "expected an orientation of length 1"},
-      {[](Sample& s) { s.xyzw[3] = 1.5; }, "expected an orientation of length 1"},
-      {[=](Sample& s) { s.position[1] = kInf; }, "expected finite numbers"},
-      {[=](Sample& s) { s.position[0] = kNan; }, "expected finite numbers"},
-      {[](Sample& s) { s.frame = "map"; }, "expected one body in one frame"},
-      {[](Sample& s) { s.body = "camera"; }, "expected one body in one frame"},
+       "orientation"},
+      {[](Sample& s) { s.xyzw[3] = 1.5; }, "orientation"},
+      {[=](Sample& s) { s.position[1] = kInf; }, "finite"},
+      {[=](Sample& s) { s.position[0] = kNan; }, "finite"},
+      {[](Sample& s) { s.frame = "map"; }, "one frame"},
+      {[](Sample& s) { s.body = "camera"; }, "one frame"},
   };
   for (const BagKind kind : kKinds) {
     for (const Case& one : cases) {
       std::vector<Sample> flown = samples(9);
       one.change(flown[4]);
-      EXPECT_THAT(fault(kind, flown), AllOf(HasSubstr(one.said), HasSubstr("message "),
-                                            HasSubstr("5 of topic /odom (nav_msgs")));
+      EXPECT_THAT(fault(kind, flown), AllOf(NamesField(one.named), NamesField("5 of topic /odom")));
     }
     std::vector<Sample> flown = samples(9);
     for (Sample& s : flown) s.frame = "earth";
-    EXPECT_THAT(fault(kind, flown), HasSubstr("frame earth, which is geocentric"));
+    EXPECT_THAT(fault(kind, flown), NamesField("frame earth"));
     flown = samples(9);
     flown[4].position[0] = 2e7;
-    EXPECT_THAT(fault(kind, flown), HasSubstr("record 5: position = 20000000 m"));
+    EXPECT_THAT(fault(kind, flown),
+                AllOf(NamesField("record 5"), NamesField("position = 20000000 m")));
   }
 }
 
@@ -515,7 +509,7 @@ TEST(RosBags, HostileLengthsCostNothing) {
     first.add("/a", raw(Type::odometry, one));
     const std::string path = folder().file("hostile.bag");
     first.write(path);
-    EXPECT_THAT(fault(path), HasSubstr("characters of the frame name"));
+    EXPECT_THAT(fault(path), NamesField("frame name"));
     std::string two = ros2_bytes(Type::odometry, s);
     two.replace(12, 4, reinterpret_cast<const char*>(&length), 4);
     Ros2BagFile second;
@@ -523,7 +517,7 @@ TEST(RosBags, HostileLengthsCostNothing) {
     const std::string other = folder().file("hostile.db3");
     std::remove(other.c_str());
     second.write(other).reset();
-    EXPECT_THAT(fault(other), HasSubstr("bytes of CDR"));
+    EXPECT_THAT(fault(other), NamesField("CDR"));
   }
   std::string stamp = ros1_bytes(Type::pose, s);
   const std::uint32_t nanoseconds = 1'000'000'000;
@@ -532,7 +526,7 @@ TEST(RosBags, HostileLengthsCostNothing) {
   bag.add("/a", raw(Type::pose, stamp));
   const std::string path = folder().file("stamp.bag");
   bag.write(path);
-  EXPECT_THAT(fault(path), HasSubstr("less than 1e9 ns"));
+  EXPECT_THAT(fault(path), NamesField("1e9 ns"));
 }
 
 std::string bytes_of_file(const std::string& path) {
@@ -551,7 +545,7 @@ TEST(RosBags, McapCutAnywhereGivesThePosesBeforeTheCut) {
       EXPECT_GE(part.size(), most) << length;
       most = part.size();
       ASSERT_FALSE(part.warnings.empty());
-      EXPECT_THAT(part.warnings.front().message, HasSubstr("not closed or is cut off"));
+      EXPECT_THAT(part.warnings.front(), Warns(kWarning.cut_off));
     } catch (const FileError&) {
       EXPECT_EQ(most, 0U) << length;
     }
@@ -569,7 +563,7 @@ TEST(RosBags, AFolderOfRos2IsOneTrajectory) {
               {{"/a", Type::pose, {flown.begin() + first, flown.begin() + first + 10}}}),
         bag + "/" + name, std::filesystem::copy_options::overwrite_existing);
   }
-  EXPECT_THAT(fault(bag), HasSubstr("without metadata.yaml"));
+  EXPECT_THAT(fault(bag), NamesField("metadata.yaml"));
   write_bytes(bag + "/metadata.yaml",
               "rosbag2_bagfile_information: {version: 6, relative_file_paths: [0.mcap, 1.mcap]}");
   EXPECT_EQ(load_trajectory(bag).size(), 20U);
@@ -615,7 +609,7 @@ TEST(RosBags, ATopicWithoutMessagesIsRefused) {
   bag.topic("/a", "nav_msgs/msg/Odometry");
   const std::string path = folder().file("empty.db3");
   bag.write(path).reset();
-  EXPECT_THAT(fault(path), HasSubstr("the topic /a holds no message"));
+  EXPECT_THAT(fault(path), NamesField("topic /a"));
 }
 
 TEST(RosBags, AnUnknownMd5IsNamed) {
@@ -625,7 +619,7 @@ TEST(RosBags, AnUnknownMd5IsNamed) {
   bag.add("/odom", message);
   const std::string path = folder().file("md5.bag");
   bag.write(path);
-  EXPECT_THAT(fault(path), HasSubstr("nav_msgs/Odometry with the unknown md5 0000"));
+  EXPECT_THAT(fault(path), AllOf(NamesField("nav_msgs/Odometry"), HasSubstr("md5 0000")));
   EXPECT_EQ(trajectory_file_kind(path), TrajectoryFileKind::none);
 }
 

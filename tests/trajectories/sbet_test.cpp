@@ -20,11 +20,13 @@
 #include "io/test_folder.hpp"
 #include "refusal.hpp"
 #include "trajectories/known_flight.hpp"
+#include "warning_codes.hpp"
 
 namespace risley::trajectories::sbet_test {
 
 using Eigen::Vector3d;
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -123,18 +125,18 @@ TEST(Sbet, FramesThatCannotBeToldStayUndecided) {
   // Too short.
   Trajectory t = read(sbet_records(flight, 9));
   EXPECT_EQ(t.velocity_frame->name, "undecided");
-  EXPECT_THAT(t.velocity_frame->reason, HasSubstr("9 records, at least 10"));
+  EXPECT_THAT(t.velocity_frame->reason, NamesField("9 records"));
   EXPECT_THAT(t.velocity, IsEmpty());
   // None fits.
   std::vector<SbetRecord> records = sbet_records(flight, 400);
   for (SbetRecord& n : records) n[4] += 15;
   t = read(records);
   EXPECT_EQ(t.velocity_frame->name, "undecided");
-  EXPECT_THAT(t.velocity_frame->reason, HasSubstr("none of 5 frames fits"));
+  EXPECT_THAT(t.velocity_frame->reason, NamesField("none of 5 frames"));
   EXPECT_THAT(t.velocity, IsEmpty());
   // Zeros, as some programs write.
   for (SbetRecord& n : records) n[4] = n[5] = n[6] = 0;
-  EXPECT_THAT(read(records).velocity_frame->reason, HasSubstr("all velocities are 0"));
+  EXPECT_THAT(read(records).velocity_frame->reason, NamesField("velocities are 0"));
   // Level to the north: the body's axes are those of the map.
   records = sbet_records(flight, 400);
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -147,7 +149,7 @@ TEST(Sbet, FramesThatCannotBeToldStayUndecided) {
   }
   t = read(records);
   EXPECT_EQ(t.velocity_frame->name, "undecided");
-  EXPECT_THAT(t.velocity_frame->reason, HasSubstr("fit the change of the positions equally well"));
+  EXPECT_THAT(t.velocity_frame->reason, NamesField("equally well"));
 }
 
 TEST(Sbet, NoisyPositionsDoNotHideTheFrame) {
@@ -171,8 +173,8 @@ TEST(Sbet, SizesThatAreNoWholeRecordsAreRefusedByName) {
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     if (size > 0 && size % 136 == 0) continue;
     EXPECT_THAT(refusal<FileError>([&] { read(bytes.substr(0, size), "cut.sbet"); }),
-                AllOf(HasSubstr("cut.sbet"),
-                      HasSubstr(size == 0 ? "is empty" : std::to_string(size) + " bytes")));
+                AllOf(NamesField("cut.sbet"),
+                      NamesField(size == 0 ? "empty" : std::to_string(size) + " bytes")));
   }
 }
 
@@ -181,8 +183,8 @@ TEST(Sbet, DegreesWhereRadiansBelongAreNamed) {
   for (SbetRecord& n : records) {
     for (const std::size_t i : {1, 2, 7, 8, 9}) n[i] = degrees_from_radians(n[i]);
   }
-  EXPECT_THAT(fault(records), AllOf(HasSubstr("byte 0"), HasSubstr("latitude = "),
-                                    HasSubstr("degrees stored where radians belong")));
+  EXPECT_THAT(fault(records),
+              AllOf(NamesField("byte 0"), NamesField("latitude"), NamesField("radians")));
   // Without the ending, too.
   const std::string path = folder().file("degrees.out");
   write_bytes(path, bytes_of(records));
@@ -197,7 +199,7 @@ TEST(Sbet, ValuesThatNoPlatformHasAreRefusedAtTheirRecord) {
     for (const double value : {kNan, kInfinite, -kInfinite, 1e300, -1e9}) {
       std::vector<SbetRecord> records = sound;
       records[7][field] = value;
-      EXPECT_THAT(fault(records), HasSubstr("byte 952")) << field << ' ' << value;
+      EXPECT_THAT(fault(records), NamesField("byte 952")) << field << ' ' << value;
     }
   }
   EXPECT_EQ(fault(sound), "");
@@ -209,18 +211,16 @@ TEST(Sbet, TimesThatRunBackAreSortedOrRefused) {
   records.insert(records.begin() + 200, records[200]);
   const Trajectory t = read(records);
   EXPECT_EQ(t.size(), 300U);
-  ASSERT_EQ(t.warnings.size(), 2U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("records that come after later ones: 1 of 301"));
+  ASSERT_THAT(t.warnings, ElementsAre(Warns(kWarning.rows_sorted, {"1 of 301"}),
+                                      Warns(kWarning.content_left_out, {"1"})));
   EXPECT_EQ(t.warnings[0].place.byte_offset, 101U * 136);
-  EXPECT_THAT(t.warnings[1].message, HasSubstr("repeat the time of an earlier one: 1"));
   EXPECT_TRUE(std::ranges::is_sorted(t.time_ns));
   EXPECT_EQ(t.velocity_frame->name, "north-east-down");
   EXPECT_LT((t.position[100] - KnownFlight().position(0.5)).norm(), 1e-8);
   // Another flight behind this one.
   const std::vector<SbetRecord> again = sbet_records(KnownFlight(), 260);
   records.insert(records.end(), again.begin(), again.end());
-  EXPECT_THAT(fault(records),
-              AllOf(HasSubstr("byte 40936"), HasSubstr("time jumps back by 1.495")));
+  EXPECT_THAT(fault(records), AllOf(NamesField("byte 40936"), NamesField("1.495000 s")));
 }
 
 TEST(Sbet, TheWeekMayEnd) {
@@ -231,8 +231,7 @@ TEST(Sbet, TheWeekMayEnd) {
   }
   const Trajectory t = read(records);
   EXPECT_EQ(t.week_crossings, 1);
-  ASSERT_EQ(t.warnings.size(), 1U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("GPS week (604800 s) ends"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.clock_wrapped, {"604800 s"})));
   EXPECT_NEAR(static_cast<double>(t.time_ns.back() - t.time_ns.front()), 399 * 5e6, 2);
   EXPECT_THAT(Interpolation(t).gaps(), IsEmpty());
   EXPECT_EQ(t.velocity_frame->name, "north-east-down");
@@ -327,7 +326,7 @@ TEST(Smrmsg, OtherFlightsAndDamageAreRefused) {
   std::vector<SmrmsgRecord> records = accuracies(20);
   for (SmrmsgRecord& n : records) n[0] += 3600;
   EXPECT_THAT(refusal<FileError>([&] { add_accuracies(t, read_accuracies(records), "b.smrmsg"); }),
-              AllOf(HasSubstr("b.smrmsg"), HasSubstr("404420")));
+              AllOf(NamesField("b.smrmsg"), HasSubstr("404420")));
   for (std::size_t field = 0; field < 10; ++field) {
     for (const double value : {std::nan(""), -1.0, 1e12}) {
       records = accuracies(20);
@@ -367,7 +366,7 @@ TEST(RealSbet, TwoPointsAndACutFile) {
   EXPECT_EQ(t.size(), 2U);
   EXPECT_EQ(t.velocity_frame->name, "undecided");
   EXPECT_THAT(refusal<FileError>([&] { load_trajectory(real_file("badfile.sbet")); }),
-              AllOf(HasSubstr("badfile.sbet"), HasSubstr("271 bytes")));
+              AllOf(NamesField("badfile.sbet"), NamesField("271 bytes")));
 }
 
 TEST(RealSmrmsg, MediansAreThoseOfTheFile) {

@@ -20,13 +20,15 @@
 #include "io/test_folder.hpp"
 #include "refusal.hpp"
 #include "trajectories/known_flight.hpp"
+#include "warning_codes.hpp"
 
 namespace risley::trajectories::text_formats_test {
 
 using Eigen::Vector3d;
 using ::testing::AllOf;
-using ::testing::HasSubstr;
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 const io::TestFolder& folder() {
   static const io::TestFolder one;
@@ -165,45 +167,48 @@ TEST(InertialExplorer, ScaledStandardDeviationsAreDividedAgain) {
   Trajectory t = read(text);
   EXPECT_DOUBLE_EQ(t.accuracy[0].position.x(), 0.0055);
   EXPECT_NEAR(degrees_from_radians(t.accuracy[0].heading), 0.021, 1e-12);
-  ASSERT_EQ(t.warnings.size(), 1U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("position were written 2 times as large"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.values_changed, {"position", "2 times"})));
   EXPECT_EQ(t.warnings[0].place.line, 10U);
   t = read(replaced(text, "Position: 2.0000", "Position: 95 percent"));
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("95 times"));  // a number is a number
+  // A number is a number.
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.values_changed, {"position", "95 times"})));
   t = read(replaced(text, "Position: 2.0000", "Position: twice"));
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("is not a known scaling"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.unit_guessed, {"twice"})));
+}
+
+TEST(InertialExplorer, StandardDeviationsOfAnglesInAnyUnit) {
+  const std::string units = "(deg) (deg) (deg) (deg) (deg) (deg)";
+  for (const auto& [unit, per_degree] : {std::pair("(arcmin)", 60.0), std::pair("(arcsec)", 3600.0),
+                                         std::pair("(rad)", kRadiansPerDegree)}) {
+    const Trajectory t = read(replaced(explorer_text(20, false), units,
+                                       fmt::format("(deg) {0} (deg) {0} (deg) {0}", unit)));
+    EXPECT_NEAR(degrees_from_radians(t.accuracy[5].roll) * per_degree, 0.004, 1e-12) << unit;
+    EXPECT_NEAR(degrees_from_radians(t.accuracy[5].pitch) * per_degree, 0.005, 1e-12) << unit;
+    EXPECT_NEAR(degrees_from_radians(t.accuracy[5].heading) * per_degree, 0.021, 1e-12) << unit;
+  }
 }
 
 TEST(InertialExplorer, MistakesAreNamed) {
   const std::string text = explorer_text(20, false);
-  EXPECT_THAT(
-      fault(replaced(text, "H-Ell", "H-MSL")),
-      AllOf(HasSubstr("line 14"), HasSubstr("column H-Ell is missing"), HasSubstr("geoid")));
-  EXPECT_THAT(fault(replaced(text, "GPSTime", "UTCDate")), HasSubstr("column GPSTime is missing"));
-  EXPECT_THAT(fault(replaced(text, "(sec)", "(HMS)")),
-              AllOf(HasSubstr("line 15"), HasSubstr("column gpstime has the unit (hms)")));
-  EXPECT_THAT(fault(replaced(text, "(none)", "")),
-              HasSubstr("names 17 columns, and the line below"));
-  EXPECT_THAT(fault(replaced(text, "0.004 ", "nan ")),
-              AllOf(HasSubstr("line 17"), HasSubstr("expected a finite number in column rollsd")));
-  EXPECT_THAT(fault(replaced(text, " 0.004 ", " -0.004 ")),
-              AllOf(HasSubstr("line 17"), HasSubstr("accuracy of the attitude")));
-  EXPECT_THAT(fault(replaced(text, " 0.011 ", " 0.011 5 ")),
-              HasSubstr("expected 17 fields, found 18"));
-  EXPECT_THAT(fault(kExplorerHead), HasSubstr("no line of column names"));
-  const std::string places = replaced(explorer_text(20, true), "37 ", "37 75 ");
-  EXPECT_THAT(fault(places), HasSubstr("line 17"));
+  EXPECT_THAT(fault(replaced(text, "H-Ell", "H-MSL")), NamesField("column H", 14));
+  EXPECT_THAT(fault(replaced(text, "GPSTime", "UTCDate")), NamesField("column GPSTime"));
+  EXPECT_THAT(fault(replaced(text, "(sec)", "(HMS)")), NamesField("column gpstime", 15));
+  EXPECT_THAT(fault(replaced(text, "(none)", "")), NamesField("17"));
+  EXPECT_THAT(fault(replaced(text, "0.004 ", "nan ")), NamesField("column rollsd", 17));
+  EXPECT_THAT(fault(replaced(text, " 0.004 ", " -0.004 ")), NamesField("attitude", 17));
+  EXPECT_THAT(fault(replaced(text, " 0.011 ", " 0.011 5 ")), NamesField("found 18"));
+  EXPECT_THAT(fault(kExplorerHead), NamesField("a.txt"));
+  EXPECT_THAT(fault(replaced(explorer_text(20, true), "37 ", "37 75 ")), NamesField("", 17));
 }
 
 TEST(InertialExplorer, TextBehindTheRecordsAndCutLines) {
   const std::string text = explorer_text(20, false);
   Trajectory t = read(text + "\nProcessing summary\n  3 passes\n");
   EXPECT_EQ(t.size(), 20U);
-  ASSERT_EQ(t.warnings.size(), 1U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("text after the records"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.content_left_out)));
   t = read(text.substr(0, text.size() - 9));
   EXPECT_EQ(t.size(), 19U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("cut off"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.cut_off)));
 }
 
 const std::string kPospacHead =
@@ -239,13 +244,13 @@ TEST(Pospac, ColumnsAreFoundByTheirNames) {
       replaced(pospac_text(30), "angles and SD in Degrees", "angles in Degrees, SD in ArcMin"));
   EXPECT_NEAR(degrees_from_radians(t.accuracy[5].heading), 0.021 / 60, 1e-12);
   t = read(replaced(pospac_text(30), "angles and SD in Degrees", "angles in Degrees"));
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("degrees are assumed"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.unit_guessed)));
 }
 
 TEST(Pospac, MistakesAreNamed) {
   EXPECT_THAT(fault(replaced(pospac_text(20), "LONGITUDE", "ZONE")),
-              HasSubstr("column LONGITUDE is missing"));
-  EXPECT_THAT(fault(kPospacHead), HasSubstr("holds no record"));
+              NamesField("column LONGITUDE"));
+  EXPECT_THAT(fault(kPospacHead), NamesField("a.txt"));
 }
 
 std::string openmms_text(int count, bool real_time = false) {
@@ -289,7 +294,7 @@ TEST(Openmms, MidnightMayPass) {
   }
   const Trajectory t = read(shifted);
   EXPECT_EQ(t.week_crossings, 1);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("the day (86400 s) ends"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.clock_wrapped, {"86400 s"})));
   EXPECT_EQ(t.time_ns.back() - t.time_ns.front(), 399 * 5'000'000);
 }
 
@@ -349,19 +354,17 @@ TEST(TrajectoryCsv, WrongNamesGetANearOne) {
   const auto refused = [](const std::string& what, const std::string& by) {
     return fault(replaced(csv_text(3), what, by), "a.csv");
   };
-  EXPECT_THAT(refused("latitude_deg", "lattitude_deg"),
-              AllOf(HasSubstr("line 1"), HasSubstr("did you mean latitude_deg?")));
-  EXPECT_THAT(refused("latitude_deg", "latitude"), HasSubstr("did you mean latitude_deg?"));
+  EXPECT_THAT(refused("latitude_deg", "lattitude_deg"), NamesField("latitude_deg", 1));
+  EXPECT_THAT(refused("latitude_deg", "latitude"), NamesField("latitude_deg"));
   EXPECT_THAT(refused("ellipsoidal_height_m", "ellipsoidal_height"),
-              HasSubstr("did you mean ellipsoidal_height_m?"));
-  EXPECT_THAT(refused("heading_deg", "colour"), HasSubstr("column heading_deg is missing"));
-  EXPECT_THAT(refused("gps_second_of_week_s", "hour"), HasSubstr("no column of times"));
-  EXPECT_THAT(refused("pitch_deg", "roll_rad"), HasSubstr("column roll_rad repeats roll_deg"));
+              NamesField("ellipsoidal_height_m"));
+  EXPECT_THAT(refused("heading_deg", "colour"), NamesField("column heading_deg"));
+  EXPECT_THAT(refused("gps_second_of_week_s", "hour"), NamesField("hour"));
+  EXPECT_THAT(refused("pitch_deg", "roll_rad"), NamesField("column roll_rad"));
   const Trajectory t = read(replaced(csv_text(3), "velocity_up_m_per_s", "temperature"), "a.csv");
   EXPECT_THAT(t.velocity, IsEmpty());
-  ASSERT_EQ(t.warnings.size(), 2U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("velocities are incomplete"));
-  EXPECT_THAT(t.warnings[1].message, HasSubstr("column temperature was ignored"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.columns_unused, {"velocity_north_m_per_s"}),
+                                      Warns(kWarning.columns_unused, {"column temperature"})));
 }
 
 TEST(TrajectoryCsv, ValuesThatNoPlatformHasAreRefusedAtTheirLine) {
@@ -370,15 +373,14 @@ TEST(TrajectoryCsv, ValuesThatNoPlatformHasAreRefusedAtTheirLine) {
   const auto with = [&](const std::string& line) {
     return fault(text.substr(0, row) + line + text.substr(text.find('\n', row)), "a.csv");
   };
-  EXPECT_THAT(with("400825.025,91,1,1,1,1,1,1,1,1"),
-              AllOf(HasSubstr("line 7"), HasSubstr("latitude = 91 deg, allowed -90")));
-  EXPECT_THAT(with("400825.025,1,1,nan,1,1,1,1,1,1"), HasSubstr("column ellipsoidal_height_m"));
-  EXPECT_THAT(with("400825.025,1,1,1e9,1,1,1,1,1,1"), HasSubstr("ellipsoidal height = 1"));
-  EXPECT_THAT(with("400825.025,1,1,1,1,95,1,1,1,1"), HasSubstr("pitch = "));
-  EXPECT_THAT(with("400825.025,1,1,1,1,5,1,1,1"), HasSubstr("expected 10 fields, found 9"));
-  EXPECT_THAT(with("1e300,1,1,1,1,5,1,1,1,1"), HasSubstr("expected a time"));
-  EXPECT_THAT(with(""), HasSubstr("a row after the empty line 7"));
-  EXPECT_THAT(with("400823.9,1,1,1,1,5,1,1,1,1"), HasSubstr("time jumps back by 1.12"));
+  EXPECT_THAT(with("400825.025,91,1,1,1,1,1,1,1,1"), NamesField("latitude", 7));
+  EXPECT_THAT(with("400825.025,1,1,nan,1,1,1,1,1,1"), NamesField("column ellipsoidal_height_m"));
+  EXPECT_THAT(with("400825.025,1,1,1e9,1,1,1,1,1,1"), NamesField("ellipsoidal height"));
+  EXPECT_THAT(with("400825.025,1,1,1,1,95,1,1,1,1"), NamesField("pitch"));
+  EXPECT_THAT(with("400825.025,1,1,1,1,5,1,1,1"), NamesField("found 9", 7));
+  EXPECT_THAT(with("1e300,1,1,1,1,5,1,1,1,1"), NamesField("time", 7));
+  EXPECT_THAT(with(""), NamesField("line 7"));
+  EXPECT_THAT(with("400823.9,1,1,1,1,5,1,1,1,1"), NamesField("1.120000 s", 7));
 }
 
 TEST(TrajectoryCsv, StatedVelocitiesThatDoNotFitAreNamed) {
@@ -388,9 +390,8 @@ TEST(TrajectoryCsv, StatedVelocitiesThatDoNotFitAreNamed) {
   head = replaced(head, "velocity_up", "velocity_down");
   const Trajectory t = read(csv_text(400, head), "a.csv");
   EXPECT_EQ(t.velocity.size(), 400U);
-  ASSERT_EQ(t.warnings.size(), 1U);
-  EXPECT_THAT(t.warnings[0].message, AllOf(HasSubstr("stated as north-east-down and differ"),
-                                           HasSubstr("as east-north-up they")));
+  EXPECT_THAT(t.warnings,
+              ElementsAre(Warns(kWarning.velocity_frame, {"north-east-down", "east-north-up"})));
 }
 
 TEST(TrajectoryCsv, ACutLastLineIsLeftOut) {
@@ -398,7 +399,7 @@ TEST(TrajectoryCsv, ACutLastLineIsLeftOut) {
   for (std::size_t cut = 1; cut < 60; ++cut) {
     const Trajectory t = read(text.substr(0, text.size() - 1 - cut), "a.csv");
     EXPECT_EQ(t.size(), 19U) << cut;
-    EXPECT_THAT(t.warnings[0].message, HasSubstr("cut off")) << cut;
+    EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.cut_off))) << cut;
   }
   EXPECT_EQ(read(text.substr(0, text.size() - 1), "a.csv").size(), 20U);
 }
@@ -511,8 +512,7 @@ TEST(Tum, TheHeaderDecidesTheOrderOfTheQuaternion) {
   }
   // Without one, a body that lies on its back says so.
   const Trajectory t = read(tum_drive("", true));
-  ASSERT_EQ(t.warnings.size(), 1U);
-  EXPECT_THAT(t.warnings[0].message, HasSubstr("qw qx qy qz"));
+  EXPECT_THAT(t.warnings, ElementsAre(Warns(kWarning.columns_guessed, {"qw qx qy qz"})));
   EXPECT_THAT(read(tum_drive("# timestamp tx ty tz qx qy qz qw\n", true)).warnings, IsEmpty());
 }
 
@@ -564,16 +564,17 @@ TEST(TrajectoryCsv, NamesWithUnitsInBrackets) {
   // What may be one thing or another is not guessed.
   const std::string yaw = replaced(good, "Heading", "Yaw"),
                     altitude = replaced(good, "Ellipsoidal height", "Alt");
-  EXPECT_THAT(fault(yaw + rows, "ins.csv"), HasSubstr("heading_deg"));
-  EXPECT_THAT(fault(altitude + rows, "ins.csv"), HasSubstr("ellipsoidal_height_m"));
+  EXPECT_THAT(fault(yaw + rows, "ins.csv"), NamesField("heading_deg"));
+  EXPECT_THAT(fault(altitude + rows, "ins.csv"), NamesField("ellipsoidal_height_m"));
   EXPECT_THAT(fault(replaced(yaw, "Ellipsoidal height", "Alt") + rows, "ins.csv"),
-              AllOf(HasSubstr("heading_deg"), HasSubstr("ellipsoidal_height_m")));
+              AllOf(NamesField("heading_deg"), NamesField("ellipsoidal_height_m")));
 }
 
 TEST(Kitti, IsRefusedBecauseItHasNoTimes) {
   const std::string text = "1 0 0 0.0 0 1 0 0 0 0 1 0\n0 -1 0 0.05 1 0 0 0 0 0 1 0\n";
-  EXPECT_THAT(fault(text), AllOf(HasSubstr("KITTI"), HasSubstr("time x y z qx qy qz qw")));
-  EXPECT_THAT(fault(replaced(text, "0 -1 0 0.05", "0 -2 0 0.05")), HasSubstr("known kind"));
+  EXPECT_THAT(fault(text), NamesField("KITTI"));
+  EXPECT_THAT(fault(replaced(text, "0 -1 0 0.05", "0 -2 0 0.05")),
+              AllOf(NamesField("a.txt"), Not(NamesField("KITTI"))));
 }
 
 TEST(InertialExplorer, TheDateDecidesBetweenSecondsOfDayAndOfWeek) {
@@ -619,10 +620,10 @@ TEST(InertialExplorer, TheDateDecidesBetweenSecondsOfDayAndOfWeek) {
       EXPECT_NEAR(1e-9 * static_cast<double>(t.time_ns[i]), wanted[i], 1e-6);
     }
   }
-  EXPECT_THAT(fault(text("(YMD)", {"2023/11/16"}, {200'000.0})), HasSubstr("second of the day"));
-  EXPECT_THAT(fault(text("(YMD)", {"2023/13/16"}, {55225.0})), HasSubstr("line 5"));
-  EXPECT_THAT(fault(text("(MDY)", {"2023/11/16"}, {55225.0})), HasSubstr("line 5"));
-  EXPECT_THAT(fault(text("(day)", {"2023/11/16"}, {55225.0})), HasSubstr("(YMD)"));
+  EXPECT_THAT(fault(text("(YMD)", {"2023/11/16"}, {200'000.0})), NamesField("200000"));
+  EXPECT_THAT(fault(text("(YMD)", {"2023/13/16"}, {55225.0})), NamesField("", 5));
+  EXPECT_THAT(fault(text("(MDY)", {"2023/11/16"}, {55225.0})), NamesField("", 5));
+  EXPECT_THAT(fault(text("(day)", {"2023/11/16"}, {55225.0})), NamesField("(YMD)"));
 }
 
 TEST(InertialExplorer, ColumnsWithoutAUnit) {
@@ -644,14 +645,14 @@ TEST(InertialExplorer, ColumnsWithoutAUnit) {
   }
   EXPECT_THAT(
       fault(text("       (sec)      (deg)               (m)     (deg)  (deg)    (deg)", names)),
-      HasSubstr("longitude"));
+      NamesField("longitude"));
 }
 
 TEST(Tum, WhatIsNoRotationIsRefused) {
-  EXPECT_THAT(
-      fault(kTum + "1305031102.4753 1.2 2.0 3.0 0.0 0.0 1.0 1.0\n"),
-      AllOf(HasSubstr("line 5"), HasSubstr("quaternion of length 1, found length 1.41421")));
-  EXPECT_THAT(fault(kTum + "1305031102.4753 1e9 2.0 3.0 0.0 0.0 1.0 0.0\n"), HasSubstr("position"));
+  EXPECT_THAT(fault(kTum + "1305031102.4753 1.2 2.0 3.0 0.0 0.0 1.0 1.0\n"),
+              NamesField("1.41421", 5));
+  EXPECT_THAT(fault(kTum + "1305031102.4753 1e9 2.0 3.0 0.0 0.0 1.0 0.0\n"),
+              NamesField("position", 5));
 }
 
 TEST(Rtklib, IsRefusedBecauseItHasNoAttitude) {
@@ -659,8 +660,7 @@ TEST(Rtklib, IsRefusedBecauseItHasNoAttitude) {
       "% program   : RTKPOST ver.2.4.2\n"
       "%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns\n"
       "2022/02/07 00:00:00.000   40.063710326  -105.222420012  1565.0000   1  12\n";
-  EXPECT_THAT(fault(text, "a.pos"), AllOf(HasSubstr("a.pos"), HasSubstr("RTKLIB"),
-                                          HasSubstr("neither roll nor pitch nor heading")));
+  EXPECT_THAT(fault(text, "a.pos"), AllOf(NamesField("a.pos"), NamesField("RTKLIB")));
 }
 
 TEST(TextFormats, EveryBeginningOfAFileIsReadOrRefused) {
@@ -694,7 +694,7 @@ TEST(TextFormats, OtherTextsAreNoTrajectory) {
     const std::string path = folder().file("other.csv");
     write_bytes(path, text);
     EXPECT_EQ(trajectory_file_kind(path), TrajectoryFileKind::none) << text;
-    EXPECT_THAT(fault(text, "other.csv"), HasSubstr("is not a trajectory of a known kind")) << text;
+    EXPECT_THAT(fault(text, "other.csv"), NamesField("other.csv")) << text;
   }
   EXPECT_EQ(trajectory_file_kind(folder().file("missing")), TrajectoryFileKind::none);
   EXPECT_THROW(load_trajectory(folder().file("missing")), FileError);
@@ -704,7 +704,7 @@ TEST(TextFormats, OtherTextsAreNoTrajectory) {
 TEST(TextFormats, UnknownEndingsListTheKnownOnes) {
   const Trajectory t = trajectory_of(KnownFlight(), 3);
   EXPECT_THAT(refusal([&] { write_trajectory(folder().file("a.xyz"), t); }),
-              HasSubstr("unknown ending, allowed .csv, .sbet"));
+              AllOf(NamesField("a.xyz"), NamesField(".csv"), NamesField(".sbet")));
   EXPECT_THROW(write_trajectory(folder().file("a.csv"), t, "tum"), InvalidArgument);
   EXPECT_THROW(write_trajectory(folder().file("a.csv"), {}), InvalidArgument);
   EXPECT_EQ(writable_trajectories().size(), 2U);

@@ -11,10 +11,11 @@
 
 #include "refusal.hpp"
 #include "trajectories/known_flight.hpp"
+#include "warning_codes.hpp"
 
 namespace risley::trajectories::trajectory_audit_test {
 
-using ::testing::HasSubstr;
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 TEST(TrajectoryAudit, SaysWhatATrajectoryHolds) {
@@ -48,17 +49,16 @@ TEST(TrajectoryAudit, GapsAndJumpsAreNamed) {
   ASSERT_EQ(audit.times.gaps.size(), 1U);
   EXPECT_EQ(audit.times.gaps[0].row, 299U);
   EXPECT_NEAR(audit.times.gaps_total_s, 2.0, 1e-9);
-  ASSERT_EQ(audit.warnings.size(), 1U);
-  EXPECT_THAT(audit.warnings[0].message, HasSubstr("1 gap without records, the longest 2.005 s"));
+  EXPECT_THAT(audit.warnings, ElementsAre(Warns(kWarning.trajectory_gaps, {"1 gap", "2.005 s"})));
   EXPECT_LT(audit.fastest, 24);  // not across the gap
 
   t = trajectory_of(KnownFlight(), 600);
   for (std::size_t i = 300; i < 600; ++i) t.position[i] += Eigen::Vector3d(30, 0, 0);
   t.attitude[400] = t.attitude[400] * Eigen::Quaterniond(0, 0, 0, 1);
   audit = audit_trajectory(t);
-  ASSERT_EQ(audit.warnings.size(), 2U);
-  EXPECT_THAT(audit.warnings[0].message, HasSubstr("m/s at 400826.500 s: it jumps"));
-  EXPECT_THAT(audit.warnings[1].message, HasSubstr("degrees per second at 400827.0"));
+  EXPECT_THAT(audit.warnings,
+              ElementsAre(Warns(kWarning.trajectory_jumps, {"m/s at 400826.500 s"}),
+                          Warns(kWarning.trajectory_jumps, {"degrees per second"})));
 }
 
 TEST(TrajectoryAudit, RecordsThatAreTooFewAreNamed) {
@@ -69,10 +69,9 @@ TEST(TrajectoryAudit, RecordsThatAreTooFewAreNamed) {
     t.position.emplace_back(i, 0, 0);
     t.attitude.push_back(ned_from_body({0, 0, 0.7 * i}));
   }
-  EXPECT_THAT(audit_trajectory(t).warnings[0].message,
-              HasSubstr("up to 40 degrees between records"));
+  EXPECT_THAT(audit_trajectory(t).warnings[0], Warns(kWarning.trajectory_gaps, {"40 degrees"}));
   t.time_scale = TimeScale::unknown;
-  EXPECT_THAT(audit_trajectory(t).warnings[1].message, HasSubstr("what the times count from"));
+  EXPECT_THAT(audit_trajectory(t).warnings[1], Warns(kWarning.clock_unknown));
 }
 
 TEST(TrajectoryAudit, OneRecordHasNoRate) {
@@ -94,14 +93,14 @@ TEST(AccuracyAudit, MediansAndWorst) {
   EXPECT_EQ(audit.times.gaps.size(), 1U);
   EXPECT_EQ(audit.times.rate_hz, 1);
   records.time_ns[3] = 0;
-  EXPECT_THAT(refusal([&] { audit_accuracies(records); }), HasSubstr("time_ns[3] = 0"));
-  EXPECT_THAT(refusal([] { audit_accuracies({}); }), HasSubstr("records = 0"));
+  EXPECT_THAT(refusal([&] { audit_accuracies(records); }), NamesField("time_ns[3]"));
+  EXPECT_THAT(refusal([] { audit_accuracies({}); }), NamesField("records"));
 }
 
 TEST(AngleWords, DegreesAndArcMinutes) {
   EXPECT_EQ(angle_words(radians_from_degrees(1.0 / 60)), "0.017 degree (1.0 arc-minute)");
   EXPECT_EQ(angle_words(radians_from_degrees(0.08)), "0.08 degree (4.8 arc-minutes)");
-  EXPECT_THAT(refusal([] { angle_words(std::nan("")); }), HasSubstr("angle = nan rad"));
+  EXPECT_THAT(refusal([] { angle_words(std::nan("")); }), NamesField("angle"));
 }
 
 TEST(RealAudit, LeewardsTrajectory) {

@@ -3,7 +3,6 @@
 #include "risley/wire/event_server.hpp"
 
 #include <chrono>
-#include <cstring>
 #include <memory>
 #include <string>
 #include <thread>
@@ -13,15 +12,12 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include "risley/core/error.hpp"
 #include "risley/wire/udp_socket.hpp"
 
 #include "refusal.hpp"
+#include "wire/connection.hpp"
 
 namespace risley::wire {
 namespace {
@@ -29,54 +25,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-/// A browser of bytes.
-class Connection {
- public:
-  explicit Connection(const Endpoint& to, int receive_buffer = 0)
-      : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
-    if (receive_buffer > 0) {
-      ::setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
-    }
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(to.port);
-    std::memcpy(&address.sin_addr, to.address.bytes.data(), to.address.bytes.size());
-    connected_ = ::connect(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
-  }
-  ~Connection() { ::close(socket_); }
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
-
-  bool connected() const { return connected_; }
-  bool send(const std::string& bytes) const {
-    return ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
-           static_cast<ssize_t>(bytes.size());
-  }
-  /// What comes until a text is in it, the other side ends, or nothing came for so long.
-  std::string read(const std::string& until, int milliseconds = 5000) {
-    std::string text;
-    pollfd waiting{socket_, POLLIN, 0};
-    while (text.find(until) == std::string::npos && ::poll(&waiting, 1, milliseconds) == 1) {
-      char bytes[4096];
-      const ssize_t count = ::recv(socket_, bytes, sizeof bytes, 0);
-      if (count <= 0) {
-        ended_ = true;
-        break;
-      }
-      text.append(bytes, count);
-    }
-    return text;
-  }
-  bool ended() const { return ended_; }
-
- private:
-  int socket_;
-  bool connected_ = false, ended_ = false;
-};
-
-const std::string kNever = "\x01 never \x01";
-constexpr Address kLoopback{{127, 0, 0, 1}};
 
 class EventServerTest : public ::testing::Test {
  protected:
@@ -226,7 +174,7 @@ TEST_F(EventServerTest, AThousandConnectionsLeaveItAlive) {
 
 TEST_F(EventServerTest, APortThatIsTakenIsRefused) {
   EXPECT_THAT(refusal<NetworkError>([&] { EventServer other(server_->local(), {}); }),
-              HasSubstr("another program has this port"));
+              HasSubstr("another program uses this port"));
   EXPECT_THROW(EventServer(Endpoint{Address{}, 0}, {}), InvalidArgument);
 }
 

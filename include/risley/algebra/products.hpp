@@ -5,9 +5,9 @@
 #include <Eigen/Core>
 
 /// @file
-/// Products of matrices whose sizes are only known when running. They are compiled here once: the
-/// products of Eigen's own expressions take seconds of compilation in every file that has one.
-/// All throw InvalidArgument for sizes that do not fit.
+/// Products of matrices with sizes known only at run time. They are compiled once here: Eigen's own
+/// product expressions take seconds of compilation in every file that uses one. All throw
+/// InvalidArgument for sizes that do not fit.
 namespace risley::algebra {
 
 /// A B
@@ -22,9 +22,10 @@ Eigen::VectorXd transposed_times(const Eigen::MatrixXd& a, const Eigen::VectorXd
 void add_transposed_product(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, Eigen::Index rows,
                             Eigen::MatrixXd& sum);
 
-/// J C J^T: covariance of what depends on quantities of covariance C with derivatives J.
+/// J C J^T: covariance of functions, with derivatives J, of quantities of covariance C.
 Eigen::MatrixXd propagated(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& covariance);
-/// J^T H J: normal equations H in the unknowns that those of H depend on with derivatives J.
+/// J^T H J: normal equations H, transformed to unknowns on which those of H depend with derivatives
+/// J.
 Eigen::MatrixXd pulled_back(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& hessian);
 
 }  // namespace risley::algebra

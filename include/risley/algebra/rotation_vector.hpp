@@ -14,7 +14,7 @@ namespace risley::algebra {
 inline Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& q) {
   const double sign = q.w() < 0 ? -1 : 1;
   const double sine = q.vec().norm();
-  // angle / sine of half of it; 2 to all digits for small ones
+  // angle / sine of half of it; 2 to full precision for small angles
   const double factor = sine < 1e-9 ? 2 : 2 * std::atan2(sine, sign * q.w()) / sine;
   return sign * factor * q.vec();
 }
@@ -33,10 +33,10 @@ inline Eigen::AngleAxisd rotation_by(const Eigen::Vector3d& vector) {
 }
 
 /// Below this angle, rad, series replace sine and cosine: they are exact to the last digit there,
-/// and hold for the time between records of any navigation system.
+/// and cover the record interval of any navigation system.
 inline constexpr double kSmallTurn = 0.02;
 
-/// The same as a quaternion, fast for small ones.
+/// The same as a quaternion, fast for small angles.
 inline Eigen::Quaterniond turned_by(const Eigen::Vector3d& vector) {
   const double squared = vector.squaredNorm();
   double cosine = 0, factor = 0;  // of half the angle; its sine over the angle
@@ -51,7 +51,7 @@ inline Eigen::Quaterniond turned_by(const Eigen::Vector3d& vector) {
   return {cosine, factor * vector.x(), factor * vector.y(), factor * vector.z()};
 }
 
-/// Angular velocity, in the axes that are turned, where a rotation vector changes at a rate.
+/// Angular velocity, in the rotated axes, of a rotation vector that changes at a given rate.
 inline Eigen::Vector3d angular_velocity_of(const Eigen::Vector3d& vector,
                                            const Eigen::Vector3d& rate) {
   const double squared = vector.squaredNorm();
@@ -68,7 +68,7 @@ inline Eigen::Vector3d angular_velocity_of(const Eigen::Vector3d& vector,
   return rate - first * across + second * vector.cross(across);
 }
 
-/// The matrix that multiplied by w gives the cross product v x w.
+/// The matrix of the cross product: times w it gives v x w.
 inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
   m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;

@@ -12,12 +12,12 @@ namespace risley::algebra {
 /// differ by many orders of magnitude.
 class SymmetricSolver {
  public:
-  /// @param matrix   [n, n], the lower triangle of which is read
+  /// @param matrix  [n, n], only the lower triangle is read
   /// @param damping  added to the diagonal of ones
   /// @throws InvalidArgument for a matrix that is not square or a damping below 0
   explicit SymmetricSolver(const Eigen::MatrixXd& matrix, double damping = 0);
 
-  /// Whether all pivots are above 0 and finite: no direction is without information.
+  /// Whether all pivots are above 0 and finite: every direction has information.
   bool positive() const { return positive_; }
 
   /// x of A x = b. Directions without information come out as zero, and NaN as NaN.
@@ -52,18 +52,18 @@ struct PrincipalAxes {
   Eigen::MatrixXd vectors;
 };
 
-/// @param matrix  symmetric [n, n], the lower triangle of which is read
+/// @param matrix  symmetric [n, n], only the lower triangle is read
 /// @throws InvalidArgument for a matrix that is not square
 PrincipalAxes principal_axes(const Eigen::MatrixXd& matrix);
 
-/// Inverse of normal equations in which some directions may have no information: what follows from
-/// the others, zero along them. Rounding decides below a ten-trillionth of the unit diagonal.
+/// Inverse of normal equations in which some directions may have no information; it is zero along
+/// these. Pivots below a ten-trillionth of the unit diagonal count as rounding.
 /// @param matrix  symmetric [n, n], positive or semidefinite
 /// @throws InvalidArgument for a matrix that is not square
 Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& matrix);
 
 /// Covariance [rows, rows] of linear combinations of unknowns, from the unknowns' normal equations.
-/// A combination of which a direction without information is part has an infinite variance, and
+/// A combination that includes a direction without information has an infinite variance, and
 /// covariances of 0.
 /// @param normal        as for pseudo_inverse [n, n]
 /// @param combinations  [rows, n]

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The fields of one serialised message, taken from the front. Both kinds of serialisation have the
-// same names, so that a decoder can be written once.
+// The fields of one serialised message, taken from the front. Both kinds of serialisation use the
+// same member names, so that a decoder can be written once.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@
 
 namespace risley::bags {
 
-/// Checks that a sequence can stand in what is left of its message. @throws BadMessage
+/// Checks that a sequence fits into the rest of its message. @throws BadMessage
 void require_room(std::string_view what, std::uint64_t count, std::size_t bytes_each,
                   std::size_t bytes_left);
 
@@ -29,7 +29,7 @@ class Ros1Fields {
 
   std::size_t left() const { return left_.size(); }  ///< bytes that have not been read yet
 
-  /// @param what  of which bytes, for the message. @throws BadMessage
+  /// @param what  describes the elements in these bytes, for the message  @throws BadMessage
   std::span<const std::uint8_t> take(std::size_t count, std::string_view what) {
     require_room(what, count, 1, left());
     const auto taken = left_.first(count);
@@ -58,6 +58,10 @@ class Ros1Fields {
     require_room(what, count, bytes_each, left());
     return count;
   }
+
+  /// Bytes from one element of a sequence to the next.
+  static std::size_t step(std::size_t bytes, std::size_t) { return bytes; }
+  bool big_endian() const { return false; }  ///< never
 
   /// @throws BadMessage
   void require_end() const {
@@ -91,8 +95,14 @@ class CdrFields {
   /// Length of a sequence whose elements have at least this many bytes. @throws BadMessage
   std::uint32_t length(std::string_view what, std::size_t bytes_each);
 
-  /// A sequence of bytes behind its length. @throws BadMessage
-  std::span<const std::uint8_t> byte_sequence(std::string_view what);
+  /// @param what  describes the elements in these bytes, for the message  @throws BadMessage
+  std::span<const std::uint8_t> take(std::size_t count, std::string_view what);
+
+  /// Bytes from one element of a sequence to the next; the first number determines the size.
+  static std::size_t step(std::size_t bytes, std::size_t alignment) {
+    return (bytes + alignment - 1) / alignment * alignment;
+  }
+  bool big_endian() const;  ///< as the message says
 
   /// Nothing: CDR may end with padding.
   void require_end() const {}
@@ -107,6 +117,7 @@ struct Header {
   std::int64_t seconds = 0;
   std::uint32_t nanoseconds = 0;
   std::string frame;
+  std::uint32_t sequence = 0;  ///< of ROS 1
 };
 
 /// @throws BadMessage

@@ -30,25 +30,25 @@ enum class CalibrationMethod {
   paper,       ///< unweighted point-to-plane distances, SVD planes                [B21 Eq. (32)]
 };
 
-/// Formal sigma of the shared rotation above which a user is warned, rad (0.05 degree).
+/// Formal sigma of the shared rotation above which a warning is given, rad (0.05 degree).
 inline constexpr double kPoorDatum = 8.7266462599716477e-4;
 
 /// A direction of the parameter space wider than this after the data makes a calibration fail, in
 /// prior sigmas of the parameters (1 degree, 0.01 in an index).
 inline constexpr double kWidestDirection = 0.5;
 
-/// Whether recordings from unknown poses saw the same walls, whose shape they then share.
+/// Whether recordings from unknown poses saw the same walls and so share their shape.
 enum class SameWalls {
-  if_found,  ///< where their planes fit in one way only
+  if_found,  ///< if their planes fit in one way only
   yes,       ///< or there is no calibration
   no,
 };
 
-/// How a calibration on planes is made, and what it may assume.
+/// Method and assumptions of a calibration on planes.
 struct CalibrationOptions {
   CalibrationMethod method = CalibrationMethod::adjustment;
   sensors::Sensor sensor;  ///< noise, geometry, name; its errors are not used
-  /// Default free parameters to hold, at the believed value or at one that is given, SI units.
+  /// Default free parameters to hold, at the believed value or a given one, SI units.
   std::vector<std::pair<std::string, std::optional<double>>> fixed;
   std::vector<std::string> additional;  ///< further parameters to free
   std::optional<double> range_noise;    ///< 1 sigma, m, default the sensor's
@@ -57,28 +57,28 @@ struct CalibrationOptions {
   /// Root mean square error of directions up to which a unit counts as sound, rad; default the
   /// sensor's specification. 0: every significant error is too large.
   std::optional<double> tolerance;
-  bool beam_origin = true;  ///< beams start where they leave the last prism
-  /// Of the walls. Without parameters they are exact planes, and ranges have a constant error
-  /// alone: what the paper assumes.
+  bool beam_origin = true;  ///< beams start at the exit point of the last prism
+  /// Of the walls. Without parameters they are exact planes, and ranges have only a constant error,
+  /// as the paper assumes.
   ShapePrior shape = building_walls();
-  /// How far patches of another reflectivity may stand off their wall, m: as much of the error that
-  /// depends on intensity cannot be separated from it. 0 for painted patches and boards let into a
-  /// wall.
+  /// Largest offset of patches of another reflectivity from their wall, m: this much of the
+  /// intensity-dependent error cannot be separated from it. 0 for painted patches and boards let
+  /// into a wall.
   double patch_thickness = 0.01;
   std::optional<scenes::Scene> planes;  ///< known normals, as seen from the scene's origin
   /// The station of each recording [recordings]; empty: unknown poses, or the origin of the scene
-  /// where planes are given.
+  /// if planes are given.
   std::vector<scenes::Station> stations;
   SameWalls same_walls = SameWalls::if_found;  ///< without planes and stations
   std::uint64_t seed = 0;                      ///< of the search for planes
 };
 
-/// A size of the prisms or a range error that a calibration adjusted, by its name in presets.
+/// An adjusted size of the prisms or range error, by its name in presets.
 struct CalibratedNumber {
   std::string name;
   double value = 0, prior = 0, prior_sigma = 0;  ///< SI
-  double sigma = 0;        ///< if everything that was held were exactly as held, SI
-  double total_sigma = 0;  ///< what was held included, SI
+  double sigma = 0;                              ///< if all held quantities were exact, SI
+  double total_sigma = 0;                        ///< what was held included, SI
 };
 
 /// One wall in one recording.
@@ -89,13 +89,13 @@ struct CalibratedPlane {
   double distance = 0;     ///< from the sensor's origin, m
   Plane believed;          ///< fitted to the points of the believed parameters, sensor frame
   std::size_t points = 0;
-  /// Shots that lie near the plane (within ten sigmas) and were not used.
+  /// Shots near the plane (within ten sigmas) that were not used.
   std::size_t outliers = 0;
   double rms = 0;          ///< of point-to-plane distances after the calibration, m
   double rms_before = 0;   ///< the same with the believed parameters, of the believed plane, m
   double range_sigma = 0;  ///< of one range, found by variance components, m
-  /// Root mean square of what the wall deviates from its plane by where shots met it, m, and the
-  /// length over which it does so; 0 where walls are taken as flat.
+  /// Root mean square deviation of the wall from its plane at the shots, m, and its correlation
+  /// length; 0 if walls are taken as flat.
   double shape_sigma = 0, shape_length = 0;
 };
 
@@ -125,23 +125,23 @@ struct Calibration {
   std::vector<Warning> warnings;
   CalibrationMethod method = CalibrationMethod::adjustment;
   sensors::Sensor sensor;  ///< calibrated, with covariance
-  PrismTrain believed;     ///< what the sensor computed directions with
+  PrismTrain believed;     ///< with which the sensor computed directions
   std::vector<estimation::FreeParameter> free;
   Eigen::VectorXd parameters;  ///< [free], SI
-  /// [free, free], common errors of the rotation angles and the shape of the walls included, if
-  /// everything that was held were exactly as held.
+  /// [free, free], common errors of the rotation angles and the shape of the walls included, if all
+  /// held quantities were exact.
   Eigen::MatrixXd covariance;
   /// Sizes of the prisms and range errors: range_offset_m, range_near_m, ...
   std::vector<CalibratedNumber> numbers;
-  /// What was held and may be off, and by how much a sigma of each changes parameters and numbers
-  /// [free, held], [numbers, held]. An error in one makes up for the other in the beams'
+  /// Held parameters that may be wrong, and the effect of one sigma of each on parameters and
+  /// numbers [free, held], [numbers, held]. An error in one compensates for the other in the beams'
   /// directions.
   std::vector<std::string> held;
   Eigen::MatrixXd held_changes, number_held_changes;
 
-  /// Sigma of a free parameter, what was held included.
+  /// Sigma of a free parameter, held quantities included.
   double total_sigma(std::size_t parameter) const;
-  /// One of the numbers, or nullptr where it was not adjusted.
+  /// One of the numbers, or nullptr if it was not adjusted.
   const CalibratedNumber* number(std::string_view name) const;
   std::vector<CalibratedPlane> planes;
   std::vector<SurfaceStep> steps;
@@ -149,37 +149,36 @@ struct Calibration {
   bool same_walls = false;
   DatumKind datum_kind = DatumKind::none;
   FormalDatum datum;                 ///< after, everything included
-  FormalDatum datum_given_held;      ///< if everything that was held were exactly as held
+  FormalDatum datum_given_held;      ///< if all held quantities were exact
   FormalDatum datum_without_common;  ///< without the common errors of the rotation angles
   PointingError pointing_error;      ///< of the directions that the sensor reports
-  double tolerance = 0;              ///< that pointing_error was judged by, rad; 0: none
+  double tolerance = 0;              ///< used for the verdict on pointing_error, rad; 0: none
   /// That calibrated directions are nearer to the truth than reported ones, root mean square over
-  /// the beams, if everything that was held is as held. docs/theory/calibration.md
+  /// the beams, if held values are exact. docs/theory/calibration.md
   double better_probability = 1;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PriorTest> prior_tests;
   bool unit_doubted = false;  ///< of the ranges, which no recording states
   double sigma0 = 0;          ///< standard deviation of unit weight against the stated range noise
-  /// How far the walls deviate from planes, mean after the data; all 0 where they are taken as
-  /// flat.
+  /// Deviation of the walls from planes, mean after the data; all 0 if they are taken as flat.
   ShapeParameters shape;
   int iterations = 0;  ///< of the longest adjustment, the one that starts from the believed values
-  /// What the recordings together say of the believed parameters moves the rotation angles of each
-  /// by this [recordings][prisms], rad.
+  /// Shift of each recording's rotation angles due to the common estimate of the believed
+  /// parameters [recordings][prisms], rad.
   std::vector<std::vector<double>> angle_shift;
   double rms_before = 0, rms_after = 0;  ///< over all planes, m
   std::size_t points = 0;                ///< used
   std::vector<ThicknessProfile> profiles;
-  /// Row of planes that each shot was used for, -1: none [recordings][shots].
+  /// Row of planes for which each shot was used, -1: none [recordings][shots].
   std::vector<std::vector<int>> plane_of_shot;
 };
 
-/// Calibrates a sensor on the walls that its recordings saw.
-/// @throws EstimationError when there is nothing to calibrate on: no plane, points on one line,
-///         recordings of different sensors, stations or planes that contradict the data
+/// Calibrates a sensor on the walls in its recordings.
+/// @throws EstimationError when there is no basis for a calibration: no plane, points on one line,
+/// recordings of different sensors, stations or planes that contradict the data
 /// @throws InvalidArgument for unknown parameters, stations that do not match the recordings, noise
-///         or sigmas out of their ranges, columns or matrices that do not belong to a recording's
-///         prisms, shots and free parameters
+/// or sigmas out of range, columns or matrices that do not match a recording's prisms, shots and
+/// free parameters
 Calibration calibrate(const std::vector<RangedRecording>& recordings,
                       const CalibrationOptions& options, const Progress& progress = {});
 

@@ -18,7 +18,7 @@
 
 namespace risley::calibration {
 
-/// A calibration that somebody thinks of making.
+/// A planned calibration.
 struct CalibrationPlan {
   sensors::Sensor sensor;
   /// Walls, and the stations to scan them from; without stations one scan from the origin. Normals
@@ -51,41 +51,41 @@ struct CalibrationForecast {
   double range_offset_sigma = 0;  ///< m
   DatumKind datum_kind = DatumKind::none;
   FormalDatum datum;
-  /// Of a plan with one pose before walls that have shape: if half of the time went to a second one
-  /// before the same walls, rolled by 180 degrees on the spot by an unknown turn.
+  /// For a plan with one pose before walls that have shape: if half of the time went to a second
+  /// pose before the same walls, rolled by 180 degrees on the spot by an unknown angle.
   std::optional<FormalDatum> rolled;
   std::vector<estimation::WeakDirection> unobservable;
   std::vector<PlannedWall> walls;
   double shots = 0;                 ///< with a return, of all recordings
-  std::vector<std::string> advice;  ///< what would make it better, in words
+  std::vector<std::string> advice;  ///< possible improvements, in words
 };
 
 /// Cramer-Rao bound of the calibration: the normal equations of the default method at the sensor's
-/// parameters for shots that meet the scene, with walls of the plan's shape,
-/// whatever the scene's are. Wrong indices come on top. A sample of the shots stands for all.
+/// parameters for shots that meet the scene, with walls of the plan's shape, whatever the scene's
+/// walls are. Wrong indices come on top. A sample represents all shots.
 /// @throws EstimationError when no shot meets a wall; Cancelled; InvalidArgument for a duration,
 ///         rate, noise or sigma out of its range, and as calibration_parameters()
 CalibrationForecast forecast(const CalibrationPlan& plan, const Progress& progress = {});
 
-/// What an adjustment estimates, and what it knows of it before.
+/// The unknowns of an adjustment, and their priors.
 struct AdjustedParameters {
   std::vector<estimation::FreeParameter> free;
   std::vector<double> prior_sigma;  ///< [free], SI; infinite: nothing
 };
 
-/// The free parameters of a calibration and, with what the sensor states of them as priors, the
-/// tilts that walls determine and directions do not: prism A's horizontal one, by default; also the
-/// lean of a last axis that has one.
-/// @param angle_sigma  prior sigma of every angle, rad; none: only those of these tilts
+/// The free parameters of a calibration and, with the sensor's sigmas as priors, the tilts that
+/// walls determine and directions do not: prism A's horizontal one, by default; also the lean of a
+/// last axis that has one.
+/// @param angle_sigma  prior sigma of every angle, rad; none: only for these tilts
 /// @throws InvalidArgument as calibration_parameters()
 AdjustedParameters adjusted_parameters(const sensors::Sensor& sensor,
                                        const std::vector<std::string>& fixed,
                                        const std::vector<std::string>& additional,
                                        std::optional<double> angle_sigma);
 
-/// Free parameters of a calibration: what walls can determine, less the fixed ones plus the others.
-/// The refractive index is held unless asked for, since the recording itself determines it better;
-/// so is a lean of the last axis, which is known no better than the walls' poses.
+/// Free parameters of a calibration: those that walls can determine, less the fixed ones plus the
+/// others. The refractive index is held unless requested, since the recording itself determines it
+/// better; so is a lean of the last axis, which is known no better than the walls' poses.
 /// @throws InvalidArgument for a name that is no parameter of the prisms, or is in both lists
 std::vector<estimation::FreeParameter> calibration_parameters(
     TrainShape shape, const std::vector<std::string>& fixed,

@@ -8,11 +8,11 @@ namespace risley::calibration {
 
 /// What a calibration comes to. The codes are stable: scripts read them.
 enum class CalibrationCode {
-  as_believed,           ///< walls or strips confirm what the sensor believes of itself
-  off_within_tolerance,  ///< the beam goes elsewhere, significantly, but less than is tolerated
-  bent,                  ///< the beam goes elsewhere, significantly and more than is tolerated
-  not_better,            ///< parameters moved, and walls are no flatter, strips no closer for it
-  undecided,             ///< the data cannot decide, or contradict what is stated
+  as_believed,           ///< walls or strips confirm the sensor's own parameters
+  off_within_tolerance,  ///< beams differ significantly, but within the tolerance
+  bent,                  ///< beams differ significantly and beyond the tolerance
+  not_better,            ///< parameters moved, but walls became no flatter, or strips no closer
+  undecided,             ///< the data cannot decide, or contradict stated values
 };
 
 /// "as_believed", ...

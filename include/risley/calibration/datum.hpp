@@ -14,67 +14,67 @@
 
 namespace risley::calibration {
 
-/// Errors of directions, split into the rotation that all beams share (the gauge: only a datum from
-/// outside can see it) and what is left (the shape of the bundle of beams, which walls do see).
+/// Errors of directions, split into the rotation common to all beams (the gauge, which only an
+/// external datum can determine) and the rest (the shape of the beam bundle, which walls reveal).
 struct DirectionErrors {
   double azimuth_rmse = 0, zenith_rmse = 0;  ///< rad
   double azimuth_bias = 0, zenith_bias = 0;  ///< mean, rad
   double total = 0;                          ///< sqrt(azimuth_rmse^2 + zenith_rmse^2), rad
   double gauge = 0;          ///< RMS over the beams of the best-fitting rigid rotation, rad
-  double shape = 0;          ///< RMS of what is left, rad
+  double shape = 0;          ///< RMS of the remainder, rad
   Vector3<double> rotation;  ///< the best-fitting one: roll, pitch, yaw about X, Y, Z, rad
 };
 
-/// @param computed, truth  unit vectors of the same beams; pairs with a NaN are left out
+/// @param computed, truth  unit vectors of the same beams; pairs with a NaN are skipped
 DirectionErrors direction_errors(std::span<const Vector3<double>> computed,
                                  std::span<const Vector3<double>> truth);
 
-/// What a covariance of parameters means for the beams. A shot's own rotation angles add their
-/// noise to its direction, which is no part of this.
+/// Effect of a parameter covariance on the beams. A shot's own rotation angles add their noise to
+/// its direction; it is not included here.
 struct FormalDatum {
   double sigma_roll = 0, sigma_pitch = 0, sigma_yaw = 0;  ///< of the shared rotation, rad
   double gauge = 0, shape = 0, total = 0;                 ///< expected RMS over the beams, rad
 };
 
-/// What independent quantities that were held do to the beams, each when it is off by one sigma: to
-/// the train, its free parameters included, to the rotation angles, and to all beams together.
+/// Effect of independent held quantities on the beams, each for an error of one sigma: on the
+/// train, its free parameters included, on the rotation angles, and on all beams together.
 struct HeldMovement {
   Eigen::MatrixXd train;            ///< flat vector [places, held], SI
   Eigen::MatrixXd rotation_angles;  ///< [prisms, held], rad
   Eigen::MatrixXd turn;  ///< rotation of the bundle about X, Y, Z [3, held], rad; empty: none
 };
 
-/// How wrong the directions are that a sensor reports, as a calibration has it.
+/// Errors of the reported directions according to a calibration.
 struct PointingError {
   DirectionErrors errors;  ///< reported minus calibrated
   /// Of errors.total, gauge and shape, to first order in the covariance of the calibration, rad.
   double total_sigma = 0, gauge_sigma = 0, shape_sigma = 0;
-  double total_sigma_given_held = 0;  ///< as if what was held were true, rad
-  /// Of the beam with the largest, without the rotation that all share, rad.
+  double total_sigma_given_held = 0;  ///< as if held values were exact, rad
+  /// Of the beam with the largest, without the rotation common to all, rad.
   double worst_shape = 0, worst_shape_sigma = 0;
 };
 
-/// Whether what was held may be wrong.
+/// Whether errors of held quantities are included.
 enum class HeldErrors { included, left_out };
 
-/// Beams that get through a train, and how their directions follow its free parameters and what was
-/// held.
+/// Beams that get through a train, and the derivatives of their directions with respect to free
+/// parameters and held quantities.
 class BeamBundle {
  public:
   /// @param rotation_angles  [prisms][beams], rad
   /// @param emitter          of every beam, from 0; empty: all the first
   /// @param held             without columns: nothing was
-  /// @throws InvalidArgument where lengths do not match or no beam gets through
+  /// @throws InvalidArgument if lengths do not match or no beam passes the prisms
   BeamBundle(const PrismTrain& train, const std::vector<estimation::FreeParameter>& free,
              const std::vector<std::vector<double>>& rotation_angles,
              std::span<const std::uint8_t> emitter = {}, const HeldMovement& held = {});
 
-  /// What a covariance means for the beams.
+  /// Effect of a covariance on the beams.
   /// @param covariance  of the free parameters [free, free], SI
   FormalDatum formal_datum(const Eigen::MatrixXd& covariance,
                            HeldErrors held = HeldErrors::included) const;
 
-  /// @param believed    what the sensor computes directions with
+  /// @param believed  with which the sensor computes directions
   /// @param covariance  of the free parameters [free, free], SI
   /// @throws InvalidArgument as direction_errors()
   PointingError pointing_error(const PrismTrain& believed, const Eigen::MatrixXd& covariance) const;
@@ -100,19 +100,19 @@ class BeamBundle {
   Eigen::Index free_ = 0, held_ = 0;  ///< quantities
   std::vector<Beam> beams_;
   Eigen::Matrix3d normal_ = Eigen::Matrix3d::Zero();
-  Eigen::MatrixXd turn_;  ///< the shared rotation that each quantity makes [3, free + held]
+  Eigen::MatrixXd turn_;  ///< the shared rotation due to each quantity [3, free + held]
 };
 
 /// Probability that the calibration's directions are nearer to the truth than the reported ones, if
-/// what was held is true. Where these differ by d, the calibration is worse when its own error
+/// held values are exact. Where these differ by d, the calibration is worse when its own error
 /// along d is below -d / 2.
 double better_probability(const PointingError& error);
 
-/// Probability that a root mean square error is larger than is tolerated.
+/// Probability that a root mean square error exceeds the tolerance.
 /// @param error, sigma, tolerance  rad
 double beyond_probability(double error, double sigma, double tolerance);
 
-/// What ties the frame of the calibrated beams to the outside.
+/// The external reference of the calibrated beams' frame.
 enum class DatumKind {
   none,      ///< walls of unknown orientation: boresight only through the bundle's shape
   planes,    ///< normals of walls known in the sensor's frame

@@ -15,7 +15,7 @@
 
 namespace risley::calibration {
 
-/// What is known of a plane before a flight.
+/// Prior knowledge of a plane before a flight.
 struct PlanePrior {
   std::size_t plane = 0;
   Eigen::Vector3d place{0, 0, 0};  ///< on it, local frame, m
@@ -30,24 +30,23 @@ struct FlightPriors {
   Eigen::VectorXd mean;                ///< [globals], SI; the boresight as a rotation vector
   Eigen::MatrixXd information;       ///< [globals, globals], inverse of its covariance; 0: nothing
   std::vector<bool> held{};          ///< [globals]: not to be adjusted; empty: none
-  std::vector<PlanePrior> planes{};  ///< of those that are known, at most one for each
+  std::vector<PlanePrior> planes{};  ///< of the known ones, at most one for each
   std::vector<ProcessBreak> breaks{};  ///< of the process, at knots of the model
 };
 
 /// Values of the unknowns [globals], the boresight as a rotation vector of up to half a turn.
 Eigen::VectorXd unknown_values(const FlightModel& model);
 
-/// Derivatives of unknown_values() by the unknowns [globals, globals]: the identity but for the
-/// boresight, whose unknowns are rotations after the one there is.
+/// Derivatives of unknown_values() with respect to the unknowns [globals, globals]: the identity
+/// except for the boresight, where the unknowns are rotations after the current one.
 Eigen::MatrixXd value_rates(const FlightModel& model);
 
 /// Normal equations with the planes eliminated and factorised: unknowns are the corrections at all
-/// knots, six by six, and behind them the globals.
+/// knots, six by six, followed by the globals.
 class FlightSystem {
  public:
-  /// @throws InvalidArgument for sizes that do not fit, EstimationError when the equations
-  /// determine some
-  ///         unknown nothing at all and no prior does
+  /// @throws InvalidArgument for sizes that do not fit, EstimationError when neither the equations
+  /// nor a prior determine some unknown
   FlightSystem(const FlightEquations& equations, const FlightModel& model,
                const FlightPriors& priors);
   FlightSystem(FlightSystem&&) noexcept;
@@ -57,18 +56,19 @@ class FlightSystem {
   Eigen::Index size() const;     ///< 6 knots + globals
   Eigen::Index globals() const;  ///< of these
 
-  /// Solution of the equations: what to add to all unknowns [size], and to the planes' [3, planes].
+  /// Solution of the equations: the increments of all unknowns [size], and of the planes' [3,
+  /// planes].
   struct Step {
     Eigen::VectorXd unknowns;
     Eigen::MatrixXd planes;
-    /// By how much the cost would fall beyond what the planes alone could do, in squared sigmas.
+    /// Decrease of the cost beyond that of the planes alone, in squared sigmas.
     double promised = 0;
   };
-  /// The Gauss-Newton step that these equations ask for.
+  /// The Gauss-Newton step of these equations.
   Step step() const;
 
-  /// Columns of the inverse of the equations times `right` [size, columns]; rows of what is held
-  /// count nothing.
+  /// Columns of the inverse of the equations times `right` [size, columns]; rows of held unknowns
+  /// are ignored.
   Eigen::MatrixXd solve(const Eigen::MatrixXd& right) const;
   /// The planes' part of such columns [3 planes, columns].
   Eigen::MatrixXd planes_of(const Eigen::MatrixXd& solution) const;
@@ -84,7 +84,7 @@ class FlightSystem {
   Band inverse_band() const;
   /// Diagonal of inverse() [size], in less memory than the whole.
   Eigen::VectorXd inverse_diagonal() const { return inverse_band().diagonal; }
-  /// By how much the unknowns move where a held global is off by one unit [size, held].
+  /// Shift of the unknowns for an error of one unit in a held global [size, held].
   Eigen::MatrixXd held_changes() const;
   /// The priors' part of the equations times columns [size, columns].
   Eigen::MatrixXd prior_times(const Eigen::MatrixXd& columns) const;
@@ -97,17 +97,17 @@ class FlightSystem {
 /// Adds a step to a model.
 void apply(const FlightSystem::Step& step, FlightModel& model);
 
-/// When an adjustment in flight stops, and how it weighs the ground.
+/// Convergence criteria of an adjustment in flight, and its weighting of the ground.
 struct FlightAdjustmentOptions {
   int most_steps = 10;
   double tolerance = 1e-2;  ///< done when a step promises less, in squared sigmas
-  /// Columns of a cell that leans as its surroundings do, but for noise, are those of its
-  /// surroundings; its plane is adjusted as ever.
+  /// Columns of a cell that differs from its surroundings only by noise are those of its
+  /// surroundings; its plane is adjusted normally.
   bool smooth = false;
   InstructionSet set = best_instruction_set();
 };
 
-/// What an adjustment in flight arrived at.
+/// Result of an adjustment in flight.
 struct FlightAdjustment {
   FlightModel model;  ///< adjusted
   int steps = 0;
@@ -117,16 +117,16 @@ struct FlightAdjustment {
   std::size_t shots = 0, lost = 0, outliers = 0;
 };
 
-/// Gauss-Newton steps on shots whose planes are given.
-/// @throws EstimationError when steps grow beyond all bounds; as flight_equations, FlightSystem
+/// Gauss-Newton steps on shots with given planes.
+/// @throws EstimationError when steps grow without bound; as flight_equations, FlightSystem
 FlightAdjustment adjust_flight(const FlightShots& shots, const ShotPoses& poses,
                                const PlaneOfShot& plane, FlightModel model,
                                const FlightWeights& weights, const FlightPriors& priors,
                                const FlightAdjustmentOptions& options = {},
                                const Progress& progress = {});
 
-/// How ground departs from its planes, which all strips see alike: a covariance between the patches
-/// of a cell, of some cells that stand for all.
+/// Departure of the ground from its planes, the same for all strips: a covariance between the
+/// patches of a cell, of some cells that represent all.
 struct RoughGround {
   static constexpr int kSide = 3;                 ///< patches along a side of a cell
   static constexpr int kPatches = kSide * kSide;  ///< of a cell
@@ -137,11 +137,11 @@ struct RoughGround {
   double cells_for_each = 1;       ///< that counts
 };
 
-/// How far linear functions of the solution are off.
+/// Errors of linear functions of the solution.
 /// @param functionals  [size, functions], of the unknowns of the system
-/// @return covariance of all [functions, functions]: of the ranges' own noise, of the white noise
-///         of the attitude that the shots of a sample share, of what the trajectory's process does
-///         between knots, and of the priors, whatever the weights were
+/// @return covariance of all [functions, functions]: of the ranges' own noise, of the white
+/// attitude noise common to the shots of a sample, of the trajectory's process between knots, and
+/// of the priors, whatever the weights were
 /// @param ground  rough ground, or nullptr: planes
 /// @throws as flight_equations
 Eigen::MatrixXd flight_covariance(const FlightShots& shots, const ShotPoses& poses,

@@ -48,7 +48,7 @@ struct FlightUnknowns {
   int size() const { return attitude_delay() + (delay ? 1 : 0); }
 };
 
-/// Everything that the range of a shot is predicted from. A point p of the sensor's frame is at
+/// The quantities that predict the range of a shot. A point p of the sensor's frame is at
 ///
 ///     position + R (lever_arm + nominal * boresight * p),
 ///
@@ -67,11 +67,11 @@ struct FlightModel {
   Eigen::MatrixXd corrections;  ///< [6, knots], see kCorrections
   std::vector<GroundPlane> planes;
 
-  /// Where given, a drift of the clock of 0 about this time, ns, is one more unknown: its
-  /// derivatives say how much of one there is.
+  /// If given, a drift of the clock of 0 about this time, ns, is one more unknown: its derivatives
+  /// give the drift.
   std::optional<std::int64_t> drift_about_ns;
-  /// One more unknown: by how much the attitudes of the trajectory are late, now by 0 s. A record
-  /// then has the attitude that the body had so long before the record's time.
+  /// One more unknown: the delay of the trajectory's attitudes, now 0 s. A record then has the
+  /// attitude of the body that long before the record's time.
   bool attitude_delay = false;
 
   /// The unknowns of this model beside the knots and the planes.
@@ -88,14 +88,14 @@ std::vector<std::string> unknown_names(const FlightModel& model);
 struct FlightWeights {
   double range_variance = 0;           ///< of one range, m^2
   double rotation_angle_variance = 0;  ///< of each rotation angle, independent, rad^2
-  /// White noise of the poses that the shots of a sample share, in the order of the corrections, 1
+  /// White noise of the poses common to the shots of a sample, in the order of the corrections, 1
   /// sigma, m and rad. Weights treat it as each shot's own, as many times its variance as a sample
   /// has shots, so that planes stay apart from each other.
   std::array<double, kCorrections> white{};
   double sample_interval = 0.005;  ///< s
-  /// Residual at which a shot counts half, m; 0: all alike.
+  /// Residual at which a shot has half weight, m; 0: all have equal weight.
   double cauchy_scale = 0;
-  double gate = 0;  ///< residual beyond which a shot does not count, in its sigmas; 0: none
+  double gate = 0;  ///< residual beyond which a shot is ignored, in its sigmas; 0: none
 };
 
 /// Sums of a plane's columns with those of one interval between knots.
@@ -124,7 +124,7 @@ struct FlightEquations {
 
 /// Plane of every shot, or kNoPlane.
 using PlaneOfShot = std::vector<std::int32_t>;
-/// Stands in PlaneOfShot for a shot without a plane.
+/// Marks a shot without a plane in PlaneOfShot.
 inline constexpr std::int32_t kNoPlane = -1;
 
 /// Residuals and derivatives of every shot that has a plane, summed up. The range of a shot is
@@ -135,7 +135,7 @@ inline constexpr std::int32_t kNoPlane = -1;
 /// prisms' parameters is left out. The sums do not depend on the number of threads.
 /// @param poses  at a clock offset close to the model's: the rest is extrapolated
 /// @throws InvalidArgument for columns, labels, knots or matrices that do not belong together,
-///         numbers that are not finite, variances that are not above 0; as check_available()
+/// non-finite numbers, variances not above 0; as check_available()
 FlightEquations flight_equations(const FlightShots& shots, const ShotPoses& poses,
                                  const PlaneOfShot& plane, const FlightModel& model,
                                  const FlightWeights& weights,
@@ -153,7 +153,7 @@ struct FlightRows {
   std::span<const double> values;
 };
 
-/// The pieces of a flight that equations are summed up over, each within one interval.
+/// The pieces of a flight over which equations are summed, each within one interval.
 std::size_t flight_pieces(const FlightModel& model);
 
 /// Calls a function with the rows of every piece, in parallel; `piece` counts from 0 in the order

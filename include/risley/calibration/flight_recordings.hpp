@@ -13,27 +13,27 @@
 
 namespace risley::calibration {
 
-/// The recordings of one flight, ready to be calibrated with.
+/// The recordings of one flight, prepared for a calibration.
 struct FlightRecordings {
   FlightShots shots;
-  /// The sensor that was given, with what it computes its directions with: parameters that the
-  /// recordings determine, and how well. One with a covariance, as a calibration writes it, keeps
+  /// The given sensor with the parameters, determined from the recordings, that it uses to compute
+  /// its directions, and their accuracy. One with a covariance, as a calibration writes it, keeps
   /// its own parameters.
   sensors::Sensor sensor;
-  PrismTrain believed;  ///< what the recordings' directions were computed with
-  /// What the recordings together say of the believed parameters moved the rotation angles of each
-  /// by this [recordings][prisms], rad.
+  PrismTrain believed;  ///< used to compute the recordings' directions
+  /// Shift of each recording's rotation angles due to the common estimate of the believed
+  /// parameters [recordings][prisms], rad.
   std::vector<std::vector<double>> angle_shift;
   double rotation_angle_sigma = 0;      ///< independent noise of a rotation angle, RMS, rad
-  std::size_t outside_strips = 0;       ///< shots between the strips, left out
-  std::vector<std::size_t> strip_rows;  ///< shots of every strip that was given [strips]
+  std::size_t outside_strips = 0;       ///< shots between the strips, dropped
+  std::vector<std::size_t> strip_rows;  ///< shots of every given strip [strips]
 };
 
 /// Puts the shots of all recordings that fall into strips into the order of time.
 /// @param recordings  of one sensor; none may begin before the one before it has ended, whatever
 ///                    the order they are given in
 /// @param strips      in the order of time
-/// @param shift_ns    what is added to the recordings' times to get those of the strips
+/// @param shift_ns  offset added to the recordings' times to get those of the strips
 /// @throws InvalidArgument for no recordings, recordings of different sensors or of the same time;
 ///         EstimationError when their parameters disagree or no shot is in a strip
 FlightRecordings flight_recordings(const std::vector<RangedRecording>& recordings,

@@ -28,12 +28,12 @@ struct FlightShots {
   std::size_t strips() const { return strip.empty() ? 0 : std::size_t{1} + strip.back(); }
 };
 
-/// @throws InvalidArgument for no shot, columns of different lengths, numbers that are not finite,
-///         ranges that are not above 0, times or strips that descend; the message names column and
-///         row
+/// @throws InvalidArgument for no shot, columns of different lengths, non-finite numbers, ranges
+/// not above 0, times or strips that descend; the message names column and row
 void require_flight_shots(const FlightShots& shots);
 
-/// Some shots by their rows, which must ascend. @throws InvalidArgument for a row that is not there
+/// Some shots by their rows, which must ascend. @throws InvalidArgument for a row that does not
+/// exist
 FlightShots rows_of(const FlightShots& shots, const std::vector<std::size_t>& rows);
 
 /// Poses of shots at the trajectory's time, recording's clock + clock_offset.
@@ -50,7 +50,7 @@ std::vector<std::size_t> rows_with_pose(const FlightShots& shots,
 
 /// @param local  of a trajectory in a local frame
 /// @throws InvalidArgument for a trajectory that is not local, a clock offset that is not finite or
-///         beyond a day, and a shot without pose, naming its row
+/// beyond a day, and a shot without pose, naming its row
 ShotPoses poses_of(const FlightShots& shots, const trajectories::Interpolation& local,
                    double clock_offset);
 

@@ -14,37 +14,37 @@
 
 namespace risley::calibration {
 
-/// Points of shots, local frame, m; NaN where a beam does not get through the prisms or a point is
+/// Points of shots, local frame, m; NaN if a beam does not get through the prisms or a point is
 /// beyond 1000 km.
 using ShotPoints = std::vector<std::array<float, 3>>;
 
-/// Where the measured ranges put the points.
+/// Points from the measured ranges.
 /// @throws InvalidArgument as flight_equations
 ShotPoints georeferenced(const FlightShots& shots, const ShotPoses& poses,
                          const FlightModel& model);
 
-/// How ground is cut into cells, and which of them may be called planes.
+/// How ground is divided into cells, and which of them count as planes.
 struct GroundCellOptions {
   double size = 2;                         ///< of a cell, m
   double shift_east = 0, shift_north = 0;  ///< of the grid, in cells
   std::size_t least_shots = 8, least_strips = 2;
   double steepest = 1.0471975511965976;  ///< angle of a normal from the vertical, rad (60 degrees)
-  /// Scatter of the points about their plane above which a cell is left out, 1 sigma, m.
+  /// Scatter of the points about their plane above which a cell is rejected, 1 sigma, m.
   double most_roughness = std::numeric_limits<double>::infinity();
-  /// What the scatter is of one plane, 1 sigma, m: cells with significantly more, such as those
-  /// that an edge crosses, are left out, too. 0: not known.
+  /// Scatter of one plane, 1 sigma, m: cells with significantly more, such as those crossed by an
+  /// edge, are rejected, too. 0: not known.
   double noise = 0;
 };
 
-/// Squares of a map's grid that several strips have seen, each with a plane of its own.
+/// Squares of a map's grid covered by several strips, each with its own plane.
 struct GroundCells {
   std::vector<GroundPlane> planes;
   PlaneOfShot plane;      ///< of every shot
   double scatter = 0;     ///< of the points about the planes, robust 1 sigma, m
-  std::size_t rough = 0;  ///< cells left out, those too rough
+  std::size_t rough = 0;  ///< rejected cells that are too rough
 };
 
-/// Sorts points into cells and fits a plane to each that takes no notice of strays: weights fall
+/// Sorts points into cells and fits to each a plane that is robust against outliers: weights fall
 /// with the distance as Cauchy's, at 1.5 median absolute distances.
 /// @param strip  of every point
 /// @throws InvalidArgument for columns of different lengths and options out of range
@@ -53,22 +53,23 @@ GroundCells ground_cells(const ShotPoints& points, const std::vector<std::uint16
 
 /// A level circle of ground.
 struct GroundCircle {
-  Eigen::Vector3d centre{0, 0, 0};  ///< of which the height counts nothing
+  Eigen::Vector3d centre{0, 0, 0};  ///< whose height is ignored
   double radius = 1;                ///< m
 
-  /// Whether a point (east, north, up), m, lies inside or on the rim; its height counts nothing.
+  /// Whether a point (east, north, up), m, lies inside or on the rim; its height is ignored.
   bool holds(const std::array<float, 3>& point) const {
     const double east = point[0] - centre.x(), north = point[1] - centre.y();
     return east * east + north * north <= radius * radius;
   }
 };
 
-/// Takes the points of circles out of their cells and gives each circle a plane behind those of the
-/// cells, under the same conditions but for the number of strips: one is enough. Of circles that
+/// Removes the points of circles from their cells and gives each circle a plane after those of the
+/// cells, under the same conditions except for the number of strips: one is enough. Of circles that
 /// overlap the first has the points.
 /// @param cells  of these points; changed
-/// @return the plane of every circle, kNoPlane where there are too few points or they are no plane
-/// @throws InvalidArgument as ground_cells, for radii that are not above 0
+/// @return the plane of every circle, kNoPlane if there are too few points or they do not form a
+/// plane
+/// @throws InvalidArgument as ground_cells, for radii not above 0
 std::vector<std::int32_t> add_circles(const ShotPoints& points,
                                       const std::vector<GroundCircle>& circles,
                                       const GroundCellOptions& options, GroundCells& cells);
@@ -82,8 +83,8 @@ struct StripInCell {
 };
 
 /// Mean distances from the planes, strip by strip; ordered by plane, then strip.
-/// @param gate         distance beyond which a point does not count, m
-/// @param least_shots  a strip with fewer is left out
+/// @param gate  distance beyond which a point is ignored, m
+/// @param least_shots  a strip with fewer is skipped
 /// @throws InvalidArgument as ground_cells
 std::vector<StripInCell> strips_in_cells(const ShotPoints& points,
                                          const std::vector<std::uint16_t>& strip,
@@ -91,17 +92,17 @@ std::vector<StripInCell> strips_in_cells(const ShotPoints& points,
                                          const std::vector<GroundPlane>& planes, double gate,
                                          std::size_t least_shots = 8);
 
-/// How far two strips are apart.
+/// Offset between two strips.
 struct StripPair {
   std::uint16_t first = 0, second = 0;
   std::size_t cells = 0;     ///< that both have seen
   double mean = 0, rms = 0;  ///< of the second less the first, along the cells' normals, m
-  /// The shift east, north, up that explains most of it, and its sigma, m; where the ground does
-  /// not determine it, sigma is 1.
+  /// The shift east, north, up that explains most of it, and its sigma, m; if the ground does not
+  /// determine it, sigma is 1.
   Eigen::Vector3d shift{0, 0, 0}, sigma{1, 1, 1};
 };
 
-/// The pair of the same two strips; null where there is none.
+/// The pair of the same two strips; null without one.
 const StripPair* find_pair(const std::vector<StripPair>& pairs, const StripPair& like);
 
 /// strips_in_cells(), compared. @throws InvalidArgument as ground_cells

@@ -28,7 +28,8 @@ struct StationPose {
   Eigen::Matrix3d stated = Eigen::Matrix3d::Identity();             ///< what is known of it
   /// Of each of the three stated rotations, rad; 0: exact, infinite: nothing is known.
   double sigma = 0;
-  /// Of the sensor's origin in the scene's frame, m: which places of a wall two recordings share.
+  /// Of the sensor's origin in the scene's frame, m; it determines which places of a wall two
+  /// recordings share.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
 };
 
@@ -37,43 +38,43 @@ struct Wall {
   std::string name;
   Vector3<double> normal{1, 0, 0};  ///< start value, unit vector, scene frame
   Vector3<double> stated{1, 0, 0};  ///< what is known of it
-  /// How well the stated normal is known, rad per axis; negative: not at all. 0 holds it.
+  /// Uncertainty of the stated normal, rad per axis; negative: unknown. 0 holds it.
   double normal_sigma = -1;
   WallGrid grid = {};  ///< empty: the wall is flat
 };
 
-/// What one recording saw of one wall. Each has a distance of its own: it is not measured where in
-/// the sensor its origin is, and a rotation about the origin leaves the distance alone.
+/// One recording's view of one wall. Each has its own distance: the position of the origin within
+/// the sensor is not measured, and a rotation about the origin leaves the distance unchanged.
 struct WallView {
   std::size_t recording = 0;  ///< row of PlanarProblem::stations
   std::size_t wall = 0;       ///< row of PlanarProblem::walls
   double distance = 0;        ///< m
   double range_variance = 0;  ///< of one range, m^2
   std::shared_ptr<const RangedShots> shots;
-  double side = 1.0;  ///< -1 where the recording saw the wall from behind, against its normal
-  /// First shot in every cell of the wall's grid and the end of the last [cells + 1]; empty where
-  /// the wall is flat.
+  double side = 1.0;  ///< -1 if the recording saw the wall from behind, against its normal
+  /// First shot in every cell of the wall's grid and the end of the last [cells + 1]; empty if the
+  /// wall is flat.
   std::vector<std::uint32_t> cell_begin = {};
 };
 
-/// What is known of one size of the prisms before.
+/// Prior knowledge of one size of the prisms.
 struct SizePrior {
   PrismSize size;
   double value = 0;  ///< m
   double sigma = 0;  ///< m, 0: exact
 };
 
-/// What a term of the range errors depends on.
+/// The variable of a range error term.
 enum class RangeTermKind { near, incidence, per_decade, emitter };
 
-/// A term of the range errors beside the constant one, see sensors::RangeErrors.
+/// A term of the range errors in addition to the constant one, see sensors::RangeErrors.
 struct RangeTerm {
   std::string name;  ///< as in presets
   double value = 0;  ///< start value, SI
-  double prior = 0;  ///< what is known of it, SI
+  double prior = 0;  ///< its known values, SI
   double sigma = 0;  ///< how well, SI; 0 holds it
   RangeTermKind kind = RangeTermKind::near;
-  int emitter = 0;  ///< whose own error it is, from 0
+  int emitter = 0;  ///< emitter with this error, from 0
 };
 
 /// Full angles of the beam, rad.
@@ -86,7 +87,7 @@ struct PlanarProblem {
   PrismTrain train;  ///< start values
   PrismGeometry geometry;
   std::vector<estimation::FreeParameter> free;  ///< to estimate
-  PrismTrain prior;                             ///< where the priors of the parameters stand
+  PrismTrain prior;                             ///< mean of the parameters' priors
   /// Prior sigma of every free parameter [free], SI; empty or infinite: none.
   std::vector<double> prior_sigma;
   double range_offset = 0;             ///< start value, m
@@ -96,33 +97,33 @@ struct PlanarProblem {
   /// Of the geometry, which holds their start values; empty: the geometry is exact.
   std::vector<SizePrior> sizes;
   std::vector<StationPose> stations;  ///< [recordings]
-  bool stations_known = false;        ///< whether their rotations tie the walls together
+  bool stations_known = false;        ///< whether their rotations connect the walls
   std::vector<Wall> walls;
   std::vector<WallView> views;
-  /// What is assumed of the shape of walls that have a grid.
+  /// Prior for the shape of walls that have a grid.
   ShapePrior shape;
 
-  /// What is known of the rotation angles' common errors: parameters that the rotation angles were
-  /// computed with. They are not estimated again, but their errors reach the result.
+  /// Prior knowledge of the rotation angles' common errors: parameters with which the rotation
+  /// angles were computed. They are not estimated again, but their errors propagate to the result.
   std::vector<estimation::FreeParameter> considered;
   Eigen::MatrixXd considered_covariance;           ///< [considered, considered], SI
   std::vector<Eigen::MatrixXd> angle_sensitivity;  ///< [recordings] of [prisms, considered]
-  /// Covariance of what the angles of one recording have in common beside that [recordings] of
+  /// Covariance of the common errors of one recording's angles in addition to that [recordings] of
   /// [prisms, prisms], rad^2; empty: nothing.
   std::vector<Eigen::MatrixXd> mean_angle_covariance;
 };
 
-/// Residual of a piece of prior knowledge: what it said less what the adjustment found.
+/// Residual of a piece of prior knowledge: stated less adjusted value.
 struct PriorTest {
   std::string name;  ///< of the station or wall
   bool station = false;
   double misfit = 0;  ///< length of the rotation between both, rad
   double chi2 = 0;    ///< of the misfit
   int degrees_of_freedom = 0;
-  double critical = 0;  ///< chi2 that a sound one exceeds once in 10,000
+  double critical = 0;  ///< chi2 that a correct one exceeds once in 10,000
 };
 
-/// By how much a solution is off where a quantity that was not adjusted is off by one unit, SI.
+/// Shift of a solution for an error of one unit, SI, in a quantity that was not adjusted.
 struct SolutionResponse {
   Eigen::MatrixXd parameters;  ///< [free, quantities]
   Eigen::MatrixXd numbers;     ///< [numbers, quantities]
@@ -146,24 +147,24 @@ struct PlanarSolution {
   SolutionResponse considered;              ///< to the considered parameters of the problem
   std::vector<double> distance_sigma;       ///< [views], m
   std::vector<double> normal_sigma;         ///< [walls], of the two angles together, rad
-  /// What data, stations and known walls say of the free parameters, everything else eliminated and
-  /// without the priors of the parameters themselves [free, free].
+  /// Information of data, stations and known walls on the free parameters, everything else
+  /// eliminated and without the priors of the parameters themselves [free, free].
   Eigen::MatrixXd information;
   std::vector<PriorTest> prior_tests;
   /// Redundancy of every view: its shots less its share of the unknowns [views].
   std::vector<double> redundancy;
   /// Sum of squared residuals over variances of every view [views].
   std::vector<double> chi2;
-  /// What is found of the walls' shape; without weights where all walls are flat.
+  /// Estimate of the walls' shape; without weights if all walls are flat.
   ShapeSolution shape;
 
-  /// Row of a number, or -1 where it was not adjusted.
+  /// Row of a number, or -1 if it was not adjusted.
   Eigen::Index number(std::string_view name) const;
-  /// Its sigma, SI; 0 where it was not adjusted.
+  /// Its sigma, SI; 0 if it was not adjusted.
   double number_sigma(std::string_view name) const;
 };
 
-/// When an adjustment on planes stops.
+/// Convergence criteria of an adjustment on planes.
 struct AdjustmentOptions {
   int most_iterations = 50;
   /// Done when a step would lower the cost by less than this (in the unit of one squared sigma).
@@ -171,18 +172,18 @@ struct AdjustmentOptions {
   InstructionSet set = best_instruction_set();
 };
 
-/// Lays a grid over every wall and sorts the shots of its views by the grid's cells. Where a shot
-/// meets its plane decides, as the problem has it.
+/// Lays a grid over every wall and sorts the shots of its views by the grid's cells. The cell
+/// follows from where a shot meets its plane in the problem.
 void lay_grids(PlanarProblem& problem);
 
 /// Levenberg-Marquardt on normal equations that every view accumulates by itself. Where walls have
-/// grids: Gauss-Newton steps with the walls' shape integrated out, from start values that an
-/// adjustment on flat walls has found.
-/// @throws EstimationError when a beam leaves all planes, or nothing is to be estimated
+/// grids: Gauss-Newton steps with the walls' shape integrated out, from the start values of an
+/// adjustment on flat walls.
+/// @throws EstimationError when a beam leaves all planes, or there is nothing to estimate
 PlanarSolution adjust(PlanarProblem problem, const AdjustmentOptions& options = {},
                       const Progress& progress = {});
 
-/// Quantities that an adjustment held and that may be off: what moves with one unit of each.
+/// Held quantities that may be wrong, and the effect of one unit of each.
 struct HeldQuantities {
   Eigen::MatrixXd train;  ///< flat vector [places, held], SI; 0 in the places of free parameters
   std::vector<Eigen::MatrixXd> rotation_angles;  ///< [recordings] of [prisms, held], rad
@@ -190,7 +191,8 @@ struct HeldQuantities {
   Eigen::Index count() const { return train.cols(); }  ///< of held quantities
 };
 
-/// -N^-1 J^T W K with N the normal equations at the solution and K what moves the predicted ranges.
+/// -N^-1 J^T W K with N the normal equations at the solution and K the derivatives of the predicted
+/// ranges.
 /// @throws InvalidArgument for matrices that do not belong to train, recordings or each other,
 ///         EstimationError when the normal equations are singular
 SolutionResponse held_response(const PlanarProblem& solved, const HeldQuantities& held,
@@ -205,21 +207,21 @@ std::vector<double> prior_sigmas(const std::vector<estimation::FreeParameter>& f
 /// Information of the priors on the free parameters [free, free].
 Eigen::MatrixXd prior_information(const PlanarProblem& problem);
 
-/// Whether a place of the flat vector is a material that is not adjusted: what the sensor computed
-/// with is what light meets.
+/// Whether a place of the flat vector is a material that is not adjusted: the sensor's own value is
+/// the true one.
 bool is_held_material(int place, const PlanarProblem& problem);
 
 /// Value of a prism's own size in a geometry that has a value for every prism, m.
 double size_value(const PrismGeometry& geometry, const PrismSize& size);
 
-/// The view of a problem as plane_equations() wants it.
+/// The view of a problem in the form for plane_equations().
 PlaneView plane_view(const PlanarProblem& problem, std::size_t view);
 
-/// Whether a place of the flat vector describes what the prisms are made of (index, wedge), which
-/// the sensor and the calibration share, and not how they are mounted.
+/// Whether a place of the flat vector describes the material of the prisms (index, wedge), which
+/// the sensor and the calibration share, and not their mounting.
 bool is_material(int place, int prisms);
 
-/// Two unit vectors that make a right-handed orthogonal triad with a unit vector.
+/// Two unit vectors that form a right-handed orthogonal triad with a unit vector.
 std::pair<Vector3<double>, Vector3<double>> tangents_of(const Vector3<double>& normal);
 
 }  // namespace risley::calibration

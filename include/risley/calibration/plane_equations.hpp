@@ -15,20 +15,20 @@
 
 namespace risley::calibration {
 
-/// Where the range of every shot is predicted from: the sensor's optics and one plane.
+/// The quantities that predict the range of every shot: the sensor's optics and one plane.
 struct PlaneView {
   PrismTrain train;
   PrismGeometry geometry;
   std::vector<int> places;       ///< of the flat parameter vector: those to differentiate by
   std::vector<PrismSize> sizes;  ///< of the prisms: those to differentiate by
-  double range_offset = 0;       ///< what the sensor adds to a true range, m
-  /// Of the errors beside that whose share every shot has, RangedShots::range_terms [terms].
+  double range_offset = 0;       ///< offset added to a true range, m
+  /// Of the further errors, with every shot's share in RangedShots::range_terms [terms].
   std::vector<double> range_terms;
   double range_variance = 0;             ///< of one range, rounding included, m^2
   Plane plane;                           ///< sensor frame
   Vector3<double> tangent_1, tangent_2;  ///< unit vectors that make an orthogonal triad with normal
-  /// First shot of every cell and the end of the last [cells + 1], where shots are sorted by cells
-  /// and are to be summed so, too; empty: not.
+  /// First shot of every cell and the end of the last [cells + 1], if shots are sorted by cells and
+  /// must be summed by cells, too; empty: not.
   std::span<const std::uint32_t> cell_begin;
 };
 
@@ -51,7 +51,7 @@ struct PlaneColumns {
 
   int rotation_angle(int rotor) const { return places + rotor; }         ///< a shift at all shots
   int prism_size(int number) const { return places + prisms + number; }  ///< m
-  /// A number that its term is multiplied by: m, or for the incidence without a unit.
+  /// Factor of its term: m, or for the incidence without a unit.
   int range_term(int number) const { return places + prisms + sizes + number; }
   int range_offset() const { return range_term(terms); }  ///< of the sensor, m
   /// Towards tangent 1, which has the number 0, or tangent 2.
@@ -64,7 +64,7 @@ struct PlaneColumns {
 struct PlaneEquations {
   Eigen::MatrixXd hessian;   ///< [columns, columns], J^T W J
   Eigen::VectorXd gradient;  ///< [columns], J^T W residual
-  /// Rows distance, normal 1 and normal 2 of J^T W [J, residual], summed over every cell by itself
+  /// Rows distance, normal 1 and normal 2 of J^T W [J, residual], summed separately for every cell
   /// [3 cells, columns + 1]; empty without cells.
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> cells;
   double cost = 0;        ///< sum of squared residuals over their variances
@@ -78,19 +78,19 @@ struct ResidualColumns {
   std::span<double> variance;  ///< of the residual, m^2
 };
 
-/// Residual and derivatives of every shot, summed up. The residual of a shot is its range less the
-/// one predicted from plane, optics and rotation angles,
+/// Residual and derivatives of every shot, summed. The residual of a shot is its range less the one
+/// predicted from plane, optics and rotation angles,
 ///   r = (d - n.o) / (n.L)
 /// with beam origin o and direction L, so the derivatives hold the predicted range. (Eq. 32's
-/// point-to-plane distances hold the measured one; its noise then biases the solution.) The
-/// variance of a residual is that of the range plus what the covariance of the rotation angles
-/// makes of it, which grows with the angle of incidence: the Gauss-Helmert model with the condition
+/// point-to-plane distances contain the measured one, whose noise then biases the solution.) The
+/// variance of a residual is that of the range plus the contribution of the rotation angles'
+/// covariance, which grows with the angle of incidence: the Gauss-Helmert model with the condition
 /// solved for the range. The derivative of the beam's origin is left out: a few thousandths of the
 /// rest, and the residuals themselves are exact. docs/theory/calibration.md The sums do not depend
 /// on the number of threads.
 /// @param set  instruction set, for tests and benchmarks
 /// @throws InvalidArgument for columns of other lengths, places or emitters that the train does not
-///         have, numbers that are not finite, and as check_available()
+/// have, non-finite numbers, and as check_available()
 PlaneEquations plane_equations(const RangedShots& shots, const PlaneView& view,
                                const ResidualColumns& columns = {},
                                InstructionSet set = best_instruction_set());

@@ -15,9 +15,9 @@
 
 namespace risley::calibration {
 
-/// Shots with a range, as columns of one length: what a calibration sees of a recording. A shot is
-/// a range and the rotation angles at which it was measured; the direction that the sensor reported
-/// plays no further part, so that its own calibration cannot bend the new one.
+/// Shots with a range, as columns of one length: the input of a calibration. A shot is a range and
+/// the rotation angles at which it was measured; the reported direction is not used further, so
+/// that the sensor's own calibration cannot bend the new one.
 struct RangedShots {
   std::vector<std::vector<double>> rotation_angle;  ///< [prisms][shots], rad, within half a turn
   /// Covariance of the rotation angles, upper triangle row by row [prisms (prisms+1)/2][shots],
@@ -26,13 +26,13 @@ struct RangedShots {
   std::vector<double> range;            ///< m, as measured
   std::vector<std::uint8_t> beam;       ///< emitter that fired, from 0; empty: all the first
   std::vector<std::uint8_t> intensity;  ///< as reported; empty: not known
-  /// d range / d range error [terms][shots], see range_term_names(); empty: none is looked at.
+  /// d range / d range error [terms][shots], see range_term_names(); empty: none is used.
   std::vector<std::vector<float>> range_terms;
 
   std::size_t size() const { return range.size(); }
   /// Number of columns of rotation angles.
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
-  /// @throws InvalidArgument for a number of prisms that no sensor has
+  /// @throws InvalidArgument for an unsupported number of prisms
   void resize(int prisms, std::size_t shots);
 };
 
@@ -46,29 +46,29 @@ inline constexpr ColumnPlace<RangedShots, std::vector<double>, std::vector<std::
 /// As many columns for another number of shots.
 RangedShots columns_like(const RangedShots& shots, std::size_t size);
 
-/// Some shots by their rows. @throws InvalidArgument for a row that is not there
+/// Some shots by their rows. @throws InvalidArgument for a row that does not exist
 RangedShots rows_of(const RangedShots& shots, const std::vector<std::size_t>& rows);
 
-/// One recording, ready to be calibrated with.
+/// One recording, prepared for a calibration.
 struct RangedRecording {
   std::string name;    ///< for messages: its file
   std::string serial;  ///< of the sensor, empty when unknown
   RangedShots shots;
   std::vector<std::int64_t> time_ns;  ///< [shots]
-  sensors::Sensor believed;  ///< as estimated: what the sensor computes its directions with
-  /// What the estimate says of the believed parameters.
+  sensors::Sensor believed;  ///< as estimated: those with which the sensor computes its directions
+  /// Information of the estimate on the believed parameters.
   std::vector<estimation::FreeParameter> free;
   Eigen::MatrixXd covariance;             ///< [free, free], SI units
   Eigen::MatrixXd angle_sensitivity;      ///< [prisms, free], see CommonAngleErrors
   Eigen::MatrixXd mean_angle_covariance;  ///< [prisms, prisms], rad^2, at given parameters
-  /// What parameters that the estimate held may be off by does to it; empty: nothing.
+  /// Effect of possible errors of the parameters held in the estimate; empty: nothing.
   estimation::HeldChanges held_changes;
-  bool unit_assumed = false;      ///< the unit of the ranges is stated nowhere
-  std::size_t without_range = 0;  ///< shots that had a direction and no range
+  bool unit_assumed = false;      ///< the file does not state the unit of the ranges
+  std::size_t without_range = 0;  ///< shots with a direction but no range
   std::size_t outliers = 0;       ///< shots whose reported direction was an outlier
 };
 
-/// Takes the shots that have a range and a sound direction out of an estimate.
+/// Selects the shots of an estimate with a range and a valid direction.
 /// @param estimate  converged (or with its noise overstated: angles of a recording without noise
 /// are
 ///                  good enough), by the batch estimator, of a series with ranges
@@ -77,7 +77,7 @@ struct RangedRecording {
 RangedRecording ranged_recording(const estimation::Estimate& estimate, std::string name,
                                  std::string serial);
 
-/// At most so many shots, evenly spread. @return their rows
+/// At most this many shots, evenly spread. @return their rows
 std::vector<std::size_t> spread_rows(std::size_t shots, std::size_t most);
 
 }  // namespace risley::calibration

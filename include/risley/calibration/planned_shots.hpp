@@ -17,23 +17,23 @@
 
 namespace risley::calibration {
 
-/// A flight that somebody thinks of making: a sensor on its mount is taken along the strips of a
-/// plan over a terrain. The values of sensor and mount are where it truly is.
+/// A planned flight: a sensor on its mount follows the strips of a plan over a terrain. The values
+/// of sensor and mount are the true ones.
 struct PlannedFlight {
   sensors::Sensor sensor;
   trajectories::Mount mount;
-  trajectories::FlightPlan plan;  ///< on the map of the terrain; where that is does not matter
+  trajectories::FlightPlan plan;  ///< on the map of the terrain; its location does not matter
   scenes::TerrainParts terrain;
 };
 
 /// Some shots of a planned flight that end on the terrain.
 struct PlannedPiece {
   FlightShots shots;            ///< strips from 0; ranges without noise, with the sensor's offset
-  std::vector<double> x, y, z;  ///< where they end, on the map, m
-  std::uint64_t fired = 0;      ///< of them, and of those that end nowhere
+  std::vector<double> x, y, z;  ///< their end points, on the map, m
+  std::uint64_t fired = 0;      ///< of them, and of those that miss the terrain
 };
 
-/// Which shots of a planned flight are made, and with which random numbers.
+/// Selection of a planned flight's shots, and their random numbers.
 struct PlannedShotsOptions {
   /// Shots per second: chosen by chance among the sensor's, since every n-th would beat with the
   /// rotors. Empty: all of them.
@@ -45,12 +45,12 @@ struct PlannedShotsOptions {
 /// @throws InvalidArgument as require_flight_plan
 trajectories::Flight flown(const PlannedFlight& planned);
 
-/// Calls a function with the shots of all strips, in the order of their times: rotors at constant
-/// speed, no noise, no errors of the trajectory.
+/// Calls a function with the shots of all strips, in time order: rotors at constant speed, no
+/// noise, no errors of the trajectory.
 /// @param flight  of the same plan, see flown()
 /// @throws InvalidArgument as require_flight_plan, require_mount, scenes::Terrain, for a sensor
-///         without prisms or speeds and for a rate that is not above 0 or above the sensor's;
-///         Cancelled, and what the function throws
+/// without prisms or speeds and for a rate not above 0 or above the sensor's; Cancelled, and
+/// exceptions of the function
 void for_each_planned_piece(const PlannedFlight& planned, const trajectories::Flight& flight,
                             const PlannedShotsOptions& options,
                             const std::function<void(PlannedPiece&)>& function,

@@ -13,15 +13,15 @@
 
 namespace risley::calibration {
 
-/// Lines of sight of shots. Those that do not get through the prisms are NaN.
+/// Lines of sight of shots. Blocked beams are NaN.
 class Rays {
  public:
   /// @throws InvalidArgument for shots of another number of prisms, columns of different lengths,
   ///         or emitters that the train does not have
   Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots)
       : Rays(train, geometry, shots, {0, shots.size()}) {}
-  /// The same of some rows, which count from 0 here: a block of them stays in the processor's
-  /// memory.
+  /// The same for some rows, which count from 0 here: a block of them stays in the processor's
+  /// cache.
   Rays(const PrismTrain& train, const PrismGeometry& geometry, const RangedShots& shots,
        estimation::ShotRange rows)
       : Rays(train, geometry, shots.rotation_angle, shots.beam, rows) {}
@@ -33,7 +33,7 @@ class Rays {
   std::size_t size() const { return x_.size(); }
   /// Unit vector, sensor frame.
   Vector3<double> direction(std::size_t i) const { return {x_[i], y_[i], z_[i]}; }
-  /// Where a shot's beam leaves the sensor, m, sensor frame.
+  /// Origin of a shot's beam, m, sensor frame.
   Vector3<double> origin(std::size_t i) const { return {origin_x_[i], origin_y_[i], origin_z_[i]}; }
   /// The point at a range from the origin, m, sensor frame.
   Vector3<double> point(std::size_t i, double range) const {

@@ -4,7 +4,7 @@
 
 namespace risley::calibration {
 
-/// Where the body was at a shot and how it moved, among the axes of a local frame.
+/// Pose and motion of the body at a shot, in the axes of a local frame.
 struct ShotPose {
   double position[3];         ///< m
   double attitude[4];         ///< local from body, a unit quaternion w, x, y, z

@@ -22,12 +22,13 @@ struct StepRegion {
   double solid_angle = 0;          ///< that its cells fill, sr
   std::size_t points = 0;
   double significance = 0;  ///< height over its sigma
-  /// Of the residuals. A step of more than four sigmas of a point takes its own rows from the cells
-  /// on its border; a lower one takes all of their rows, for noise would decide which are its own.
+  /// Of the residuals. A step of more than four sigmas of a point takes only its own rows from the
+  /// cells on its border; a lower one takes all of their rows, because noise would decide which are
+  /// its own.
   std::vector<std::size_t> rows;
 };
 
-/// What the residuals show of a surface.
+/// Steps and unevenness found in the residuals of a surface.
 struct SurfaceReport {
   std::vector<StepRegion> steps;  ///< largest solid angle first
   /// Mean square of cell means over their variances, less the step regions and the cells beside
@@ -39,12 +40,12 @@ struct SurfaceReport {
 /// Cells are this wide, rad (1 degree): smaller ones have too few points at 1 kHz.
 inline constexpr double kSurfaceCell = 0.017453292519943295;
 
-/// Looks for compact steps and unevenness in means over cells of the field of view. A step of a
-/// few sigmas on a small region is taken up by the calibration parameters, which bend the rest of
-/// the plane smoothly; so the cells are compared with a smooth surface fitted robustly to all of
-/// them, and not with zero. Cells are compared in sigmas of their medians: a step has at least
-/// three of them, is higher than 5 mm, and stands out from waves of the surface. On noise alone
-/// less than one of a thousand surfaces shows one. Rows that are not finite are left out.
+/// Looks for compact steps and unevenness in means over cells of the field of view. The calibration
+/// parameters absorb a step of a few sigmas on a small region by bending the rest of the plane
+/// smoothly; so the cells are compared with a smooth surface fitted robustly to all of them, and
+/// not with zero. Cells are compared in sigmas of their medians: a step has at least three of them,
+/// is higher than 5 mm, and stands out from waves of the surface. Pure noise shows one on less than
+/// one of a thousand surfaces. Non-finite rows are skipped.
 /// @throws InvalidArgument when the columns differ in length
 SurfaceReport inspect_surface(const SurfaceResiduals& residuals);
 

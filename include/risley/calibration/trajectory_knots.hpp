@@ -22,7 +22,7 @@ inline constexpr int kCorrections = 6;
 /// tilts about east and north, heading. @throws InvalidArgument for another correction
 trajectories::PoseError error_of(int correction);
 
-/// Knots between which corrections of a trajectory are linear. Every strip has knots of its own.
+/// Knots between which corrections of a trajectory are linear. Every strip has its own knots.
 struct TrajectoryKnots {
   /// Between a knot and the next one of the same strip.
   struct Interval {
@@ -37,41 +37,41 @@ struct TrajectoryKnots {
   std::size_t size() const { return time_ns.size(); }
 };
 
-/// Knots at equal distances from the first to the last shot of every strip.
-/// @param spacing  s; a strip has as many intervals as come closest to it, at least one
-/// @throws InvalidArgument as require_flight_shots, for a spacing that is not above 0, and for
-///         more than 100,000 knots
+/// Equidistant knots from the first to the last shot of every strip.
+/// @param spacing  s; a strip has the number of intervals that comes closest to it, at least one
+/// @throws InvalidArgument as require_flight_shots, for a spacing not above 0, and for more than
+/// 100,000 knots
 TrajectoryKnots make_knots(const FlightShots& shots, double spacing);
 
-/// The same corrections at other knots: those between, and beyond the ends those at them.
+/// The same corrections at other knots: interpolated, and constant beyond the ends.
 /// @param corrections  [6, from.size()]
 Eigen::MatrixXd resampled(const TrajectoryKnots& from, const Eigen::MatrixXd& corrections,
                           const TrajectoryKnots& to);
 
-/// A place where the errors of a trajectory may jump, beyond what the process says of them.
+/// A possible jump of a trajectory's errors beyond the process.
 struct ProcessBreak {
   std::size_t knot = 0;                      ///< before it
   std::array<double, kCorrections> sigma{};  ///< of the jump, m and rad
 };
 
-/// The process of one correction from knot to knot: it is expected to be `decay` times the value at
-/// the knot before, and is off from that by `sigma`. The first knot has a decay of 0.
+/// The process of one correction from knot to knot: its expected value is `decay` times that at the
+/// previous knot, with a deviation of `sigma`. The first knot has a decay of 0.
 struct KnotSteps {
   std::vector<double> decay, sigma;  ///< [knots]
 };
-/// Steps of a correction from knot to knot. A sigma of the process below 1e-7 (m, rad) counts as
+/// Steps of a correction from knot to knot. Sigmas of the process below 1e-7 (m, rad) are raised to
 /// that. @param correction  from 0, see kCorrections
 KnotSteps knot_steps(const TrajectoryKnots& knots, const trajectories::ErrorProcess& process,
                      int correction, const std::vector<ProcessBreak>& breaks = {});
 
-/// What a process says of one correction at all knots: the inverse of its covariance, which is
-/// tridiagonal. A sigma below 1e-7 (m, rad) counts as that.
+/// A process as prior of one correction at all knots: the inverse of its covariance, which is
+/// tridiagonal. Sigmas below 1e-7 (m, rad) are raised to that.
 /// @param process  at the knots' times
 struct KnotInformation {
   std::vector<double> diagonal;  ///< [knots]
   std::vector<double> next;      ///< [knots - 1] between a knot and the next
 };
-/// What a process says of one correction. @param correction  from 0, see kCorrections
+/// A process as prior of one correction. @param correction  from 0, see kCorrections
 KnotInformation knot_information(const TrajectoryKnots& knots,
                                  const trajectories::ErrorProcess& process, int correction,
                                  const std::vector<ProcessBreak>& breaks = {});
@@ -83,16 +83,17 @@ KnotInformation knot_information(const TrajectoryKnots& knots,
 Eigen::MatrixXd covariance_between_knots(const trajectories::ErrorProcess& process, int correction,
                                          std::int64_t begin_ns, std::int64_t end_ns, int parts);
 
-/// Corrections at a time: linear between the knots of a strip, elsewhere what the process expects.
+/// Corrections at a time: linear between the knots of a strip, elsewhere the expectation of the
+/// process.
 /// @param corrections  [6, knots]
-/// @throws InvalidArgument for corrections that are not those of the knots, and for no knots
+/// @throws InvalidArgument for corrections that do not match the knots, and for no knots
 Eigen::Matrix<double, kCorrections, 1> correction_at(const TrajectoryKnots& knots,
                                                      const Eigen::MatrixXd& corrections,
                                                      const trajectories::ErrorProcess& process,
                                                      std::int64_t time_ns);
 
 /// Standard deviations of corrections at a time: linear between the knots of a strip, elsewhere
-/// what the process adds to those of the nearest knot.
+/// those of the nearest knot enlarged by the process.
 /// @param knot_sigma  [6, knots]
 /// @throws as correction_at
 Eigen::Matrix<double, kCorrections, 1> correction_sigma_at(

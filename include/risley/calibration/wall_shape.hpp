@@ -11,7 +11,7 @@
 namespace risley::calibration {
 
 /// A square grid over a wall, in the coordinates of tangents_of() its normal in the scene's frame.
-/// Nodes are the corners of the cells; what deviates from the plane is known at them.
+/// Nodes are the corners of the cells, at which the deviation from the plane is known.
 struct WallGrid {
   double spacing = 0;                ///< of the nodes, m
   double first_u = 0, first_v = 0;   ///< of node (0, 0), m
@@ -35,15 +35,15 @@ struct WallGrid {
   std::uint32_t row() const { return static_cast<std::uint32_t>(cells_u); }  ///< cells of one row
 };
 
-/// How far walls deviate from their planes: a zero-mean Gaussian process over each wall, whose
-/// correlation is that of Matern with nu = 2, and beside it a part of its own for every cell.
+/// Deviation of walls from their planes: a zero-mean Gaussian process over each wall, whose
+/// correlation is that of Matern with nu = 2, and an independent part for every cell.
 struct ShapeParameters {
   double sigma = 0;   ///< of the process, m
   double length = 0;  ///< of its correlation, m: the process is kappa = 2 / length wide
   double white = 0;   ///< sigma of the cells' own part, m
 };
 
-/// What is assumed of walls before they are seen: parameters that are tried, with their weights.
+/// Prior for the shape of walls: candidate parameters with their weights.
 struct ShapePrior {
   std::vector<ShapeParameters> parameters;
   std::vector<double> weight;  ///< [parameters], sum 1
@@ -51,7 +51,7 @@ struct ShapePrior {
 
 /// Finished walls of buildings. docs/theory/calibration.md, section Walls have shape
 ShapePrior building_walls();
-/// One set of parameters in their midst, for plans, which have no data to weigh them by.
+/// One central set of parameters, for plans, which have no data to weigh them by.
 ShapePrior typical_walls();
 
 /// Sums over the shots of all views of one wall. Their columns are those of unknowns that are the
@@ -74,20 +74,20 @@ struct WallSums {
 struct ShapeProblem {
   /// J' W J of unknowns, quantities and the residual, with the priors of the unknowns
   /// [unknowns + quantities + 1, ...], less what is in the walls. The block of the quantities alone
-  /// is not looked at.
+  /// is not used.
   Eigen::MatrixXd system;
   Eigen::Index unknowns = 0;
   std::vector<WallSums> walls;
 };
 
-/// What is found of the unknowns of one wall alone.
+/// Estimate of one wall's own unknowns.
 struct OwnSolution {
   Eigen::VectorXd step;        ///< [own]
   Eigen::MatrixXd covariance;  ///< [own, own]
   Eigen::MatrixXd response;    ///< to the quantities [own, quantities]
 };
 
-/// What remains when the walls' shape is integrated out, for the parameters that were tried.
+/// The system with the walls' shape integrated out, for the candidate parameters.
 struct ShapeSolution {
   Eigen::VectorXd step;        ///< [unknowns], mean over the parameters
   Eigen::MatrixXd covariance;  ///< [unknowns, unknowns], the spread of the means included
@@ -105,13 +105,13 @@ struct ShapeSolution {
   bool positive = false;  ///< whether the normal equations could be solved
 };
 
-/// Integrates the walls' shape out, parameter by parameter, and weighs the parameters by their
-/// marginal likelihood. Those that are far from all likely ones are not tried and weigh 0.
+/// Integrates the walls' shape out, candidate by candidate, and weights the candidates by their
+/// marginal likelihood. Candidates far from all likely ones are skipped and have weight 0.
 ///                                   Derivation: docs/theory/calibration.md
 /// @throws InvalidArgument for a system or sums of other sizes
 ShapeSolution solve_with_shape(const ShapeProblem& problem, const ShapePrior& prior);
 
-/// Without the parameters that a solution found to weigh less than a thousandth.
+/// Without the parameters whose weight in a solution is less than a thousandth.
 ShapePrior likely_part(const ShapePrior& prior, const ShapeSolution& solution);
 
 }  // namespace risley::calibration

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "risley/bags/lidar_topic.hpp"
 #include "risley/cloud/points.hpp"
 
 namespace risley::cloud {
@@ -19,12 +20,16 @@ class CloudWriter {
  public:
   virtual ~CloudWriter() = default;
 
-  /// Appends points. @throws FileError when the disk refuses, InvalidArgument for columns that are
-  /// not as the cloud's header announces them, and when the format cannot hold a value (the message
-  /// names the field, the point and the allowed range)
+  /// Appends points. @throws FileError when writing fails, InvalidArgument for columns that differ
+  /// from the cloud's header, and when the format cannot hold a value (the message names the field,
+  /// the point and the allowed range)
   virtual void write(const Points& points) = 0;
 
-  /// Completes the file and gives it its name. @throws FileError
+  /// Ends the current message, if a cloud is written in messages.
+  /// @throws as write()
+  virtual void end_message() {}
+
+  /// Completes the file and renames it to its final name. @throws FileError
   virtual void close() = 0;
 };
 
@@ -32,14 +37,24 @@ class CloudWriter {
 struct CloudWriterOptions {
   std::string format;       ///< name of a CloudFormat; empty: by the file name's ending
   double las_scale = 1e-4;  ///< LAS stores coordinates as 32-bit multiples of this, m
-  /// LAS stores GPS time where the recording's clock is UTC; otherwise, or when this is false, the
+  /// LAS stores GPS time if the recording's clock is UTC; otherwise, or when this is false, the
   /// recording's own seconds.
   bool gps_time = true;
-  /// Creation date of LAS where the recording's clock knows none.
+  bags::LidarTopicOptions messages = {};  ///< of bags
+  /// Creation date of LAS if the recording's clock does not give one.
   std::optional<std::chrono::sys_days> date = {};
 };
 
-/// A format that clouds can be written in.
+/// Writes a cloud as messages into a bag, which the caller completes.
+/// @param bag  must outlive the writer; an existing topic is continued
+/// @param kind  of the bag, which determines the serialisation
+/// @param options  of the messages; empty ones have their defaults
+/// @throws InvalidArgument for a map, and as LidarTopic; FileError
+std::unique_ptr<CloudWriter> write_cloud_into(bags::BagWriter& bag, bags::BagKind kind,
+                                              const CloudHeader& header,
+                                              const bags::LidarTopicOptions& options);
+
+/// An output format of clouds.
 struct CloudFormat {
   std::string name;    ///< "las-1.4"
   std::string ending;  ///< ".las"; the first format with an ending is its default
@@ -54,7 +69,7 @@ const std::vector<CloudFormat>& cloud_formats();
 const CloudFormat& find_cloud_format(const std::string& path, const std::string& format);
 
 /// Creates a cloud file. @throws InvalidArgument as find_cloud_format, and for a number of prisms
-/// or an option that makes no sense; FileError
+/// or an invalid option; FileError
 std::unique_ptr<CloudWriter> create_cloud(const std::string& path, const CloudHeader& header,
                                           const CloudWriterOptions& options = {});
 

@@ -6,8 +6,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <Eigen/Core>
+
+#include "risley/core/error.hpp"
 
 namespace risley::cloud {
 
@@ -16,7 +19,7 @@ namespace risley::cloud {
 /// library.
 class MapTangent {
  public:
-  /// Of a map that leaves coordinates as they are.
+  /// Of a map that leaves coordinates unchanged.
   MapTangent() = default;
   /// @param value     of the map at `center`, m
   /// @param jacobian  [row: map axis, column: axis of the argument]
@@ -42,12 +45,25 @@ class MapTangent {
                                                Eigen::Matrix3d::Zero()};
 };
 
-/// Where a map is meant to be used.
+/// Area of use of a map.
 struct AreaOfUse {
   std::string name;  ///< "Between 6°E and 12°E, northern hemisphere between equator and 84°N, ..."
   double west = 0, south = 0, east = 0, north = 0;  ///< rad; west above east: across 180 degrees
-  /// How far a place is outside, of latitude or longitude, rad; 0 within.
+  /// Distance of a place outside, in latitude or longitude, rad; 0 within.
   double beyond(double latitude, double longitude) const;
+};
+
+/// A coordinate reference system with angles as coordinates, which points cannot use.
+class GeographicSystem : public InvalidArgument {
+ public:
+  /// @param system  by its usual name: "ETRS89"
+  GeographicSystem(const std::string& message, std::string system)
+      : InvalidArgument(message), system_(std::move(system)) {}
+  /// The same with the UTM zone of the points' place, rad, as advice.
+  InvalidArgument at(double latitude, double longitude) const;
+
+ private:
+  std::string system_;
 };
 
 /// From geocentric coordinates (WGS 84 or another datum of the Earth) to easting, northing and
@@ -57,16 +73,17 @@ class MapProjection {
   /// @param crs     what the map is: "EPSG:25832", with a height system "EPSG:25832+7837", or WKT.
   ///                Without a height system heights are above the ellipsoid.
   /// @param source  the datum of the positions, a geographic or geocentric system: "EPSG:4979" is
-  ///                WGS 84, "EPSG:4937" ETRS89, "EPSG:9988" ITRF2020
-  /// @throws InvalidArgument for systems that are unknown, not a map in metres, or that can only be
-  ///         reached with a file that is not installed (the message names what is missing)
+  ///                WGS 84, "EPSG:4937" ETRS89, "EPSG:9988" ITRF2020; empty: that of the map
+  /// @throws GeographicSystem; InvalidArgument for systems that are unknown, not a map in metres,
+  /// or that can only be reached with a file that is not installed (the message names it, and its
+  /// source)
   explicit MapProjection(const std::string& crs, const std::string& source = "EPSG:4979");
   ~MapProjection();
   MapProjection(MapProjection&&) noexcept;
   MapProjection& operator=(MapProjection&&) noexcept;
 
-  /// One point, exactly as the projection library has it.
-  /// @throws InvalidArgument where the map does not reach
+  /// One point, exactly, by the projection library.
+  /// @throws InvalidArgument outside the map's reach
   Eigen::Vector3d project(const Eigen::Vector3d& geocentric_m) const;
 
   /// The geocentric place of a point of the map, m: the inverse of project().
@@ -79,10 +96,10 @@ class MapProjection {
   const std::string& name() const;  ///< "ETRS89 / UTM zone 32N"
   const std::string& wkt() const;   ///< as LAS 1.4 files want it: OGC WKT 1
   bool has_height_system() const;   ///< otherwise heights are ellipsoidal
-  /// Nothing where the system does not say, as own ones in WKT.
+  /// Nothing if the system does not state it, as private ones in WKT.
   const std::optional<AreaOfUse>& area() const;
-  /// What the library says of the change of datum, once a point was projected: "WGS 84 to ETRS89
-  /// (1), accuracy 1 m"; empty where there is none.
+  /// The library's description of the change of datum, once a point was projected: "WGS 84 to
+  /// ETRS89 (1), accuracy 1 m"; empty if there is none.
   std::string operation() const;
 
  private:
@@ -90,8 +107,11 @@ class MapProjection {
   std::unique_ptr<State> state_;
 };
 
-/// The UTM zone of a place on WGS 84, with ellipsoidal heights: "EPSG:32632".
-/// @param latitude, longitude  rad @throws InvalidArgument beyond 84 north and 80 south
-std::string utm_zone_of(double latitude, double longitude);
+/// The UTM zone of a place, with ellipsoidal heights: "EPSG:32632".
+/// @param latitude, longitude  rad
+/// @param system  geographic system that it is to be of, by name, such as "ETRS89"; WGS 84 where
+///                there is no such zone
+/// @throws InvalidArgument beyond 84 north and 80 south
+std::string utm_zone_of(double latitude, double longitude, const std::string& system = "WGS 84");
 
 }  // namespace risley::cloud

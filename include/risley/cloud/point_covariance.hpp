@@ -19,8 +19,8 @@ namespace risley::cloud {
 /// @param points  with own_covariance, and loadings where there are common factors
 /// @param errors  of the trajectory, in the axes and the time of the points
 /// @param rows    of the points
-/// @throws InvalidArgument for rows beyond the points, points without own_covariance, a table of no
-///         places, times of points outside of it
+/// @throws InvalidArgument for rows beyond the points, points without own_covariance, an empty
+/// table, times of points outside of it
 Eigen::MatrixXd joint_covariance(const Points& points, const TrajectoryErrors& errors,
                                  std::span<const std::size_t> rows);
 

@@ -33,14 +33,14 @@ struct PointedShots {
 
 /// Cartesian points of the sensor's frame with covariance [B21 Eq. (31), App. A]. Fills x, y, z,
 /// covariance, range, incidence, rotation_angle, residuals and loading, as far as the header
-/// announces them; the points' other columns are the caller's. A beam that does not get through the
+/// announces them; the caller fills the points' other columns. A beam that does not get through the
 /// prisms gives NaN. Residuals are exact to 1e-8 of them up to 0.1 rad; larger ones are only large.
 /// @param header  of the points: without rotation angles only where the model needs none; with one
 /// factor name per factor of the model or none
-/// @param poses  of the shots of a model with a mount, whose errors then count
-/// @throws InvalidArgument for columns, factors or prisms that are not as model and header announce
-///         them, emitters that the model does not have, range errors that are not finite or of
-///         another number of emitters, and as check_available()
+/// @param poses  of the shots of a model with a mount; the mount's errors then count
+/// @throws InvalidArgument for columns, factors or prisms that differ from model and header,
+/// emitters that the model does not have, range errors that are not finite or of another number of
+/// emitters, and as check_available()
 void compute_points(const PointingModel& model, const CloudHeader& header,
                     const PointedShots& shots, Points& points, const SensorPoses& poses = {},
                     InstructionSet set = best_instruction_set());

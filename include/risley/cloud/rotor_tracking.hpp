@@ -20,7 +20,7 @@
 
 namespace risley::cloud {
 
-/// What a recording says of the sensor that made it.
+/// Properties of the sensor determined from its recording.
 struct SensorBelief {
   sensors::Sensor sensor;  ///< with the parameters that its reported directions are computed with
   std::vector<estimation::FreeParameter> free;
@@ -35,7 +35,7 @@ struct SensorBelief {
   std::vector<Warning> warnings;
 };
 
-/// Finds out from the beginning of a recording.
+/// Determined from the beginning of a recording.
 /// @param calibration  start values, and which parameters are free
 /// @param angle_noise  rad; empty: the calibration's
 /// @throws EstimationError naming yaw and pitch when shots lie outside the sensor's field of view,
@@ -55,7 +55,7 @@ class RotorTracker {
 
   /// Finds the motion over a piece of a recording that overlaps the piece before.
   /// @param rows  directions as the belief has them (turned when mirrored)
-  /// @throws EstimationError when none can be found
+  /// @throws EstimationError if none can be found
   void track(const recordings::Observations& rows);
 
   /// Rotation angles and their covariance at given parameters, of rows of the last piece in
@@ -70,7 +70,7 @@ class RotorTracker {
   estimation::Start start_of(const estimation::AngleSeries& series,
                              const estimation::AngleSeries& head) const;
 
-  /// How far from a knot its parabola is trusted, s.
+  /// Distance from a knot within which its parabola is trusted, s.
   double reach() const;
 
   const SensorBelief& belief_;

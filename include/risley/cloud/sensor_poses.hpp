@@ -12,7 +12,7 @@
 
 namespace risley::cloud {
 
-/// Where a sensor is at the times of some shots, as columns of one length.
+/// Poses of a sensor at the times of some shots, as columns of one length.
 struct SensorPoses {
   std::array<std::vector<double>, 9>
       turn;  ///< frame of the trajectory from sensor, column by column
@@ -25,7 +25,7 @@ struct SensorPoses {
   Eigen::Vector3d lever_arm{0, 0, 0};
 
   std::size_t size() const { return strip.size(); }
-  void resize(std::size_t shots);  ///< gives every column so many rows
+  void resize(std::size_t shots);  ///< gives every column this many rows
   /// Keeps only these rows. @param rows  ascending @throws InvalidArgument
   void keep(std::span<const std::size_t> rows);
 };

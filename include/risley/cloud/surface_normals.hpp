@@ -12,33 +12,32 @@
 
 namespace risley::cloud {
 
-/// Directions of the surfaces that a sensor looks at, from the ranges around each direction. Cells
-/// of one degree collect moments of inverse depth over y/x and z/x, in which a plane is linear; a
-/// cell and its eight neighbours together make one fit. Where surfaces end or meet there is no fit,
-/// and a shot belongs to the surface of a cell nearby that leads to its range, if one does.
+/// Orientations of the surfaces in a sensor's view, from the ranges around each direction. Cells of
+/// one degree collect moments of inverse depth over y/x and z/x, in which a plane is linear; a cell
+/// and its eight neighbours together give one fit. Where surfaces end or meet there is no fit, and
+/// a shot belongs to the surface of a nearby cell that predicts its range, if there is one.
 /// Directions flatter than six degrees to the plane across the X axis, or behind it, have none.
 /// Derivation: docs/theory/cloud.md
 class SurfaceNormals {
  public:
-  /// @param range_noise  1 sigma, m: surfaces whose ranges scatter more than kRoughest times as
-  ///                     much are edges, leaves or several surfaces, and get no normal
+  /// @param range_noise 1 sigma, m: surfaces whose ranges scatter more than kRoughest times as much
+  /// are edges, leaves or several surfaces, and get no normal
   /// @param direction_noise  1 sigma about two axes, rad: on a slanted surface it adds its distance
   ///                     times the tangent of the angle of incidence to the scatter of ranges
-  /// @throws InvalidArgument for range noise that is not above 0, direction noise below 0
+  /// @throws InvalidArgument for range noise not above 0, direction noise below 0
   explicit SurfaceNormals(double range_noise, double direction_noise = 0);
 
-  /// How much more than the noise ranges may scatter about a surface.
+  /// Largest scatter of ranges about a surface, as a multiple of the noise.
   static constexpr double kRoughest = 2.0;
 
-  /// Forgets all shots; normals stay until the next fit().
+  /// Discards all shots; normals stay until the next fit().
   void clear();
   /// Adds one shot; one without a range above 0 is ignored. @param azimuth, zenith  rad
   /// @param range  m
   void add(double azimuth, double zenith, double range);
   /// Fits all cells to the shots added.
   void fit();
-  /// Unit normal of the surface that a shot is on, of either sign, sensor frame; NaN where there is
-  /// none.
+  /// Unit normal of the surface at a shot, of either sign, sensor frame; NaN if there is none.
   Vector3<double> normal(double azimuth, double zenith, double range) const {
     const std::size_t cell = cell_of(azimuth, zenith);
     if (cell == kNowhere) return kNone;
@@ -67,21 +66,21 @@ class SurfaceNormals {
     if (!(column >= 0 && column < kSide && row >= 0 && row < kSide)) return kNowhere;
     return static_cast<std::size_t>(row) * kSide + static_cast<std::size_t>(column);
   }
-  /// Points p with n p = distance; NaN where there is none.
+  /// Points p with n p = distance; NaN if there is none.
   struct FittedPlane {
     std::array<float, 3> n;
     float distance = 0;
 
     bool exists() const { return n[0] == n[0]; }
     Vector3<double> normal() const { return {n[0], n[1], n[2]}; }
-    /// How far it is in a direction.
+    /// Its distance in a direction.
     double range(const Vector3<double>& direction) const {
       return static_cast<double>(distance) / dot(normal(), direction);
     }
     /// Slope of the range over the direction, m per rad.
     double slope(const Vector3<double>& direction) const;
   };
-  /// What a cell knows: its plane, or those of cells nearby.
+  /// Result of a cell: its plane, or those of nearby cells.
   struct Surface {
     FittedPlane plane;
     std::uint32_t beside = 0;  ///< first of its row in beside_

@@ -24,10 +24,10 @@ inline constexpr double kSquareDegree = kRadiansPerDegree * kRadiansPerDegree;
 /// As radians_from_degrees(), the other way.
 constexpr double degrees_from_radians(double radians) { return radians * kDegreesPerRadian; }
 
-/// The same angle in [-pi, pi]; NaN for what is no angle.
+/// The same angle in [-pi, pi]; NaN for a non-finite angle.
 inline double wrap_to_pi(double angle) { return std::remainder(angle, kTwoPi); }
 
-/// The same angle in [0, 2 pi); NaN for what is no angle.
+/// The same angle in [0, 2 pi); NaN for a non-finite angle.
 inline double wrap_to_two_pi(double angle) {
   const double remainder = std::remainder(angle, kTwoPi);
   const double wrapped = remainder < 0.0 ? remainder + kTwoPi : remainder;

@@ -12,13 +12,13 @@
 #include "risley/core/vector3.hpp"
 
 /// @file
-/// Sine, cosine and the angles of a direction for all lanes of a batch at once: polynomials where
-/// almost all shots are, and xsimd's functions, which are slower and know no limits, for the lanes
-/// elsewhere: what a lane gives does not depend on the others. Absolute errors stay below 2.5e-16
-/// and 1e-15 (tests/core/batch_functions_test.cpp). Directions of shots take 6 % less time than
-/// with xsimd's sines and 22 % less than with its arcs with AVX2, 12 and 26 % less with AVX-512
-/// (Zen 4). The polynomials interpolate at Chebyshev's nodes of the range that is named; the error
-/// beside each is theirs alone.
+/// Sine, cosine and the angles of a direction for all lanes of a batch at once: polynomials in the
+/// range of almost all shots, and xsimd's functions, which are slower and have no limits, for the
+/// other lanes: the result of a lane does not depend on the others. Absolute errors stay below
+/// 2.5e-16 and 1e-15 (tests/core/batch_functions_test.cpp). Directions of shots take 6 % less time
+/// than with xsimd's sines and 22 % less than with its arcs with AVX2, 12 and 26 % less with
+/// AVX-512 (Zen 4). The polynomials interpolate at Chebyshev's nodes of the named range; the stated
+/// error is that of the polynomial alone.
 namespace risley {
 
 /// Coefficients of a polynomial, each in all lanes.
@@ -26,7 +26,7 @@ template <class Batch, std::size_t Count>
 struct CoefficientLanes {
   alignas(64) double lane[Count][Batch::size];  ///< of each coefficient
 
-  /// @param coefficients  the one of the highest power last
+  /// @param coefficients  highest power last
   constexpr explicit CoefficientLanes(const double (&coefficients)[Count]) : lane{} {
     for (std::size_t i = 0; i < Count; ++i) {
       for (double& one : lane[i]) one = coefficients[i];
@@ -35,9 +35,9 @@ struct CoefficientLanes {
 };
 
 /// c[0] + c[1] z + ... + c[Count - 1] z^(Count - 1), by Horner's rule.
-/// AVX2 multiplies and adds a batch from memory in one instruction, but needs one more to bring a
-/// single number into all lanes, and the compiler prefers these to a table unless it cannot see
-/// what stands there. Directions take 7 % less time so with AVX2, 1 % more with AVX-512.
+/// AVX2 multiplies and adds a batch from memory in one instruction, but needs one more to broadcast
+/// a single number, and the compiler prefers this to a table unless it cannot see the contents.
+/// With AVX2 directions take 7 % less time this way, with AVX-512 1 % more.
 template <const auto& Coefficients, class Arch>
 xsimd::batch<double, Arch> polynomial(const xsimd::batch<double, Arch>& z) {
   using Batch = xsimd::batch<double, Arch>;
@@ -62,7 +62,7 @@ xsimd::batch<double, Arch> polynomial(const xsimd::batch<double, Arch>& z) {
   }
 }
 
-/// xsimd's functions, kept out of the code around the polynomials: it would get three times as
+/// xsimd's functions, kept out of the code around the polynomials, which would get three times as
 /// long.
 template <class Arch>
 [[gnu::noinline, gnu::cold]] std::pair<xsimd::batch<double, Arch>, xsimd::batch<double, Arch>>
@@ -88,7 +88,7 @@ xsimd::batch<double, Arch> wrapped(const xsimd::batch<double, Arch>& angle) {
   return angle - kTurn * xsimd::nearbyint(angle / kTurn);
 }
 
-/// Largest angle that sine_cosine() brings into the first eighth of a turn by itself, rad: up to
+/// Largest angle that sine_cosine() reduces to the first eighth of a turn by itself, rad: up to
 /// there, quarter turns times a third of the bits of pi / 2 is exact.
 inline constexpr double kLargestReduced = 1e6;
 
@@ -125,7 +125,7 @@ std::pair<xsimd::batch<double, Arch>, xsimd::batch<double, Arch>> sine_cosine(
   const Batch sine = r * xsimd::fma(z, polynomial<kSineSeries>(z), Batch(1.0));
   const Batch cosine =
       xsimd::fma(z, xsimd::fma(z, polynomial<kCosineSeries>(z), Batch(-0.5)), Batch(1.0));
-  // Bits 1 and 0 of q go to the two highest bits: to the sign, and to what makes a double 2.0.
+  // Bits 1 and 0 of q go to the two highest bits: to the sign, and to the bit pattern of 2.0.
   constexpr std::uint64_t kSign = std::uint64_t{1} << 63, kTwo = std::uint64_t{1} << 62;
   const Bits q = std::bit_cast<Bits>(shifted) << 62;
   const auto odd = std::bit_cast<Batch>(q & Bits(kTwo)) != Batch(0.0);
@@ -161,7 +161,7 @@ SphericalAngles<xsimd::batch<double, Arch>> cone_angles(
     const Vector3<xsimd::batch<double, Arch>>& direction) {
   using Batch = xsimd::batch<double, Arch>;
   constexpr double kMostTangent = 0.4142, kMostHeight = 0.42;
-  // Comparison with NaN is false: shots that do not get through take no batch the long way.
+  // Comparison with NaN is false: blocked shots do not send a batch the slow way.
   const auto outside = (xsimd::abs(direction.y) > Batch(kMostTangent) * direction.x) |
                        (xsimd::abs(direction.z) > Batch(kMostHeight));
   const Batch t = direction.y / direction.x, s = t * t;

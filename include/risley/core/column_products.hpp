@@ -9,8 +9,8 @@
 namespace risley {
 
 /// Sums of the products of all pairs of columns, for kernels: a row holds one group of shots, a
-/// lane each. The products are summed up in squares of so many rows and columns as the registers
-/// allow, over so many groups at once that the rows stay in the nearest cache.
+/// lane each. The products are summed in squares of as many rows and columns as the registers hold,
+/// over as many groups at once as fit the nearest cache.
 /// @tparam Most  columns at most
 /// @tparam Tile  side of the squares
 template <class Batch, std::size_t Most, std::size_t Tile = Batch::size == 8 ? 4 : 3>
@@ -21,12 +21,12 @@ class ColumnProducts {
   static constexpr std::size_t tiles_of(std::size_t columns) {
     return (columns + kTile - 1) / kTile;
   }
-  /// Room of a row of so many columns; those behind the last one must be zero.
+  /// Size of a padded row of this many columns; those after the last one must be zero.
   static constexpr std::size_t padded(std::size_t columns) { return tiles_of(columns) * kTile; }
 
   /// @param columns  at most Most
   explicit ColumnProducts(std::size_t columns) { start(columns); }
-  /// From zero, with so many columns.
+  /// Starts from zero, with this many columns.
   void start(std::size_t columns) {
     columns_ = columns;
     tiles_ = tiles_of(columns);
@@ -45,7 +45,7 @@ class ColumnProducts {
     }
   }
 
-  /// Sum of the products of columns i and j, of which i is not the larger.
+  /// Sum of the products of columns i and j, with i not above j.
   const Batch& sum(std::size_t i, std::size_t j) const {
     const std::size_t row = i / kTile;
     const Batch* tile = sums_ + (row * tiles_ - row * (row + 1) / 2 + j / kTile) * kTile * kTile;

@@ -12,9 +12,9 @@
 
 namespace risley {
 
-// Tables of columns are structs whose columns a list describes, once. Each entry of such a list
-// is a place, or says in `place`, where the table has the column, or several alike within arrays
-// and vectors.
+// Tables of columns are structs whose columns are described once, by a list. Each entry of such a
+// list is a place, or has a member `place`, which locates the table's column, or several alike
+// within arrays and vectors.
 
 /// A place: a pointer to a member of one of some types.
 template <class Table, class... Columns>
@@ -30,7 +30,7 @@ consteval auto place_of() {
   }
 }
 
-/// Whether a list has all members of a table that has nothing but columns.
+/// Whether a list covers all members of a table that consists only of columns.
 template <class Table, const auto& List>
 consteval bool lists_all_columns() {
   const std::array places = []<std::size_t... I>(std::index_sequence<I...>) {
@@ -56,8 +56,8 @@ void visit_numbers(const Visit& visit, First& first, Others&... others) {
   }
 }
 
-/// Calls visit(entry, column...) for every column of numbers that the list describes, whose types
-/// the compiler knows.
+/// Calls visit(entry, column...) for every column of numbers in the list, with types known to the
+/// compiler.
 template <const auto& List, class Visit, class... Tables>
 void for_each_entry(const Visit& visit, Tables&... tables) {
   const auto one = [&]<std::size_t I>() {

@@ -8,7 +8,7 @@
 
 namespace risley {
 
-/// A direction as the sensor reports it: azimuth from X towards Y, zenith from Z, both rad.
+/// A direction as reported by the sensor: azimuth from X towards Y, zenith from Z, both rad.
 template <class T>
 struct SphericalAngles {
   T azimuth{}, zenith{};
@@ -34,7 +34,7 @@ SphericalAngles<T> angles_from_direction(const Vector3<T>& direction) {
   return {atan2(direction.y, direction.x), atan2(horizontal, direction.z)};
 }
 
-/// How a scalar computes the angles of a unit vector; batches specialise it.
+/// A scalar's way to compute the angles of a unit vector; batches specialise it.
 template <class T>
 struct UnitVectorAngles {
   /// As angles_from_direction().
@@ -43,7 +43,7 @@ struct UnitVectorAngles {
   }
 };
 
-/// As angles_from_direction(), of a vector of length 1 (or NaN), which is quicker for batches.
+/// As angles_from_direction(), for a vector of length 1 (or NaN), which is faster for batches.
 template <class T>
 SphericalAngles<T> angles_from_unit_vector(const Vector3<T>& direction) {
   return UnitVectorAngles<T>::of(direction);

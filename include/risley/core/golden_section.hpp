@@ -6,11 +6,10 @@
 
 namespace risley {
 
-/// Where a function of one variable that has a single minimum in [a, b] takes it, by golden-section
+/// Minimum of a function of one variable that has a single minimum in [a, b], by golden-section
 /// search: each step costs one evaluation and leaves 0.618 of the interval.
 /// @param tolerance  width of the interval at which the search ends, > 0
-/// @throws InvalidArgument for an end that is not finite, b below a, and a tolerance that is not
-///         above 0
+/// @throws InvalidArgument for a non-finite end, b below a, and a tolerance not above 0
 template <class Function>
 double golden_section_minimum(Function&& f, double a, double b, double tolerance) {
   require_finite("a", a);

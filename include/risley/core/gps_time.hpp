@@ -8,12 +8,12 @@ namespace risley {
 
 /// The origin of GPS time, 6 January 1980, s after 1 January 1970.
 inline constexpr std::int64_t kGpsEpoch = 315'964'800;
-/// What adjusted standard GPS time of LAS files has less than GPS time, s.
+/// Difference of GPS time and the adjusted standard GPS time of LAS files, s.
 inline constexpr std::int64_t kGpsAdjustment = 1'000'000'000;
 inline constexpr std::int64_t kWeek = 604'800,  ///< s
     kDay = 86'400;                              ///< s
 
-/// How much GPS time is ahead of UTC, s. Earlier than July 2012 none of these sensors measured.
+/// GPS time minus UTC, s. None of these sensors is older than July 2012.
 /// @param utc_ns  since 1 January 1970
 constexpr std::int64_t leap_seconds(std::int64_t utc_ns) {
   constexpr std::int64_t kNanoseconds = 1'000'000'000;

@@ -13,19 +13,19 @@ enum class InstructionSet { baseline, avx2, avx512 };
 /// "baseline", "avx2" or "avx512".
 std::string to_string(InstructionSet set);
 
-/// The instruction sets this binary holds and this processor runs, best last: none where the binary
-/// was built for another kind of processor (RISLEY_INSTRUCTION_SETS).
+/// The instruction sets that this binary holds and this processor supports, best last: none if the
+/// binary was built for another kind of processor (RISLEY_INSTRUCTION_SETS).
 const std::vector<InstructionSet>& available_instruction_sets();
 
 /// The last of available_instruction_sets(). @throws Error when there is none
 InstructionSet best_instruction_set();
 
-/// @throws InvalidArgument when this binary does not hold it or this processor does not run it,
-///         and as best_instruction_set()
+/// @throws InvalidArgument when this binary does not hold it or this processor does not support it,
+/// and as best_instruction_set()
 void check_available(InstructionSet set);
 
-/// The copies of one kernel, a function of plain arguments: nullptr where the binary has none, and
-/// the next narrower one serves. A kernel for another device would be one more copy.
+/// The copies of one kernel, a function of plain arguments: nullptr if the binary lacks it, and the
+/// next narrower one is used. A kernel for another device would be one more copy.
 template <class Function>
 struct KernelCopies {
   Function* baseline;
@@ -54,7 +54,7 @@ struct KernelCopies {
   __VA_ARGS__;                     \
   }
 
-// What RISLEY_INSTRUCTION_SETS chose is defined by cmake/RisleySimdKernels.cmake.
+// cmake/RisleySimdKernels.cmake defines the choice of RISLEY_INSTRUCTION_SETS.
 #ifdef RISLEY_HOLDS_BASELINE
 #define RISLEY_BASELINE_COPY(function) &kernel_baseline::function
 #else
@@ -78,7 +78,7 @@ struct KernelCopies {
   risley::KernelCopies<decltype(kernel_baseline::function)> {                                \
     RISLEY_BASELINE_COPY(function), RISLEY_AVX2_COPY(function), RISLEY_AVX512_COPY(function) \
   }
-/// The same of a kernel that has nothing to do for eight lanes: AVX-512 runs its copy for AVX2.
+/// The same for a kernel that cannot use eight lanes: AVX-512 uses its AVX2 version.
 #define RISLEY_NARROW_KERNEL_COPIES(function)                                  \
   risley::KernelCopies<decltype(kernel_baseline::function)> {                  \
     RISLEY_BASELINE_COPY(function), RISLEY_NARROW_AVX2_COPY(function), nullptr \

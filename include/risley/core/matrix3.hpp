@@ -6,12 +6,12 @@
 
 namespace risley {
 
-/// Three by three numbers of any scalar the model runs in, for kernels: see Vector3.
+/// Three by three numbers of any scalar of the model, for kernels: see Vector3.
 template <class T>
 struct Matrix3 {
   Vector3<T> column[3];
 
-  /// @param entry  column by column; what T can be made of
+  /// @param entry  column by column; anything convertible to T
   template <class Number>
   static Matrix3 from_columns(const Number (&entry)[9]) {
     Matrix3 m;

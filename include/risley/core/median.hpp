@@ -13,7 +13,7 @@ namespace risley {
 /// Standard deviation of a normal distribution over the median distance from its middle.
 inline constexpr double kSigmaOverMedianDistance = 1.4826;
 
-/// The middle value, of two the mean, of none NaN. Orders the values anew.
+/// The middle value; the mean of the two middle ones; NaN for no values. Orders the values anew.
 inline double median(std::span<double> values) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -22,7 +22,7 @@ inline double median(std::span<double> values) {
   return 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
-/// What stands at a place once the values are in order, counted from 0. Orders the values anew.
+/// The value at a place in sorted order, counted from 0. Orders the values anew.
 template <class T>
 T nth_value(std::vector<T>& values, std::size_t place) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
@@ -30,13 +30,14 @@ T nth_value(std::vector<T>& values, std::size_t place) {
   return *at;
 }
 
-/// The middle value, of two the greater; there must be one. Orders the values anew.
+/// The middle value, or the greater of the two middle ones; there must be one. Orders the values
+/// anew.
 template <class T>
 T upper_median(std::vector<T>& values) {
   return nth_value(values, values.size() / 2);
 }
 
-/// The value that this share of the others is below, without interpolation; there must be one.
+/// The quantile: this share of the others is below it, without interpolation; there must be one.
 /// Orders the values anew.
 template <class T>
 T quantile(std::vector<T>& values, double share) {

@@ -6,15 +6,15 @@
 
 namespace risley {
 
-/// A value and its sigma for people, with the digits that mean something.
+/// A value and its sigma for people, with significant digits only.
 struct NumberText {
   std::string value, sigma;
 };
 
-/// "-0.00" as "0.00", any other number as it is.
+/// "-0.00" as "0.00", any other number unchanged.
 std::string without_minus_zero(std::string number);
 
-/// A number with so many significant digits and never as a power of ten: "0.0000857".
+/// A number with this many significant digits and never as a power of ten: "0.0000857".
 std::string plain_text(double value, int digits);
 
 /// Whether a sigma is finite and above zero.
@@ -28,16 +28,16 @@ NumberText number_text(double value, double sigma);
 /// number_text.
 std::string text_to_place_of(double value, double sigma);
 
-/// Distance at which messages give the shift that a small angle causes, m.
+/// Distance at which messages state the shift due to a small angle, m.
 inline constexpr double kStatedDistance = 30;
 
-/// How far a direction that is off by an angle, rad, moves a point at a distance, m, from where it
-/// is: distance * tan(|angle|), m.
+/// Displacement of a point at a distance, m, due to an angle error of its direction, rad: distance
+/// * tan(|angle|), m.
 /// @param angle  below a right angle
 double offset_at(double angle, double distance = kStatedDistance);
 
-/// The same for people, with two significant digits: "2.6 mm at 30 m", from 10 cm on "21 cm at
-/// 30 m", from 1 m on "1.6 m at 30 m"; "–" where angle or distance is not finite.
+/// The same for people, with two significant digits: "2.6 mm at 30 m", from 10 cm on "21 cm at 30
+/// m", from 1 m on "1.6 m at 30 m"; "–" if angle or distance is not finite.
 std::string offset_text(double angle, double distance = kStatedDistance);
 
 }  // namespace risley

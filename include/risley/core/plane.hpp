@@ -25,7 +25,7 @@ inline double signed_distance(const Plane& plane, const Vector3<double>& point) 
   return dot(plane.normal, point) - plane.distance;
 }
 
-/// How far along a ray the plane is met, m: negative behind the ray's start, NaN when the ray is
+/// Distance along a ray to the plane, m: negative behind the ray's start, NaN when the ray is
 /// parallel to the plane.
 /// @param origin     start of the ray, m
 /// @param direction  unit vector

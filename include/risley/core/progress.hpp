@@ -13,7 +13,7 @@
 
 namespace risley {
 
-/// A computation was asked to stop and did: nothing of it is left.
+/// A computation was stopped on request and left no trace.
 class Cancelled : public Error {
  public:
   Cancelled() : Error("cancelled") {}
@@ -31,16 +31,16 @@ class CancelFlag {
   std::atomic<bool> set_{false};
 };
 
-/// How a long computation reports its progress and learns that it is cancelled. It calls
-/// from one thread at a time. A callback stops it by throwing, best Cancelled; a flag stops it with
-/// Cancelled also where there is nothing to report. An empty Progress ignores reports.
+/// Progress reports of a long computation, and its cancellation. It calls from one thread at a
+/// time. A callback stops it by throwing, preferably Cancelled; a flag stops it with Cancelled even
+/// if there is nothing to report. An empty Progress ignores reports.
 class Progress {
  public:
   /// @param fraction  done, [0, 1]  @param stage  of a job that has several; may be empty
   using Callback = std::function<void(double fraction, std::string_view stage)>;
 
   Progress() = default;
-  /// @param cancel  looked at, if any, and must outlive the computation
+  /// @param cancel  checked if given; must outlive the computation
   template <std::invocable<double, std::string_view> F>
   Progress(F callback, const CancelFlag* cancel = nullptr)  // NOLINT(*-explicit-constructor)
       : callback_(std::move(callback)), cancel_(cancel) {}
@@ -51,7 +51,7 @@ class Progress {
         }),
         cancel_(cancel) {}
 
-  /// @throws Cancelled, and what the callback throws
+  /// @throws Cancelled, and exceptions of the callback
   void report(double fraction) const {
     check();
     if (callback_) callback_(fraction, stage_);
@@ -60,7 +60,7 @@ class Progress {
   void check() const {
     if (cancelled()) throw Cancelled();
   }
-  /// The same where nothing can be thrown.
+  /// The same where exceptions are not allowed.
   bool cancelled() const noexcept { return cancel_ != nullptr && cancel_->is_set(); }
 
   /// Another callback, the same flag.
@@ -69,7 +69,7 @@ class Progress {
     result.callback_ = std::move(callback);
     return result;
   }
-  /// For work whose share is not known: it can be cancelled by the flag and reports nothing.
+  /// For work of unknown extent: it can be cancelled by the flag and reports nothing.
   Progress silent() const { return with({}); }
   /// For a stage of a job: the same, its fractions from 0 to 1 again.
   Progress stage(std::string name) const {

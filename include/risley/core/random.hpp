@@ -7,15 +7,15 @@
 
 namespace risley {
 
-/// A stream of random numbers whose every value can be asked for by its number: value i depends
-/// on the seed, the stream and i alone (counter-based generator Philox4x64-10, Salmon et al. 2011).
-/// Results therefore do not depend on the order of the calls, on threads or on block sizes.
-/// Streams of different seeds or numbers are independent of each other, and so are the uniform and
-/// the normal values of one stream.
+/// A stream of random numbers with access by index: value i depends only on the seed, the stream
+/// and i (counter-based generator Philox4x64-10, Salmon et al. 2011). Results therefore do not
+/// depend on the order of the calls, on threads or on block sizes. Streams of different seeds or
+/// numbers are independent of each other, and so are the uniform and the normal values of one
+/// stream.
 class RandomStream {
  public:
   /// @param seed    chosen by the user
-  /// @param stream  what the numbers are for: one number per purpose
+  /// @param stream  the purpose of the numbers: one number per purpose
   RandomStream(std::uint64_t seed, std::uint64_t stream) : seed_(seed), stream_(stream) {}
 
   /// Uniform in the open interval (0, 1), 52 random bits.

@@ -7,9 +7,8 @@
 
 namespace risley {
 
-// What the entries of the libraries ask of their callers, once per call. Each throws
-// InvalidArgument with the name of the argument, its value and unit, and what is allowed; NaN is
-// never allowed.
+// Preconditions of the libraries' entry points, checked once per call. Each throws InvalidArgument
+// with the name of the argument, its value and unit, and the allowed range; NaN is never allowed.
 
 /// "azimuth has 3 values, expected 4"
 void require_length(std::string_view name, std::size_t length, std::size_t expected);
@@ -23,7 +22,7 @@ void require_rows(std::string_view name, std::size_t begin, std::size_t end, std
 void require_at_least(std::string_view name, long long value, long long least);
 
 /// "noise = nan rad, allowed above 0"; infinite numbers are not allowed either.
-/// @param unit  as it is written behind the value; may be empty
+/// @param unit  as written after the value; may be empty
 void require_above(std::string_view name, double value, double limit, std::string_view unit = {});
 /// A limit above 0 that may be infinite: "gate = nan, allowed above 0"
 void require_threshold(std::string_view name, double value);

@@ -7,7 +7,7 @@
 
 namespace risley {
 
-/// a + b, or the nearest number that 64 bits hold: times of damaged files can be of any size.
+/// a + b, or the nearest 64-bit number: times of damaged files can be of any size.
 constexpr std::int64_t saturating_sum(std::int64_t a, std::int64_t b) {
   using Limits = std::numeric_limits<std::int64_t>;
   if (b > 0 && a > Limits::max() - b) return Limits::max();
@@ -15,7 +15,7 @@ constexpr std::int64_t saturating_sum(std::int64_t a, std::int64_t b) {
   return a + b;
 }
 
-/// a - b, or the nearest number that 64 bits hold.
+/// a - b, or the nearest 64-bit number.
 constexpr std::int64_t saturating_difference(std::int64_t a, std::int64_t b) {
   using Limits = std::numeric_limits<std::int64_t>;
   if (b < 0 && a > Limits::max() + b) return Limits::max();

@@ -8,9 +8,9 @@
 
 namespace risley {
 
-/// A number type the observation model can be evaluated in: double, ceres::Jet, an SIMD batch.
-/// sqrt, sin, cos and atan2 are found by argument-dependent lookup; comparisons give a mask
-/// (bool, or one bool per lane).
+/// A number type for the observation model: double, ceres::Jet, an SIMD batch. sqrt, sin, cos and
+/// atan2 are found by argument-dependent lookup; comparisons give a mask (bool, or one bool per
+/// lane).
 template <class T>
 concept ModelScalar = requires(T a, T b) {
   T(0.0);
@@ -22,7 +22,7 @@ concept ModelScalar = requires(T a, T b) {
   a >= b;
 };
 
-/// What a comparison of two scalars gives: bool, or one bool per lane of a batch.
+/// Result of a comparison of two scalars: bool, or one bool per lane of a batch.
 template <class T>
 using Mask = std::decay_t<decltype(std::declval<T>() >= std::declval<T>())>;
 
@@ -36,7 +36,7 @@ constexpr const T& select(bool mask, const T& a, const T& b) {
 template <class T>
 using SinePair = std::pair<T, T>;
 
-/// How a scalar computes sine and cosine together; batches specialise it.
+/// A scalar's way to compute sine and cosine together; batches specialise it.
 template <class T>
 struct SineCosine {
   /// Of an angle in rad.

@@ -7,10 +7,10 @@
 
 namespace risley {
 
-/// What users set: an option of the command, a keyword of Python, a key of plans. Libraries know it
-/// by its name in Settings; how it is written is for the front end to say.
+/// A user setting: an option of the command, a keyword of Python, a key of plans. Libraries use its
+/// name in Settings; the front end determines its spelling.
 struct Setting {
-  std::string_view flag;  ///< of the command, without "--": the name that all others follow
+  std::string_view flag;  ///< of the command, without "--": the other spellings follow from it
 };
 
 /// All of them.
@@ -23,19 +23,20 @@ struct Settings {
       disorder{"disorder"}, disorder_packets{"disorder-packets"}, duplication{"duplication"},
       duration{"duration-s"}, empty_circle{"empty-circle-m"}, extrinsics{"extrinsics"},
       false_alarm{"false-alarm"}, fastest{"fastest-hz"}, find{"find-s"}, fix{"fix"},
-      flight{"flight"}, format{"format"}, free{"free"}, from{"from"},
+      flight{"flight"}, format{"format"}, frame_rate{"frame-rate-hz"}, free{"free"}, from{"from"},
       heartbeat_dies{"heartbeat-dies-s"}, interface_address{"interface"},
       knot_spacing{"knot-spacing-s"}, las_scale{"las-scale-m"}, list{"list"}, loss{"loss"},
       method{"method"}, mirror{"mirror"}, mount{"mount"}, noise_angle{"noise-angle-deg"},
       noise_range{"noise-range-m"}, output{"output"}, patch_thickness{"patch-thickness-m"},
       plan{"plan"}, planes{"planes"}, prior_sigma{"prior-sigma-deg"},
       process_noise{"process-noise"}, range_offset_sigma{"range-offset-sigma-m"}, rate{"rate-hz"},
-      recording{"recording"}, restart{"restart-s"}, resume{"resume"}, table{"table"},
-      restart_takes{"restart-takes-s"}, same_walls{"same-walls"}, scene{"scene"}, seed{"seed"},
-      sensor{"sensor"}, sensor_type{"sensor-type"}, serial{"serial"}, shot_rate{"shot-rate-hz"},
-      speed{"speed"}, start{"start-s"}, start_angles{"start-angles-deg"}, states{"states"},
-      station{"station"}, stations{"stations"}, time{"time"}, time_from{"time-from-s"},
-      tolerance{"tolerance-deg"}, trajectory{"trajectory"}, trajectory_errors{"trajectory-errors"},
+      reach{"reach-m"}, recording{"recording"}, restart{"restart-s"}, resume{"resume"},
+      table{"table"}, restart_takes{"restart-takes-s"}, same_walls{"same-walls"}, scene{"scene"},
+      seed{"seed"}, sensor{"sensor"}, sensor_type{"sensor-type"}, serial{"serial"},
+      shot_rate{"shot-rate-hz"}, replace{"replace"}, speed{"speed"}, start{"start-s"},
+      start_angles{"start-angles-deg"}, states{"states"}, station{"station"}, stations{"stations"},
+      time{"time"}, time_from{"time-from-s"}, tolerance{"tolerance-deg"}, topic{"topic"},
+      trajectory{"trajectory"}, trajectory_errors{"trajectory-errors"},
       trajectory_topic{"trajectory-topic"}, truth{"truth"}, unlike{"unlike"},
       wrong_checksums{"wrong-checksums"};
 };
@@ -43,29 +44,30 @@ struct Settings {
 /// By name: kSetting.noise_angle.
 inline constexpr Settings kSetting;
 
-/// How a front end writes settings, for its users to recognise them.
+/// Spelling of settings in a front end, so that its users recognise them.
 enum class SettingStyle {
-  option,   ///< "option noise_angle": of the libraries alone
+  option,   ///< "option noise_angle": without a front end
   flag,     ///< "--noise-angle-deg", values in its unit
   keyword,  ///< "noise_angle", values in SI units
 };
 
-/// To be called once, before anything else, by a program that has users.
+/// To be called once, before anything else, by a program with a user interface.
 void write_settings_as(SettingStyle style);
 
-/// As the front end writes it.
+/// As spelled by the front end.
 std::string name_of(Setting setting);
 /// Of the command, "--noise-angle-deg".
 std::string flag_of(Setting setting);
 /// Of Python: the flag without its unit, "noise_angle".
 std::string keyword_of(Setting setting);
 
-/// Whether an option of the command, by its name there, may be a file to read: such files are part
-/// of the inputs that results state, and no output may replace them.
+/// Whether an option of the command, by its name there, may be an input file: such files are part
+/// of the inputs in results, and no output may replace them.
 bool names_file_to_read(std::string_view option);
 
-// Each throws InvalidArgument with the name of the setting, its value and unit as the front end
-// writes them, and what is allowed; NaN and infinite values never are. Values are in SI units.
+// Each throws InvalidArgument with the name of the setting, its value and unit as spelled by the
+// front end, and the allowed range; NaN and infinite values are never allowed. Values are in SI
+// units.
 
 /// "--rate-hz = -1 Hz, allowed above 0"
 void require_positive(Setting setting, double value);

@@ -11,8 +11,8 @@
 
 // What kernels share. A kernel is compiled once per instruction set, with RISLEY_KERNEL = baseline,
 // avx2, avx512, and puts its functions into RISLEY_KERNEL_NAMESPACE. Every template instantiated
-// there carries the batch type of that instruction set in its name, so the linker cannot take a
-// wide copy for the rest of the program (tests/architecture checks it).
+// there has the batch type of that instruction set in its name, so the linker cannot use a wide
+// copy for the rest of the program (tests/architecture checks it).
 #define RISLEY_JOIN2(a, b) a##b
 #define RISLEY_JOIN(a, b) RISLEY_JOIN2(a, b)
 #define RISLEY_KERNEL_NAMESPACE RISLEY_JOIN(kernel_, RISLEY_KERNEL)

@@ -9,22 +9,22 @@
 
 namespace risley {
 
-/// The same with the letters A to Z in lower case, for endings of file names.
+/// The same with the letters A to Z in lower case, for file name endings.
 std::string lower_case(std::string text);
 
-/// The known name that was probably meant by another word: the one that fewest changed,
-/// missing, added or swapped letters separate from it, where capitals and hyphens, underscores and
-/// spaces do not count; else the first name that the word is the beginning of, up to such a mark.
-/// Empty when every name is further than a third of its letters away.
+/// The known name that was probably meant by another word: the one with the fewest changed,
+/// missing, added or swapped letters, ignoring capitals and the difference of hyphens, underscores
+/// and spaces; otherwise the first name that begins with the word, up to such differences. Empty if
+/// every name differs by more than a third of its letters.
 std::string near_miss(std::string_view word, std::span<const std::string> names);
 
 /// The same for a message: ", did you mean NAME?", or nothing.
 std::string did_you_mean(std::string_view word, std::span<const std::string> names);
 
-/// The same for a terminal: what it would obey instead of showing is written out, control
-/// characters as `\u001b`, marks that turn the direction of writing as `\u202e`, bytes that are no
-/// UTF-8 as `\x9b`. Tabs stay.
-/// @param lines  whether line feeds stay, too
+/// The same for a terminal: characters that it would act on are written out, control characters as
+/// `\u001b`, marks that change the direction of writing as `\u202e`, invalid UTF-8 bytes as `\x9b`.
+/// Tabs stay.
+/// @param lines  whether to keep line feeds, too
 std::string printable(std::string_view text, bool lines);
 
 /// 1234567 as "1 234 567".

@@ -6,8 +6,8 @@
 
 namespace risley {
 
-/// Three components of any scalar the model runs in. Eigen is not used here because its
-/// vectorisation assumes that a scalar is one number, and a batch is several.
+/// Three components of any scalar of the model. Eigen is not used here because its vectorisation
+/// assumes that a scalar is one number, while a batch is several.
 template <class T>
 struct Vector3 {
   T x{}, y{}, z{};
@@ -15,8 +15,8 @@ struct Vector3 {
   Vector3() = default;
   Vector3(const T& x_value, const T& y_value, const T& z_value)
       : x(x_value), y(y_value), z(z_value) {}
-  // Member by member: gcc 12 copies three batches as one block of memory, which costs the kernels a
-  // tenth of their speed.
+  // Member by member: gcc 12 copies three batches as one block of memory, which slows the kernels
+  // down by a tenth.
   Vector3(const Vector3& other) : x(other.x), y(other.y), z(other.z) {}
   Vector3& operator=(const Vector3& other) {
     x = other.x;

@@ -14,7 +14,7 @@
 
 namespace risley {
 
-/// What a warning is about, for programs: a name that stays the same.
+/// The subject of a warning, for programs: a stable name.
 struct WarningCode {
   explicit constexpr WarningCode(std::string_view of) : name(of) {}
   std::string_view name;
@@ -56,22 +56,23 @@ struct WarningCodes {
       ranges_uncorrected{"ranges_uncorrected"}, points_missing{"points_missing"},
       distribution_unknown{"distribution_unknown"}, map_assumed{"map_assumed"},
       datum_changed{"datum_changed"}, outside_map{"outside_map"},
-      results_renamed{"results_renamed"};
+      targets_doubtful{"targets_doubtful"}, calibration_assumed{"calibration_assumed"},
+      common_errors_unknown{"common_errors_unknown"}, results_renamed{"results_renamed"};
 };
 
 /// By name: kWarning.cut_off.
 inline constexpr WarningCodes kWarning;
 
-/// Something a user should know that does not make an answer useless: a tail that was cut off while
-/// recording, a sensor that was guessed.
+/// A remark for the user that does not invalidate the result: a tail that was cut off while
+/// recording, a guessed sensor.
 struct Warning {
   WarningCode code;
   std::string message;
-  FilePlace place = {};            ///< of the file that was read, where there is one
-  std::uint64_t lost_records = 0;  ///< known to be lost; 0 also where the number is unknown
+  FilePlace place = {};            ///< of the file read, if there is one
+  std::uint64_t lost_records = 0;  ///< known to be lost; 0 also if the number is unknown
 };
 
-/// Adds a warning, in words that fmt makes. @return it, valid until the next one
+/// Adds a warning, formatted by fmt. @return it, valid until the next one
 template <class... Values>
 Warning& warn(std::vector<Warning>& warnings, WarningCode code, fmt::format_string<Values...> words,
               Values&&... values) {
@@ -81,7 +82,7 @@ Warning& warn(std::vector<Warning>& warnings, WarningCode code, fmt::format_stri
 /// In one line: the message, then the place in brackets, as in "... (at byte 17)", "... (line 3)".
 std::string warning_text(const Warning& warning);
 
-/// The same warning of one of several files, which its message names first.
+/// The same warning for one of several files, which its message names first.
 Warning of_file(const std::string& file, Warning warning);
 
 /// Puts some behind others.

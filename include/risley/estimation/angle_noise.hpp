@@ -16,52 +16,52 @@ namespace risley::estimation {
 /// Noise of reported directions before rounding: one standard deviation of each angle, rad.
 struct AngleNoise {
   double azimuth = 0, zenith = 0;
-  /// Of one angle, taken over both.
+  /// Of one angle, averaged over both.
   double rms() const { return std::sqrt(0.5 * (azimuth * azimuth + zenith * zenith)); }
 };
 
 /// Noise that is the same in both angles, rad.
 constexpr AngleNoise equal_noise(double sigma) { return {sigma, sigma}; }
 
-/// Noise below this is taken for this, rad: a tenth of a billionth of a degree.
+/// Noise below this is raised to this, rad: a tenth of a billionth of a degree.
 inline constexpr double kLeastAngleNoise = 1e-12;
 
 /// @throws InvalidArgument unless both are finite and above 0
 void check_noise(const AngleNoise& noise);
 
-/// Noise that weights can be made of: not below kLeastAngleNoise.
+/// Noise usable for weights: not below kLeastAngleNoise.
 AngleNoise usable_noise(const AngleNoise& noise);
 
 /// Noise read off residuals.
 struct NoiseEstimate {
-  AngleNoise value;  ///< 0 where rounding explains all of the scatter
+  AngleNoise value;  ///< 0 if rounding explains all of the scatter
   AngleNoise sigma;  ///< one standard deviation of the value
 };
 
-/// So many shots, spread evenly, are enough for robust_noise(): of more it looks at every n-th.
+/// This many evenly spread shots are enough for robust_noise(); of more it uses every n-th.
 inline constexpr std::size_t kRobustNoiseShots = 4000;
 /// The same for robust_level().
 inline constexpr std::size_t kRobustLevelShots = 20000;
 
-/// n where so many of the shots are enough and every n-th is looked at.
+/// The n for which every n-th shot gives that many.
 constexpr std::size_t robust_stride(std::size_t shots, std::size_t enough) {
   return shots < enough ? 1 : shots / enough;
 }
 
-/// Noise with which half of the residuals would be as small as they are, rounding of each shot
-/// apart; half of them may be gross errors. Not below kLeastAngleNoise.
+/// Noise for which half of the residuals would be as small as they are, each shot's rounding apart;
+/// half of them may be gross errors. Not below kLeastAngleNoise.
 /// @param azimuth, zenith  residuals [shots], rad; NaN counts as a gross error
 AngleNoise robust_noise(const AngleSeries& series, std::span<const double> azimuth,
                         std::span<const double> zenith);
 
-/// Scale of the residuals over noise and rounding of each shot, 1 where these explain them; half of
+/// Scale of the residuals over noise and rounding of each shot, 1 if these explain them; half of
 /// the residuals may be gross errors.
 /// @param azimuth, zenith  as robust_noise
 double robust_level(const AngleSeries& series, const AngleNoise& noise,
                     std::span<const double> azimuth, std::span<const double> zenith);
 
-/// Squared residuals of one angle, gathered by the rounding of the shots: all that is needed to
-/// find the noise beside it. Roundings that differ by less than a 500th share a group.
+/// Squared residuals of one angle, grouped by the rounding of the shots: sufficient to find the
+/// noise beside it. Roundings that differ by less than a 500th share a group.
 class SquaredResiduals {
  public:
   /// Sums over shots of one rounding.
@@ -71,7 +71,7 @@ class SquaredResiduals {
     double rounding_variance() const { return rounding / count; }  ///< mean of them, rad^2
   };
   /// @param residual  [shots], rad  @param rounding  [shots], their variances, rad^2
-  /// @param outlier   [shots], shots that are not 0 are left out
+  /// @param outlier  [shots], nonzero shots are skipped
   void add(std::span<const double> residual, std::span<const float> rounding,
            std::span<const unsigned char> outlier);
   /// Adds what was gathered elsewhere.
@@ -90,7 +90,7 @@ struct SquaredAngles {
   SquaredResiduals azimuth, zenith;
 
   /// @param azimuth_residual, zenith_residual  [shots], rad
-  /// @param outlier  [shots], shots that are not 0 are left out
+  /// @param outlier  [shots], nonzero shots are skipped
   void add(const AngleSeries& series, std::span<const double> azimuth_residual,
            std::span<const double> zenith_residual, std::span<const unsigned char> outlier);
   /// Adds what was gathered elsewhere.
@@ -99,7 +99,7 @@ struct SquaredAngles {
 
 /// Most likely noise of normal residuals beside the known rounding of each shot: one variance
 /// component per angle, its sigma from the scatter of the squares. docs/theory/map.md
-/// @param used_share     share of the observed angles that the estimate itself used up
+/// @param used_share  share of the observed angles used up by the estimate itself
 /// @param square_factor  1 + 2 (rho_1^2 + rho_2^2 + ...) of the residuals' autocorrelation
 NoiseEstimate noise_components(const SquaredAngles& squares, double used_share,
                                double square_factor);

@@ -13,7 +13,7 @@
 
 namespace risley::estimation {
 
-/// The directions of single shots in the order of the recording: what an estimator sees of it.
+/// The directions of single shots in the order of the recording: the input of an estimator.
 struct AngleSeries {
   /// As recorded, increasing; a step back means that the sensor's clock was reset.
   std::vector<std::int64_t> time_ns;
@@ -21,8 +21,8 @@ struct AngleSeries {
   std::vector<std::uint8_t> beam;       ///< emitter that fired, from 0
   /// Variance of the format's rounding, (step^2) / 12, rad^2.
   std::vector<float> azimuth_rounding_variance, zenith_rounding_variance;
-  /// Ranges of the shots, m, NaN where there is none; empty unless they were asked for. No
-  /// estimator looks at them: they travel along for what comes after.
+  /// Ranges of the shots, m, NaN without a return; empty unless requested. Estimators ignore them:
+  /// later steps need them.
   std::vector<double> range;
   /// Intensities as reported, which travel along with the ranges; 0 where they are not known, empty
   /// where none is.
@@ -64,7 +64,7 @@ inline constexpr SeriesColumn kSeriesColumns[] = {
 /// Rows [begin, end) of a series.
 AngleSeries rows_of(const AngleSeries& series, std::size_t begin, std::size_t end);
 
-/// Spans of time up to this fit into 64 bits of nanoseconds, s.
+/// Time spans up to this fit into 64 bits of nanoseconds, s.
 inline constexpr double kMostSeconds = 9.2e9;
 
 /// Rows [begin, end) of a series.
@@ -73,40 +73,41 @@ struct ShotRange {
   std::size_t size() const { return end - begin; }
 };
 
-/// Step through rows that leaves about so many of them and meets every beam in turn, where shot i
-/// is one of beam i mod beams.
+/// Step through rows that leaves about this many of them and meets every beam in turn, if shot i is
+/// of beam i mod beams.
 std::size_t thinning_stride(const AngleSeries& series, ShotRange rows, std::size_t most);
 
-/// So many times are looked at for the typical one between shots.
+/// Number of times used to find the typical one between shots.
 inline constexpr std::size_t kMedianSteps = 20000;
 
-/// Typical time between shots, ns: the median of the first ones, which gaps do not move.
+/// Typical time between shots, ns: the median of the first ones, which is robust against gaps.
 /// @param time_ns  of at least two shots
 std::int64_t median_step_ns(std::span<const std::int64_t> time_ns);
 
-/// The mirror image of the shots: elevations change their sign, or azimuths where the axis of
-/// rotation is the sensor's Z.
+/// The mirror image of the shots: elevations change their sign, or azimuths if the axis of rotation
+/// is the sensor's Z.
 void mirror(AngleSeries& series, bool axis_up);
 /// As above. @param azimuth,zenith  rad
 void mirror(std::span<double> azimuth, std::span<double> zenith, bool axis_up);
 
 /// Picks shots on a fixed grid of ticks, so that gaps and jitter do not move them: at each tick the
-/// next shot of a beam that has not had its turn in this round, so that rates and the order of the
+/// next shot of a beam that has not been picked in this round, so that rates and the order of the
 /// beams never fall into step.
 class TickSampler {
  public:
   /// @param rate  Hz, > 0
   explicit TickSampler(double rate);
 
-  /// Begins a new grid of ticks at a time, with every beam's turn still to come.
+  /// Begins a new grid of ticks at a time, and a new round.
   void restart(std::int64_t time_ns) {
     origin_ns_ = next_ns_ = time_ns;
     had_turn_.reset();
     waited_ = 0;
   }
-  /// A beam that will fire, and shall have its turns. Others are known once they fire.
+  /// Announces a beam, so that it is picked in its turn. Other beams are known after their first
+  /// shot.
   void expect(std::uint8_t beam) { seen_[beam] = true; }
-  /// No shot before this time is taken, ns.
+  /// No earlier shot is taken, ns.
   std::int64_t next_ns() const { return next_ns_; }
   /// Whether to take the next shot. @param beam  that fired it
   bool take(std::int64_t time_ns, std::uint8_t beam) {
@@ -120,15 +121,15 @@ class TickSampler {
   double rate_;  // Hz
   std::int64_t origin_ns_ = 0, next_ns_ = 0;
   std::bitset<256> seen_, had_turn_;  // beams, ever and in this round
-  std::size_t waited_ = 0;            // shots since the tick of beams that had their turn
+  std::size_t waited_ = 0;            // shots since the tick of beams already picked
 };
 
 /// How shots are chosen.
 struct SelectionOptions {
-  /// Take at most so many shots per second, evenly spread; empty takes all.
+  /// Take at most this many shots per second, evenly spread; empty takes all.
   std::optional<double> rate;
   bool ranges = false;  ///< keep the ranges too
-  bool rows = false;    ///< remember which observation each shot was
+  bool rows = false;    ///< keep each shot's observation number
 };
 
 /// What was seen while choosing.
@@ -144,27 +145,27 @@ struct SelectionCounts {
 /// Steps back in time up to this are shots out of order, longer ones a clock that was reset, s.
 inline constexpr double kClockReset = 0.01;
 
-/// Chooses shots from a recording that comes in pieces. Only the first return of a shot counts
-/// (all returns share its direction). Another shot with the same time is left out and counted. A
-/// row that is a little earlier than the one before is left out and counted; after a reset of the
-/// clock the series goes on with the new times.
+/// Chooses shots from a recording that comes in pieces. Only the first return of a shot is used
+/// (all returns share its direction). Another shot with the same time is skipped and counted. A row
+/// slightly earlier than the one before is skipped and counted; after a reset of the clock the
+/// series continues with the new times.
 class ShotSelector {
  public:
   explicit ShotSelector(const SelectionOptions& options);
 
-  /// Takes the next rows of the recording. Those whose direction is not valid only count.
+  /// Takes the next rows of the recording. Those with an invalid direction are only counted.
   void add(const recordings::Observations& observations);
 
   /// The chosen shots.
   const AngleSeries& series() const { return series_; }
-  /// The same, handed over: a long recording is not kept twice.
+  /// The same by move: a long recording is not kept twice.
   AngleSeries take_series() { return std::move(series_); }
-  /// All shots of the first second, not thinned: the start of an estimation wants every one.
+  /// All shots of the first second, not thinned, as the start of an estimation needs them.
   const AngleSeries& head() const { return head_; }
-  /// How many rows came so far, and how many were left out for which reason.
+  /// Number of rows so far, and of those skipped by reason.
   const SelectionCounts& counts() const { return counts_; }
-  /// Number of each chosen shot's observation, counted over all that were offered; empty unless
-  /// asked for.
+  /// Number of each chosen shot's observation, counted over all rows offered; empty unless
+  /// requested.
   const std::vector<std::size_t>& rows() const { return rows_; }
 
  private:

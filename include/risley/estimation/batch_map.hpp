@@ -18,9 +18,9 @@ namespace risley::estimation {
 
 /// Settings of the batch estimator.
 struct BatchMapOptions {
-  std::optional<AngleNoise> angle_noise;  ///< held; empty: found, one variance for each angle
+  std::optional<AngleNoise> angle_noise;  ///< held; empty: estimated, one variance for each angle
   std::vector<FreeParameter> free;        ///< constants to estimate; may be empty
-  /// 1 sigma of the turn that the series' frame may have against the sensor's about both axes
+  /// 1 sigma of a possible turn of the series' frame relative to the sensor's about both axes
   /// across the beam, rad; 0: none
   double frame_sigma = 0;
   /// Motion model of the rotors [prisms]; empty chooses it by maximum likelihood.
@@ -33,13 +33,13 @@ struct BatchMapOptions {
 
 /// Maximum a posteriori estimate of the constant parameters and of the rotors' motion from all
 /// shots at once: Gauss-Newton over the whole trajectory with parameters that have no process
-/// noise, first on shots thinned to 1 kHz with weights that gross errors cannot bend, then on all
-/// of them, where one or two steps remain. At the end a hard cut decides on outliers, and the
-/// covariance is that of shots with the autocorrelation and the scatter that the residuals show.
-/// [B21 section 2.4 states the model; the method departs from it: docs/theory/map.md]
-/// @param series  as it is to be used: prepare_shots()
+/// noise, first on shots thinned to 1 kHz with weights robust against gross errors, then on all of
+/// them, which takes one or two more steps. At the end a hard threshold decides on outliers, and
+/// the covariance accounts for the autocorrelation and the scatter of the residuals. [B21 section
+/// 2.4 states the model; the method departs from it: docs/theory/map.md]
+/// @param series  ready for use: prepare_shots()
 /// @param start   of the first stretch
-/// @throws EstimationError when there is nothing to estimate from; InvalidArgument
+/// @throws EstimationError when there are no data for an estimate; InvalidArgument
 Solution run_batch_map(const PackedSeries& series, const Start& start,
                        const sensors::Sensor& sensor, const BatchMapOptions& options,
                        const Progress& progress = {});

@@ -21,38 +21,38 @@ struct Moments {
   double kurtosis = 0;  ///< excess: 0 for a normal distribution
 };
 
-/// Moments of the finite values of a column; NaN everywhere when there is none.
-/// @param skip  where not zero the value is left out (outliers); empty skips nothing
+/// Moments of the finite values of a column; NaN if there are none.
+/// @param skip  nonzero entries are skipped (outliers); empty skips nothing
 Moments moments(std::span<const double> values, std::span<const unsigned char> skip = {});
 
 /// Moments of several samples together.
 Moments moments_together(std::span<const Moments> samples);
 
-/// The shots of a recording that autocorrelation() looks at: some stretches, spread over it.
+/// The shots of a recording used by autocorrelation(): some stretches, spread over it.
 std::vector<ShotRange> autocorrelation_windows(std::size_t shots);
 
 /// Standard deviation of one component of residual pairs, from the median of their lengths: half of
 /// the pairs may be gross errors. Infinite when half of them are NaN.
 double robust_scale(std::span<const double> azimuth, std::span<const double> zenith);
 
-/// How residuals of neighbouring shots hang together.
+/// Correlation of residuals of neighbouring shots.
 struct Autocorrelation {
-  /// 1 + 2 (rho_1 + rho_2 + ...): by so much larger is the variance of a mean than that of as many
-  /// independent residuals. Never below 1.
+  /// 1 + 2 (rho_1 + rho_2 + ...): factor on the variance of a mean compared with independent
+  /// residuals. Never below 1.
   double factor = 1.0;
-  std::vector<double> rho;  ///< at lags 1, 2, ... until it is no different from zero
+  std::vector<double> rho;  ///< at lags 1, 2, ... until it does not differ from zero
 };
 
-/// Autocorrelation of residual columns, both axes together; pairs with a shot missing between them
-/// do not count. The shots of autocorrelation_windows() alone give the same as all. The sum ends
-/// before the first group of 1, 1, 2, 4, ... lags whose mean is below 2 sigma; the factor is one
-/// standard deviation of itself above what the sum says.
-/// @param time_ns  of the shots  @param skip  where not zero the shot is left out
+/// Autocorrelation of residual columns, both axes together; pairs with a missing shot between them
+/// are skipped. The shots of autocorrelation_windows() give the same result as all. The sum ends
+/// before the first group of 1, 1, 2, 4, ... lags whose mean is below 2 sigma; the factor is the
+/// sum plus one standard deviation.
+/// @param time_ns  of the shots @param skip  nonzero shots are skipped
 Autocorrelation autocorrelation(std::span<const std::int64_t> time_ns,
                                 std::span<const double> azimuth, std::span<const double> zenith,
                                 std::span<const unsigned char> skip);
 
-/// Mean residuals over the rotation angle of one prism: where a bent sensor shows.
+/// Mean residuals over the rotation angle of one prism, which reveal a bent sensor.
 struct AngleProfile {
   std::vector<std::uint64_t> count;               ///< [bins], shots
   std::vector<double> mean_azimuth, mean_zenith;  ///< [bins], rad; NaN in an empty bin
@@ -66,10 +66,10 @@ struct AngleProfile {
 class AngleProfiler {
  public:
   explicit AngleProfiler(std::size_t bins = 72);
-  /// A shot of which any number is not finite does not count.
+  /// A shot with a non-finite number is skipped.
   /// @param angle  rotation angle of the prism, rad, any number of turns
   void add(double angle, double azimuth_residual, double zenith_residual);
-  /// All shots of another one with as many bins.
+  /// Adds all shots of another one with as many bins.
   void add(const AngleProfiler& others);
   /// The profile of the shots so far.
   AngleProfile result() const;

@@ -22,12 +22,12 @@ struct EkfOptions {
   /// the first pass (which takes two passes or more). The filter's rotors have no jerk.
   std::vector<RotorProcess> rotor_process;
   double parameter_walk = 0;  ///< random walk of every free angle, rad / sqrt(s)
-  /// Innovations with a chi-square (2 degrees of freedom) above this are outliers, once the first
-  /// gate_after updates are through; before, the gate stands at 400.
+  /// Innovations with a chi-square (2 degrees of freedom) above this are outliers, after the first
+  /// gate_after updates; before, the gate is 400.
   double gate_chi_square = 13.816;  // one good shot in a thousand
   std::size_t gate_after = 50;
-  /// Passes over the data; each starts where the one before ended at the first shot, so that
-  /// everything is linearised near the answer.
+  /// Passes over the data; each starts from the previous one's result at the first shot, so that
+  /// everything is linearised near the solution.
   int passes = 2;
 };
 
@@ -38,9 +38,10 @@ struct EkfOptions {
 /// process noise is continuous and found by maximum likelihood. docs/theory/ekf.md
 /// Parameters and their covariance are means over the smoothed ones; the trajectory has a knot for
 /// every shot, without acceleration. Data and prior are not separated, nor common errors of the
-/// angles. Memory is that of the result: filtered covariances live for one block of shots at a
+/// angles. Memory is that of the result: filtered covariances are kept for one block of shots at a
 /// time.
-/// @throws EstimationError when the series is empty or the filter diverges (message says where)
+/// @throws EstimationError when the series is empty or the filter diverges (the message gives the
+/// place)
 Solution run_ekf(const AngleSeries& series, const Start& start, const EkfOptions& options,
                  const Progress& progress = {});
 

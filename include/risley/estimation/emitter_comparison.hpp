@@ -15,32 +15,33 @@
 
 namespace risley::estimation {
 
-/// How well one parameter of one prism is determined, given what is known of the emitters:
-/// Cramer-Rao bounds with the free parameters and this one, SI units; infinite where no such data
+/// How well one parameter of one prism is determined, depending on the knowledge of the emitters:
+/// Cramer-Rao bounds with the free parameters and this one, SI units; infinite if no such data
 /// determine it.
 struct EmitterBounds {
   std::string name;
-  double all = 0;    ///< all emitters, their directions as free as they are
+  double all = 0;    ///< all emitters, with as many free directions as they have
   double known = 0;  ///< the same shots with the emitters' directions known
-  /// As many shots of one emitter alone, with what is free for a sensor that has only one.
+  /// The same number of shots, all from one emitter, with the free parameters of a sensor with one
+  /// emitter.
   double alone = 0;
 };
 
-/// What several emitters behind the same prisms determine and one of them does not.
+/// Parameters that several emitters behind the same prisms determine and one of them does not.
 struct EmitterComparison {
-  int emitters = 0;  ///< that fired
-  int alone = 0;     ///< the one that is taken alone, from 0: the one nearest to the axis
+  int emitters = 0;                   ///< that fired
+  int alone = 0;                      ///< the single one, from 0: the one nearest to the axis
   std::vector<EmitterBounds> bounds;  ///< each prism's own glass, wedge and tilts
   /// Combinations of free parameters that the shots of one emitter do not determine.
   std::vector<WeakDirection> untold_alone;
 };
 
-/// @param series   shots, as accumulate() takes them
+/// @param series  shots, as for accumulate()
 /// @param knots    of the series, at the linearisation point
-/// @param free     what is free with all emitters
+/// @param free  the free parameters with all emitters
 /// @param weights  of single shots
-/// @param factor   that all information is multiplied by: shots that one shot stands for
-/// @return without bounds where fewer than two emitters fired
+/// @param factor  multiplies all information: number of shots that one shot represents
+/// @return without bounds if fewer than two emitters fired
 /// @throws Cancelled, InvalidArgument as accumulate()
 EmitterComparison compare_emitters(const AngleSeries& series, const RotorTrajectory& knots,
                                    const PrismTrain& train, std::span<const RotorProcess> process,
@@ -48,8 +49,8 @@ EmitterComparison compare_emitters(const AngleSeries& series, const RotorTraject
                                    const ShotWeights& weights, double factor,
                                    const Progress& progress = {});
 
-/// The same in sentences: which parameters only several emitters determine, which they determine
-/// better, and which would be known better if the emitters' directions were known.
+/// The same in sentences: parameters that only several emitters determine, those that they
+/// determine better, and those that known emitter directions would improve.
 std::vector<std::string> emitter_words(const EmitterComparison& comparison);
 
 }  // namespace risley::estimation

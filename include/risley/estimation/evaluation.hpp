@@ -18,7 +18,7 @@ struct TruthComparison {
   double error_over_sigma = 0;
 };
 
-/// An estimate judged by the truth that a simulation left.
+/// Comparison of an estimate with a simulation's truth.
 struct Evaluation {
   std::vector<TruthComparison> parameters;
   std::vector<std::vector<double>> rotation_angle_error;  ///< [prisms][shots], rad
@@ -26,7 +26,8 @@ struct Evaluation {
   std::vector<double> angular_velocity_rmse;              ///< [prisms], rad/s
   /// Root mean square errors over the root mean square of the stated sigmas [prisms].
   std::vector<double> rotation_angle_rmse_over_sigma, angular_velocity_rmse_over_sigma;
-  /// Per degree of freedom; 1 is honest. Held parameters count where they are off in the truth.
+  /// Per degree of freedom; 1 if the sigmas are correct. Held parameters are included if they are
+  /// off in the truth.
   double nees_parameters = 0;
   double nees_rotation_angles = 0;  ///< per degree of freedom, mean over shots
 };

@@ -13,10 +13,10 @@
 
 namespace risley::estimation {
 
-/// How the frame of a recording stands against the sensor's: p_recording = Rz(yaw) Ry(pitch)
-/// p_sensor, rad. A hub or a vehicle's calibration turns clouds so. The sensor's optical axis then
-/// points to azimuth yaw and elevation -pitch. Directions alone do not determine a roll about that
-/// axis from other zeros of all rotation angles; it is taken as 0.
+/// Orientation of the frame of a recording relative to the sensor's: p_recording = Rz(yaw)
+/// Ry(pitch) p_sensor, rad. The calibration of a hub or a vehicle turns clouds this way. The
+/// sensor's optical axis then points to azimuth yaw and elevation -pitch. Directions alone cannot
+/// distinguish a roll about that axis from other zeros of all rotation angles; it is taken as 0.
 ///
 /// Of a sensor whose axis of rotation is its Z, yaw and pitch are about Z and Y of the train's
 /// frame, which are the sensor's Y and X, and the axis is Z.
@@ -25,8 +25,8 @@ struct FrameTurn {
   bool axis_up = false;  ///< of the sensor
 };
 
-/// What the turns of a FrameTurn are called, "yaw" and "pitch" or "pitch" and "roll": by the axes
-/// of the sensor's frame, yaw about Z, pitch about Y, roll about X.
+/// Names of the turns of a FrameTurn, "yaw" and "pitch" or "pitch" and "roll": by the axes of the
+/// sensor's frame, yaw about Z, pitch about Y, roll about X.
 std::array<std::string, 2> turn_names(bool axis_up);
 
 /// The axes of the train's frame, in which X is the axis of rotation, in the sensor's.
@@ -35,10 +35,10 @@ Eigen::Matrix3d sensor_from_train(bool axis_up);
 /// Rotation that takes vectors of the sensor's frame to the recording's.
 Eigen::Matrix3d recording_from_sensor(const FrameTurn& turn);
 
-/// The turn whose axis of rotation is that of a rotation, which may roll about it.
+/// The rotation with the same axis as a rotation that may include a roll about it.
 FrameTurn turn_of(const Eigen::Matrix3d& recording_from_sensor, bool axis_up);
 
-/// A rotation followed by small turns as a FrameTurn has them, without the roll that this leaves.
+/// A rotation followed by small turns as in a FrameTurn, without the resulting roll.
 /// @param step  yaw and pitch, rad
 Eigen::Matrix3d turned_further(const Eigen::Matrix3d& recording_from_sensor,
                                const Eigen::Vector2d& step, bool axis_up);
@@ -52,12 +52,12 @@ struct FrameEstimate {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  ///< of yaw and pitch, rad^2
 };
 
-/// What stands at the end of the free parameters where the frame's turn is estimated too.
+/// The last free parameters when the frame's turn is estimated too.
 /// @param prior_sigma  of each, rad
 std::vector<FreeParameter> frame_parameters(const TrainLayout& layout, double prior_sigma);
 
-/// Drops from the free parameters those that a free turn of the frame holds: a lean of the last
-/// axis, which looks alike.
+/// Drops the free parameters that a free turn of the frame replaces: a lean of the last axis, which
+/// has the same effect.
 void hold_last_bearing(const TrainLayout& layout, std::vector<FreeParameter>& free);
 
 }  // namespace risley::estimation

@@ -14,7 +14,7 @@ namespace risley::estimation {
 /// One constant that is estimated.
 struct FreeParameter {
   std::string name;         ///< as in parameter_list()
-  std::vector<int> places;  ///< of the flat parameter vector that take its value
+  std::vector<int> places;  ///< of the flat parameter vector with its value
   double prior_sigma = 0;   ///< SI units
   bool of_frame = false;    ///< a turn of the recording's frame, in a place of the last bearing
 
@@ -37,11 +37,11 @@ std::vector<std::string> default_free_names(TrainShape shape, bool one_glass = t
 ///         as shared and own, such as refractive_index with refractive_index_a)
 std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names, TrainShape shape);
 
-/// Whether one of the parameters takes its value to a place of the flat vector.
+/// Whether one of the parameters sets a place of the flat vector.
 bool takes_place(const std::vector<FreeParameter>& parameters, int place);
 
-/// Parameters of the train of which a sensor states a sigma and none is in a place of the free
-/// ones: what is held and may be off. Their prior sigma is the stated one.
+/// Parameters of the train with a stated sigma that share no place with the free ones: held ones
+/// that may be off. Their prior sigma is the stated one.
 std::vector<FreeParameter> uncertain_held(const sensors::Sensor& sensor,
                                           const std::vector<FreeParameter>& free);
 
@@ -51,7 +51,7 @@ Eigen::VectorXd free_values(const PrismTrain& train, const std::vector<FreeParam
 PrismTrain with_free_values(PrismTrain train, const std::vector<FreeParameter>& free,
                             const Eigen::VectorXd& values);
 
-/// Squared distances of values from those expected before, in prior sigmas, summed.
+/// Sum of the squared distances of values from their prior means, in prior sigmas.
 /// @param offset  [free], SI units
 double prior_chi2(const std::vector<FreeParameter>& free, const Eigen::VectorXd& offset);
 

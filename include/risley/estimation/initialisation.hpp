@@ -28,7 +28,7 @@ class WrongClock : public EstimationError {
 struct StartOptions {
   std::vector<FreeParameter> free;  ///< parameters that are fitted to the first shots
   double angle_noise = 0;           ///< 1 sigma of azimuth and zenith, roughly, rad
-  /// Whether the recording is a mirror image; empty finds out.
+  /// Whether the recording is a mirror image; empty: to be determined.
   std::optional<bool> mirrored = false;
   /// Whether the recording's frame is turned against the sensor's; empty finds out: it is when
   /// shots lie outside the sensor's field of view.
@@ -37,14 +37,14 @@ struct StartOptions {
   friend bool operator==(const StartOptions&, const StartOptions&) = default;
 };
 
-/// How rotors are assumed to move before the recording shows it.
+/// Assumed motion of rotors before the recording shows it.
 struct FirstMotion {
-  double window = 0.025;  ///< s, in which a speed is as good as constant
+  double window = 0.025;  ///< s, within which a speed is practically constant
   RotorProcess process = kSettlingProcess;
 };
 
-/// What an estimation starts from. All of the recording as it is to be used: turned if mirrored,
-/// and turned into the sensor's frame.
+/// What an estimation starts from. Preparation of a recording: flipped if mirrored, and turned into
+/// the sensor's frame.
 struct Start {
   std::int64_t time_ns = 0;              ///< of the angles
   double reach = 0;                      ///< it was fitted to shots so far around, s
@@ -52,16 +52,16 @@ struct Start {
   std::vector<double> angular_velocity;  ///< [prisms], rad/s
   PrismTrain train;                      ///< free parameters fitted to the first shots
   std::optional<int> combination;
-  bool mirrored = false;           ///< the recording is a mirror image and has to be turned
-  std::optional<FrameTurn> frame;  ///< of the recording, where it is not the sensor's
-  double residual_rms = 0;         ///< of the fit, rad; robust, so that outliers do not count
+  bool mirrored = false;           ///< the recording is a mirror image and must be flipped
+  std::optional<FrameTurn> frame;  ///< of the recording, if it is not the sensor's
+  double residual_rms = 0;         ///< of the fit, rad; robust against outliers
   FirstMotion motion;              ///< faster where the sensor's speeds swing
 };
 
-/// What was found out about some shots on the way to a start, so that the next caller need not look
-/// for it again. It holds for these shots alone.
+/// Findings about some shots on the way to a start, so that the next caller need not repeat the
+/// search. It is valid only for these shots.
 struct StartFindings {
-  /// A question that was asked, and its answer.
+  /// A question and its answer.
   struct Known {
     sensors::Sensor sensor;
     StartOptions options;
@@ -75,22 +75,22 @@ struct StartFindings {
 
 /// Speeds, combination and rotation angles from fits of lines, then a robust least-squares fit of
 /// parameters and motion to the same shots, for every combination of the sensor's speeds and both
-/// mirror images that may be; the one that leaves least is the answer. It needs no zero position
-/// and so loses no shot, and half of the field may be missing.
+/// possible mirror images; the one with the smallest residuals wins. It needs no zero position, so
+/// it loses no shot, and half of the field may be missing.
 ///
 /// Whether a recording holds the mirror image of what the sensor can produce (its elevation has the
 /// other sign), as public copies of some vendor files do, cannot be seen from the speeds: a
 /// mirrored first combination turns like the second. The optics can: prisms bend differently when
 /// met from the other side, and the fit leaves a tenth of a degree for the wrong image.
 /// @param head   every shot of about the first second, as recorded
-/// @param found  about the head before; this adds to it
-/// @throws EstimationError naming what is missing: duration, shots, matching speeds; also when two
-///         answers fit equally well, and when the recording's clock rather than the rotors must be
-///         off (WrongClock)
+/// @param found  earlier findings about the head; this adds to them
+/// @throws EstimationError naming the missing condition: duration, shots, matching speeds; also
+/// when two solutions fit equally well, and when the recording's clock rather than the rotors must
+/// be wrong (WrongClock)
 Start find_start(const AngleSeries& head, const sensors::Sensor& sensor,
                  const StartOptions& options, StartFindings* found = nullptr);
 
-/// The shots as a start says they are to be used: turned if mirrored, and into the sensor's frame.
+/// The shots prepared as a start requires: flipped if mirrored, and in the sensor's frame.
 void prepare_shots(AngleSeries& series, const Start& start);
 
 }  // namespace risley::estimation

@@ -20,7 +20,7 @@
 
 namespace risley::estimation {
 
-/// How much a shot counts. chi2 is the sum of its squared residuals over their variances.
+/// The weight of a shot. chi2 is the sum of its squared residuals over their variances.
 struct ShotWeights {
   AngleNoise angle_noise;
   /// Geman-McClure: a shot weighs 1 / (1 + softening chi2)^2. 0 is least squares.
@@ -28,18 +28,18 @@ struct ShotWeights {
   double cut = std::numeric_limits<double>::infinity();  ///< shots with more chi2 are outliers
 };
 
-/// Softening for residuals whose scale is so many times the stated noise: a shot at four of these
-/// sigmas weighs a quarter.
+/// Softening for residuals whose scale is this multiple of the stated noise: a shot at four of
+/// these sigmas has a weight of a quarter.
 constexpr double softening_at(double level) { return 1.0 / (16.0 * level * level); }
 
-/// Where residuals (observed minus modelled, rad) and outlier flags of all shots go; empty spans
-/// are not written, and rows of shots that no knot serves are left alone.
+/// Destination of residuals (observed minus modelled, rad) and outlier flags of all shots; empty
+/// spans are not written, and rows of shots without a knot are left unchanged.
 struct ShotColumns {
   std::span<double> azimuth_residual, zenith_residual;
   std::span<unsigned char> outlier;
 };
 
-/// The normal equations of all shots at one linearisation, in the form the smoother wants: rotor
+/// The normal equations of all shots at one linearisation, in the form for the smoother: rotor
 /// states knot by knot, their coupling with the free parameters, and the parameters' own part.
 struct NormalEquations {
   int prisms = 0;
@@ -57,20 +57,20 @@ struct NormalEquations {
     return prisms < 1 ? 0 : gradient.size() / static_cast<std::size_t>(3 * prisms);
   }
 
-  /// Multiplies all information: 1/f says that every variance is f times as large.
-  /// @throws InvalidArgument for a factor that is not above 0
+  /// Multiplies all information: 1/f means that every variance is f times as large.
+  /// @throws InvalidArgument for a factor not above 0
   void scale(double factor);
 };
 
-/// Evaluates every shot of the knots and its derivatives with the batch model and sums them up. The
+/// Evaluates every shot of the knots and its derivatives with the batch model and sums them. The
 /// sums do not depend on the number of threads.
 /// @param train  linearisation point of the parameters
 /// @param knots  linearisation point of the rotors
 /// @param set    instruction set, for tests and benchmarks
 /// @param[out] equations  keeps its memory between calls
 /// @throws InvalidArgument for columns of other lengths, knots beyond the series or of another
-///         train, free parameters beyond the flat vector, noise that is none, and as check_beams()
-///         and check_available()
+/// train, free parameters beyond the flat vector, invalid noise, and as check_beams() and
+/// check_available()
 void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,
                 NormalEquations& equations, const ShotColumns& columns = {},
@@ -79,22 +79,22 @@ void accumulate(const AngleSeries& series, const RotorTrajectory& knots, const P
 /// Shots that were evaluated together.
 struct EvaluatedShots {
   const AngleSeries& shots;
-  std::size_t first = 0;  ///< row of the series that the first of them is
-  std::span<const double> azimuth_residual, zenith_residual;  ///< rad; NaN where no knot serves
-  std::span<const unsigned char> outlier;                     ///< not 0 also where no knot serves
+  std::size_t first = 0;  ///< row of the series of the first of them
+  std::span<const double> azimuth_residual, zenith_residual;  ///< rad; NaN without a knot
+  std::span<const unsigned char> outlier;                     ///< not 0 also without a knot
 };
 
-/// What is to be done with the shots of a packed series while they are unpacked; either may be
-/// empty. Both are called from several threads, for one block of shots at a time.
+/// Callbacks for the shots of a packed series while they are unpacked; either may be empty. Both
+/// are called from several threads, for one block of shots at a time.
 struct ShotLooks {
   /// Changes rows before they are evaluated.
   std::function<void(AngleSeries& rows)> prepare;
-  /// Looks at what came out; the function that it returns is called by one thread at a time, in the
+  /// Receives the results; the function that it returns is called by one thread at a time, in the
   /// order of the shots.
   std::function<std::function<void()>(const EvaluatedShots& shots)> look;
 };
 
-/// The same of a packed series, which is unpacked block by block.
+/// The same for a packed series, which is unpacked block by block.
 /// @throws as above, for beams of all rows
 void accumulate(const PackedSeries& series, const RotorTrajectory& knots, const PrismTrain& train,
                 const std::vector<FreeParameter>& free, const ShotWeights& weights,

@@ -17,7 +17,7 @@
 
 namespace risley::estimation {
 
-/// A recording that need not exist yet.
+/// A planned or real recording.
 struct ObservabilityPlan {
   sensors::Sensor sensor;
   double duration = 30;             ///< s
@@ -25,22 +25,21 @@ struct ObservabilityPlan {
   double angle_noise = 0;           ///< 1 sigma of azimuth and zenith before rounding, rad
   double angle_resolution = 0;      ///< rounding step, rad; 0: none
   std::vector<FreeParameter> free;  ///< what the bounds are for
-  /// Motion model [prisms]; empty takes kTypicalRotor.
+  /// Motion model [prisms]; empty uses kTypicalRotor.
   std::vector<RotorProcess> rotor_process;
 };
 
-/// What one quantity means to the observations and what they mean to it. SI units.
+/// Effect of one quantity on the observations, and their information on it. SI units.
 struct QuantityObservability {
   std::string name;   ///< as in parameter_list()
   bool free = false;  ///< among the free ones; rotation angles and speeds always are
-  /// Root mean square change of azimuth and zenith together for a change of this alone, rad per
-  /// unit. A speed turns the prism about the middle of the recording.
+  /// Root mean square change of azimuth and zenith together per change of this parameter alone, rad
+  /// per unit. A speed turns the prism about the middle of the recording.
   double sensitivity = 0;
   /// Cramer-Rao bound with the free quantities, and with this one too when it is not among them;
-  /// infinite where no data of the kind determine it. Rotation angles and speeds: in the middle.
+  /// infinite if no data of the kind determine it. Rotation angles and speeds: in the middle.
   double sigma = 0;
-  /// What it is most correlated with among those, and how much: the strongest, and others beyond
-  /// 0.98, strongest first.
+  /// Its correlations with those: the strongest, and others beyond 0.98, strongest first.
   std::vector<std::pair<std::string, double>> twins;
 };
 
@@ -48,13 +47,13 @@ struct QuantityObservability {
 struct Observability {
   std::vector<QuantityObservability> quantities;  ///< all of the prisms, then angles, then speeds
   /// Correlation of everything in quantities with all of the prisms' parameters free, under their
-  /// wide priors (1 degree, 0.01 of an index): what would happen if everything were free.
+  /// wide priors (1 degree, 0.01 of an index).
   std::vector<std::string> correlation_names;
   Eigen::MatrixXd correlation;
   /// With all of the prisms' parameters free: combinations that keep their prior sigma or more.
   std::vector<WeakDirection> unobservable;
   double shots = 0, duration = 0, rate = 0;
-  EmitterComparison emitters;  ///< without bounds where fewer than two fire
+  EmitterComparison emitters;  ///< without bounds if fewer than two fire
 };
 
 /// Cramer-Rao bounds of a plan: the information of prisms that turn at the sensor's speeds under
@@ -63,12 +62,12 @@ struct Observability {
 /// @throws InvalidArgument for a plan without duration, rate or noise; Cancelled
 Observability observability_of_plan(const ObservabilityPlan& plan, const Progress& progress = {});
 
-/// The same for a recording that was estimated: its own shots, gaps, outliers and rotors.
+/// The same for an estimated recording: its own shots, gaps, outliers and rotors.
 /// @throws Cancelled
 Observability observability_of_estimate(const Estimate& estimate, const Progress& progress = {});
 
-/// What a user should know, in sentences: which parameters to hold fixed, what each is mixed up
-/// with, and how long a recording would have to be to determine them.
+/// Advice in sentences: which parameters to hold, what each is correlated with, and how long a
+/// recording would have to be to determine them.
 std::vector<std::string> observability_words(const Observability& observability, TrainShape shape);
 
 }  // namespace risley::estimation

@@ -14,15 +14,15 @@
 namespace risley::estimation {
 
 /// An AngleSeries in less memory and without any loss, for whole recordings: four bytes a shot
-/// where angles are multiples of a step such as 0.01 degree and the time from shot to shot is the
-/// same, some thirty where coordinates say where shots went. Rows are packed in blocks of
-/// kBlockRows, each by itself; those behind the last whole block are kept as they are.
+/// where angles are multiples of a step such as 0.01 degree and the time from shot to shot is
+/// constant, some thirty for directions from coordinates. Rows are packed in blocks of kBlockRows,
+/// each separately; those after the last complete block are kept unpacked.
 class PackedSeries {
  public:
   static constexpr std::size_t kBlockRows = 4096;  ///< rows of a block
 
   PackedSeries() = default;
-  /// @throws InvalidArgument where columns have other lengths
+  /// @throws InvalidArgument if columns have other lengths
   PackedSeries(const AngleSeries& series) { append(series); }  // NOLINT(*-explicit-*)
 
   std::size_t size() const { return blocks_.size() * kBlockRows + tail_.size(); }
@@ -48,22 +48,22 @@ class PackedSeries {
   /// Of a series without resets, s.
   double duration() const { return size() == 0 ? 0.0 : time(size() - 1); }
 
-  /// First row at or after a time in a range whose times ascend; the range's end where there is
-  /// none. The nearer it is to the beginning, the sooner it is found.
+  /// First row at or after a time in a range whose times ascend; the range's end if there is none.
+  /// Rows near the beginning are found faster.
   std::size_t first_at(ShotRange range, std::int64_t time_ns) const;
-  /// How many shots each emitter fired, [largest_beam() + 1].
+  /// Number of shots of each emitter, [largest_beam() + 1].
   std::vector<std::size_t> shots_of_beams() const;
 
   /// Rows [begin, end).
   AngleSeries rows(ShotRange range) const;
-  /// The same into a series whose memory is used again.
+  /// The same into a series whose memory is reused.
   void rows(ShotRange range, AngleSeries& out) const;
   /// All rows.
   AngleSeries rows() const { return rows({0, size()}); }
-  /// Times of rows, as recorded, into memory that is used again.
+  /// Times of rows, as recorded, into reused memory.
   void times(ShotRange range, std::vector<std::int64_t>& out) const;
 
-  /// Appends all rows of a series. @throws InvalidArgument where columns have other lengths
+  /// Appends all rows of a series. @throws InvalidArgument if columns have other lengths
   void append(const AngleSeries& series);
   /// Appends some rows of another series.
   void append(const PackedSeries& other, std::span<const std::size_t> rows);
@@ -76,7 +76,7 @@ class PackedSeries {
     std::int64_t base = 0, step = 0;
     std::vector<std::uint16_t> few_steps;  ///< this and the next empty: as many steps as rows
     std::vector<std::uint32_t> many_steps;
-    std::vector<std::int64_t> time_ns;  ///< where there are no such steps
+    std::vector<std::int64_t> time_ns;  ///< if there are no such steps
 
     Times() = default;
     /// @param all  two or more
@@ -98,10 +98,10 @@ class PackedSeries {
     T at(std::size_t i) const { return each.empty() ? all : each[i]; }
     void put(std::size_t first, std::size_t rows, T* to) const;
   };
-  /// What the numbers of angles that are multiples of a step stand for.
+  /// Meaning of the numbers of angles that are multiples of a step.
   struct Grid {
-    float variance = 0;         ///< of rounding, which gives the step; 0: none was met
-    std::vector<double> value;  ///< [65536] by number; NaN where none was met
+    float variance = 0;         ///< of rounding, which gives the step; 0: none occurred
+    std::vector<double> value;  ///< [65536] by number; NaN if none occurred
   };
   /// Numbers of a grid, or the angles themselves.
   struct Angles {
@@ -128,7 +128,7 @@ class PackedSeries {
   /// Calls see(block or null for the tail, its first row, rows, rows of the range before them).
   template <class See>
   void visit(ShotRange range, const See& see) const;
-  /// A column of a range. @param put  (block, first row, rows, to), or a column that puts itself
+  /// A column of a range. @param put  (block, first row, rows, to), or a column that copies itself
   template <class T, class Put>
   void put_column(ShotRange range, const std::vector<T>& tail, const Put& put,
                   std::vector<T>& out) const;
@@ -143,11 +143,11 @@ class PackedSeries {
   std::uint8_t largest_beam_ = 0;
 };
 
-/// The stretches of a series: it is cut where the clock was reset and at gaps over which the turns
-/// of a rotor could not be counted (longer than longest_gap, s).
+/// The stretches of a series: it is cut at clock resets and at gaps too long to count the turns of
+/// a rotor (longer than longest_gap, s).
 std::vector<ShotRange> stretches(const PackedSeries& series, double longest_gap = 5.0);
 
-/// At most so many shots per second, evenly spread over time and beams, of every given stretch.
+/// At most this many shots per second, evenly spread over time and beams, of every given stretch.
 /// @param[in,out] ranges  rows of the series, on return those of the result
 PackedSeries thinned(const PackedSeries& series, double rate, std::vector<ShotRange>& ranges);
 

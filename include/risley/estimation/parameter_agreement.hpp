@@ -6,12 +6,12 @@
 
 namespace risley::estimation {
 
-/// Mean chi2 per parameter up to which two sets of parameters are those of one sensor: three sigma
-/// in each. The two halves of a real Mid-40's recording are 1.6 apart (docs/real-units.md), two
-/// units with errors of a tenth of a degree, each from one second of shots, thousands.
+/// Mean chi2 per parameter up to which two sets of parameters count as one sensor's: three sigma in
+/// each. The two halves of a real Mid-40's recording are 1.6 apart (docs/real-units.md), two units
+/// with errors of a tenth of a degree, each from one second of shots, thousands.
 inline constexpr double kMostDisagreement = 9.0;
 
-/// How far two sets of the same parameters are apart.
+/// Difference between two sets of the same parameters.
 struct Disagreement {
   double chi2_per_parameter = 0;
   Eigen::Index worst = 0;       ///< parameter with the most sigmas

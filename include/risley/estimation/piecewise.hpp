@@ -11,8 +11,8 @@
 
 namespace risley::estimation {
 
-/// Estimates from short pieces of a recording alone, beside the one of all of it: they show whether
-/// parameters drift, and whether sigmas are honest without any truth.
+/// Estimates from short pieces of a recording, in addition to that of the whole: they show whether
+/// parameters drift, and whether sigmas are correct even without a truth.
 struct PiecewiseEstimate {
   std::vector<double> time;                ///< [pieces], middle, s since the first shot
   double duration = 0;                     ///< of the longest piece, s
@@ -20,7 +20,7 @@ struct PiecewiseEstimate {
   std::vector<std::vector<double>> sigma;  ///< [free][pieces]
   std::size_t failed = 0;                  ///< pieces that gave no estimate; they have no row
   /// Squared differences from their weighted mean over the pieces' own variances, per degree of
-  /// freedom: 1 for parameters that stand still and sigmas that are true. NaN below two pieces.
+  /// freedom: 1 for constant parameters and correct sigmas. NaN below two pieces.
   double chi2 = 0;
   double degrees_of_freedom = 0;
 
@@ -28,9 +28,9 @@ struct PiecewiseEstimate {
 };
 
 /// Cuts the recording into pieces of equal length and estimates each by the batch estimator with
-/// the rotors' motion model of the whole. Of a piece at most the first 100,000 shots are taken, so
+/// the rotors' motion model of the whole. At most the first 100,000 shots of a piece are used, so
 /// that long recordings take no longer. Only for estimates of the batch estimator.
-/// @param sensor  what the estimation started from
+/// @param sensor  the starting values of the estimation
 /// @throws InvalidArgument for less than one piece, or an estimate of the filter
 PiecewiseEstimate estimate_piecewise(const Estimate& estimate, const sensors::Sensor& sensor,
                                      std::size_t pieces, const Progress& progress = {});

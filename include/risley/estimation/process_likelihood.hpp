@@ -15,13 +15,13 @@ namespace risley::estimation {
 /// Usual length of the windows, s.
 inline constexpr double kRotorWindow = 0.010;
 
-/// What the data say of one rotor alone, window by window: the other rotors' parts are eliminated,
-/// so that each rotor's noise can be judged by itself. Only what a likelihood of the process noise
-/// needs: the parameters stay at the linearisation.
+/// Information of the data on one rotor, window by window: the other rotors' parts are eliminated,
+/// so that each rotor's noise can be judged separately. Contains only the data for a likelihood of
+/// the process noise: the parameters stay at the linearisation.
 class RotorWindows {
  public:
-  /// Joins the knots of a linearisation to windows of about that length (s), or of eight shots
-  /// where shots are rare, up to the first most_windows.
+  /// Joins the knots of a linearisation to windows of about that length (s), or of eight shots if
+  /// shots are rare, up to the first most_windows.
   RotorWindows(const NormalEquations& equations, const RotorTrajectory& linearisation, int rotor,
                std::size_t most_windows = 3000, double window = kRotorWindow);
 
@@ -40,7 +40,7 @@ class RotorWindows {
 };
 
 /// Intensities of white acceleration and white jerk that make a rotor's observations likeliest,
-/// each rotor by itself. The jerk is zero unless it makes the data likelier by a factor of e^3.
+/// each rotor separately. The jerk is zero unless it makes the data likelier by a factor of e^3.
 /// @return [prisms]
 std::vector<RotorProcess> likeliest_process(const NormalEquations& equations,
                                             const RotorTrajectory& linearisation);

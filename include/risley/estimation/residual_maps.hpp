@@ -10,8 +10,8 @@
 
 namespace risley::estimation {
 
-/// Mean residuals over the cells of a plane of two angles, empty cells left out. A sensor that the
-/// model describes leaves means that noise alone explains; a bent one leaves patches.
+/// Mean residuals over the cells of a plane of two angles, without empty cells. If the model
+/// describes the sensor, noise alone explains the means; a bent sensor gives patches.
 struct ResidualMap {
   double cell = 0;                                ///< side of a cell, rad
   std::vector<double> x, y;                       ///< middle of the cells, rad
@@ -23,12 +23,12 @@ struct ResidualMap {
   std::size_t size() const { return x.size(); }
 };
 
-/// Over azimuth and zenith as estimated: by the observed ones noise would sort the shots, and cells
-/// at the rim would hold those that it moved outwards. All shots that were used count.
-/// @throws InvalidArgument for a cell that is not above 0
+/// Over azimuth and zenith as estimated: with the observed ones noise would sort the shots, and
+/// cells at the rim would hold those that it moved outwards. All used shots count.
+/// @throws InvalidArgument for a cell not above 0
 ResidualMap residuals_over_field(const Estimate& estimate, double cell);
 
-/// Over the rotation angles of two prisms, both in [0, 2 pi), at all shots that were used.
+/// Over the rotation angles of two prisms, both in [0, 2 pi), at all used shots.
 /// @throws InvalidArgument for prisms that the sensor does not have, or a cell not above 0
 ResidualMap residuals_over_angles(const Estimate& estimate, int prism_x, int prism_y, double cell);
 

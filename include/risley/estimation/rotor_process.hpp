@@ -6,11 +6,11 @@
 
 namespace risley::estimation {
 
-/// How a rotor is allowed to move between two observations: the angle advances by the speed, the
-/// speed by the acceleration, and each takes white noise.                      [B21 Eq. (27)]
-/// The paper adds one noise term per state and step. Here the noise is a continuous process, so
-/// that its effect does not depend on the observation rate. The paper's states end at the speed;
-/// the white jerk lets a rotor swing smoothly, as a speed controller makes it (Fig. 9).
+/// Motion model of a rotor between two observations: the angle advances by the speed, the speed by
+/// the acceleration, and each has white noise. [B21 Eq. (27)] The paper adds one noise term per
+/// state and step. Here the noise is a continuous process, so that its effect does not depend on
+/// the observation rate. The paper's states end at the speed; the white jerk allows a smooth swing,
+/// as caused by a speed controller (Fig. 9).
 struct RotorProcess {
   double acceleration = 0;  ///< white acceleration: random walk of the speed, (rad/s) / sqrt(s)
   double angle_walk = 0;    ///< random walk of the angle, rad / sqrt(s)
@@ -18,22 +18,23 @@ struct RotorProcess {
 };
 
 /// The heavy noise that makes the filter reproduce the paper's section 3.2: residuals of 0.0085
-/// degree where the noise is 0.01, and rotation angles of 0.025 degree. The paper does not print
-/// its tuning; this one lands in the middle of what it reports.
+/// degree where the noise is 0.01, and rotation angles of 0.025 degree. The paper does not state
+/// its tuning; this one gives results in the middle of its reported range.
 inline constexpr RotorProcess kPaperProcess{radians_from_degrees(900.0), 0.0, 0.0};
 
-/// A rotor that moves as the paper saw it: speeds that swing by 2.2 deg/s within seconds (Fig. 9).
+/// A rotor with the motion reported in the paper: speeds that swing by 2.2 deg/s within seconds
+/// (Fig. 9).
 inline constexpr RotorProcess kTypicalRotor{0.0, 0.0, radians_from_degrees(4.0)};
 
-/// A rotor of which nothing is known yet: noise far above that of real ones, so that a first pass
-/// follows it wherever it goes.
+/// A rotor with unknown motion: noise far above that of real ones, so that a first pass follows any
+/// motion.
 inline constexpr RotorProcess kSettlingProcess{radians_from_degrees(30.0), 0.0, 0.0};
 
-/// A rotor that moves along one parabola for ever: constant acceleration. The jerk only says that
-/// there is an acceleration.
+/// A rotor that moves along a single parabola: constant acceleration. The jerk only introduces an
+/// acceleration.
 inline constexpr RotorProcess kConstantAcceleration{0.0, 0.0, 1e-12};
 
-/// Covariance that a step of dt seconds adds to (angle, speed, acceleration).
+/// Covariance added to (angle, speed, acceleration) by a step of dt seconds.
 struct RotorStepCovariance {
   double angle_angle = 0, angle_speed = 0, angle_acceleration = 0;
   double speed_speed = 0, speed_acceleration = 0, acceleration_acceleration = 0;

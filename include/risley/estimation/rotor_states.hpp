@@ -10,7 +10,7 @@
 
 namespace risley::estimation {
 
-/// What an estimation knows of the rotors at some shots, as columns of one length.
+/// Estimated rotor states at some shots, as columns of one length.
 struct RotorStates {
   std::vector<std::int64_t> time_ns;                  ///< as recorded
   std::vector<std::vector<double>> rotation_angle;    ///< [prisms][shots], rad, unwrapped
@@ -19,13 +19,13 @@ struct RotorStates {
   std::vector<std::vector<double>> rotation_angle_covariance;
   std::vector<std::vector<double>> angular_velocity_sigma;  ///< [prisms][shots], rad/s
   std::vector<double> azimuth_residual, zenith_residual;    ///< observed minus estimated, rad
-  std::vector<unsigned char> outlier;                       ///< 1 where the shot was left out
+  std::vector<unsigned char> outlier;                       ///< 1 if the shot was rejected
 
   std::size_t size() const { return time_ns.size(); }
   /// Number of columns of rotation angles.
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
 
-  /// Gives every column so many rows.
+  /// Gives every column this many rows.
   void resize(int prisms, std::size_t shots);
 };
 

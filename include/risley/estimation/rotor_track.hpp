@@ -11,9 +11,9 @@
 
 namespace risley::estimation {
 
-/// Follows the rotors from a start through a stretch, 25 ms at a time with the start's optics, and
-/// so gives every knot of it angles and speeds that are right to a degree or so. A gap, or a window
-/// in which few shots lie in a corner of the field, only makes the next prediction longer.
+/// Follows the rotors from a start through a stretch, 25 ms at a time with the start's optics,
+/// which gives every knot of it angles and speeds to a degree or so. A gap, or a window with few
+/// shots in a corner of the field, only makes the next prediction longer.
 /// @param series   thinned, in the sensor's frame
 /// @param shots    the stretch's rows
 /// @param start    of this stretch

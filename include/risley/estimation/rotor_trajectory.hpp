@@ -16,14 +16,14 @@ namespace risley::estimation {
 /// Angle, speed and acceleration: the states of one rotor at a knot.
 inline constexpr int kStatesPerRotor = 3;
 
-/// How long a rotor is taken to move along one parabola, s. Around the middle of so short a piece
-/// real rotors leave the parabola by less than 1e-4 degree. docs/theory/map.md
+/// Time for which a rotor is assumed to follow one parabola, s. Around the middle of so short a
+/// piece real rotors leave the parabola by less than 1e-4 degree. docs/theory/map.md
 inline constexpr double kKnotInterval = 0.002;
 
 /// The motion of all rotors over a recording: one parabola of each per knot, a knot in the middle
-/// of the shots it serves. Knots follow each other in stretches; nothing ties the rotors of one
-/// stretch to those of the next, because the time between is unknown (the clock was reset) or too
-/// long to count the turns.
+/// of its shots. Knots follow each other in stretches; the rotors of one stretch are not connected
+/// to those of the next, because the time between is unknown (the clock was reset) or too long to
+/// count the turns.
 struct RotorTrajectory {
   int prisms = 0;
   std::vector<std::int64_t> time_ns;               ///< [knots]
@@ -37,11 +37,11 @@ struct RotorTrajectory {
 
   std::size_t size() const { return time_ns.size(); }
   int states() const { return kStatesPerRotor * prisms; }  ///< of one knot, all rotors together
-  /// Knot behind the last one of a stretch.
+  /// Knot after the last one of a stretch.
   std::size_t stretch_end(std::size_t stretch) const {
     return stretch + 1 < stretch_begin.size() ? stretch_begin[stretch + 1] : size();
   }
-  /// The knot that serves a shot; none in an unused stretch.
+  /// The knot of a shot; none in an unused stretch.
   std::optional<std::size_t> knot_of_shot(std::size_t shot) const;
   /// The states of a knot [prisms][3], to read and to change.
   std::span<double> state_of(std::size_t knot) {

@@ -15,25 +15,25 @@
 
 namespace risley::estimation {
 
-/// How the optics of a sensor are followed while it runs.
+/// Settings for monitoring the optics of a running sensor.
 struct RunningOptions {
-  sensors::Sensor sensor;  ///< start values and what is held, as EstimateOptions::sensor
-  /// The unit ought to be the sensor, to what the sensor's sigmas and covariance say: another alarm
-  /// where it is not.
+  sensors::Sensor sensor;  ///< start values and held parameters, as EstimateOptions::sensor
+  /// The unit should match the sensor within the sensor's sigmas and covariance: otherwise there is
+  /// another alarm.
   bool is_sensor = false;
   bool cartesian = false;  ///< as EstimateOptions::cartesian
   double piece = 0.5;      ///< s, after which there is a new estimate
-  /// Shots of a second that are used, evenly thinned; others only count. No sensor has more.
+  /// Shots per second used, evenly thinned; others are only counted. No sensor has more.
   double most_rate = 250'000;
   std::size_t beginning = 8;  ///< pieces that it is compared with at first; others join, up to 60
-  /// Of all alarms together, where optics do not change: a bound.
+  /// Upper bound for all alarms together without a change of the optics.
   double false_alarms_per_hour = 1e-3;
 };
 
 /// What an alarm is about.
 enum class OpticsAlarmKind : std::uint8_t {
-  changed,  ///< the optics are no longer those of the beginning
-  unlike,   ///< the optics are not those of the sensor
+  changed,  ///< the optics differ from those of the beginning
+  unlike,   ///< the optics differ from the sensor's
 };
 /// "changed" or "unlike"
 const char* to_string(OpticsAlarmKind kind);
@@ -42,12 +42,12 @@ const char* to_string(OpticsAlarmKind kind);
 struct RunningParameter {
   std::string name;
   double value = 0;
-  double sigma = 0;             ///< what held parameters may be off by included
-  double sigma_given_held = 0;  ///< if they were exactly as held
+  double sigma = 0;             ///< including possible errors of held parameters
+  double sigma_given_held = 0;  ///< if they were exact
   double change = 0;            ///< since the beginning; 0 before it is over
-  double change_sigma = 0;      ///< held parameters do not count, which were the same
+  double change_sigma = 0;      ///< without those of held parameters, which were the same
   double off_sensor = 0;        ///< from the sensor's value
-  double off_sensor_sigma = 0;  ///< with what the sensor says of its own
+  double off_sensor_sigma = 0;  ///< with the sensor's own uncertainty
 };
 
 /// The mean speed of a rotor over the last piece, rad/s.
@@ -55,22 +55,22 @@ struct RunningSpeed {
   double value = 0, sigma = 0;
 };
 
-/// The optics have changed, or are others.
+/// The optics have changed, or belong to another sensor.
 struct OpticsAlarm {
   OpticsAlarmKind kind = OpticsAlarmKind::changed;
-  std::int64_t time_ns = 0;          ///< of the last shot that was looked at, by the sensor's clock
-  double time = 0;                   ///< the same, s of shots that were looked at before
+  std::int64_t time_ns = 0;          ///< of the last shot processed, by the sensor's clock
+  double time = 0;                   ///< the same, s of processed shots
   double p_value = 1;                ///< probability of such a difference by chance
-  std::string parameter;             ///< whose difference alone would explain it best
+  std::string parameter;             ///< the parameter that alone explains the difference best
   double difference = 0, sigma = 0;  ///< of the last piece, if all others are the same; SI units
 };
 
-/// What is known of a sensor that runs.
+/// Current results for a running sensor.
 struct RunningState {
   /// Where it stands.
   enum class Phase : std::uint8_t {
     waiting,    ///< no piece could be estimated yet
-    beginning,  ///< what the unit is compared with is being estimated
+    beginning,  ///< the reference of the comparison is being estimated
     watching,
   };
   Phase phase = Phase::waiting;
@@ -78,19 +78,20 @@ struct RunningState {
   std::vector<RunningSpeed> speeds;          ///< [prisms]; empty while it waits
   std::optional<int> combination;            ///< as Sensor::combination
   double angle_noise = 0;                    ///< 1 sigma of the last piece, before rounding, rad
-  double window = 0;                         ///< s of shots that the parameters come from
+  double window = 0;                         ///< s of shots used for the parameters
   std::int64_t time_ns = 0;                  ///< of the last shot of the last piece
   std::uint64_t shots = 0;                   ///< with a direction
   std::uint64_t pieces = 0;                  ///< that were estimated
   std::uint64_t short_pieces = 0;            ///< with too few shots, or cut off by a gap
-  std::uint64_t unfit_pieces = 0;  ///< whose shots the model does not describe, or not settled
+  std::uint64_t unfit_pieces = 0;            ///< whose shots do not fit the model, or not converged
   std::uint64_t unfit_in_a_row = 0;
-  std::string reason;                  ///< why the last piece gave no estimate; empty if it did
+  std::string reason;                  ///< reason why the last piece gave no estimate; empty if it
+                                       ///< did
   double change_p_value = 1;           ///< least of the last look
   double unlike_p_value = 1;           ///< the same against the sensor
   double alarm_p_value = 0;            ///< a look alarms below
   double scatter_variance_factor = 1;  ///< of the beginning's pieces, never below 1
-  bool alarmed = false;                ///< so say the last two looks
+  bool alarmed = false;                ///< according to the last two checks
   std::optional<OpticsAlarm> alarm;    ///< the first one
   std::uint64_t alarms = 0;            ///< times that it came up
 };
@@ -98,11 +99,11 @@ struct RunningState {
 /// "waiting", "beginning", "watching"
 const char* to_string(RunningState::Phase phase);
 
-/// Follows the optics of one sensor while its shots come in, with constant memory. Every piece of
-/// the recording is estimated by itself, as run_batch_map() does; pieces that cannot be estimated
-/// are left out. The last one, two, four and eight are compared with the beginning, all parameters
-/// together and each by itself; false alarms are shared among all looks: docs/theory/watch.md. Not
-/// for several threads at once.
+/// Monitors the optics of one sensor as its shots arrive, with constant memory. Every piece of the
+/// recording is estimated separately, as by run_batch_map(); pieces without an estimate are
+/// skipped. The last one, two, four and eight are compared with the beginning, all parameters
+/// together and each separately; false alarms are shared among all checks: docs/theory/watch.md.
+/// Not thread-safe.
 class RunningEstimate {
  public:
   /// @throws InvalidArgument
@@ -112,7 +113,7 @@ class RunningEstimate {
   RunningEstimate& operator=(RunningEstimate&&) noexcept;
 
   /// Takes the next rows of the recording: of one sensor, in the order of their times. Rows without
-  /// a direction and further returns of a shot do not count. A step back or a gap ends a piece.
+  /// a direction and further returns of a shot are ignored. A step back or a gap ends a piece.
   /// @return whether there was a new piece  @throws Cancelled
   bool add(const recordings::Observations& rows, const Progress& progress = {});
 

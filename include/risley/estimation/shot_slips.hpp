@@ -12,23 +12,23 @@
 
 namespace risley::estimation {
 
-/// What the rotors say of the count of a recording's shots.
+/// Evidence of the rotors on the count of a recording's shots.
 struct ShotCount {
   /// The rotors could be followed; otherwise nothing is known.
   bool followed = false;
-  /// Where the count is wrong, in ascending order.
+  /// Errors of the count, in ascending order.
   std::vector<recordings::ShotSlip> slips;
-  /// Emitter of shots 0, 1, ... of the mended count, one entry per emitter; empty where the file
+  /// Emitter of shots 0, 1, ... of the corrected count, one entry per emitter; empty if the file
   /// names the emitters or there is only one.
   std::vector<std::uint8_t> firing_order;
 };
 
 /// Finds slips of the shot count: where shots are missing from a recording, every later time is too
 /// early, and the phases of all rotors jump by the same time, which no motor does. The rotors are
-/// followed from a stretch without slips in both directions; where they leave their prediction, the
-/// number of shots that brings them back is looked for. Where it cannot be found, the recording is
-/// to be cut. docs/theory/slips.md
-/// @throws InvalidArgument for columns of different lengths, a shot rate that is not above 0
+/// followed from a stretch without slips in both directions; when they leave their prediction, the
+/// number of shots that restores it is searched. If it cannot be found, the recording must be cut.
+/// docs/theory/slips.md
+/// @throws InvalidArgument for columns of different lengths, a shot rate not above 0
 ShotCount find_slips(const CountedShots& shots, const sensors::Sensor& sensor,
                      const Progress& progress = {});
 

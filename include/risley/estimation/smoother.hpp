@@ -13,7 +13,7 @@
 
 namespace risley::estimation {
 
-/// What is known of the parameters before the data, about the linearisation point.
+/// Prior of the parameters, about the linearisation point.
 struct ParameterPrior {
   Eigen::VectorXd information;  ///< [free], 1 / sigma^2
   Eigen::VectorXd gradient;     ///< [free], information times (prior mean minus linearisation)
@@ -39,15 +39,15 @@ struct SmootherSolution {
 
 /// One Gauss-Newton step of the whole trajectory. The parameters are constants without noise, so
 /// the states of every knot are affine functions of them: a forward pass over the knots carries
-/// mean, derivative and covariance of the rotor states and collects what the data say of the
-/// parameters; a backward pass brings back what later knots say of earlier ones (as information
-/// where covariances are wanted, else in the quicker form of Bryson and Frazier). Equal to the
-/// solution of the full normal equations at a cost proportional to the number of knots. Derivation:
-/// docs/theory/map.md
+/// mean, derivative and covariance of the rotor states and collects the information on the
+/// parameters; a backward pass propagates information from later knots to earlier ones (as
+/// information if covariances are needed, otherwise in the faster form of Bryson and Frazier).
+/// Equal to the solution of the full normal equations at a cost proportional to the number of
+/// knots. Derivation: docs/theory/map.md
 /// @param linearisation  the trajectory the equations were accumulated at
 /// @param process        [prisms]
-/// @param covariances    whether the covariances of the states are wanted
-/// @throws EstimationError when a covariance stops being positive definite (place in the message)
+/// @param covariances  whether to compute the covariances of the states
+/// @throws EstimationError when a covariance is no longer positive definite (place in the message)
 SmootherSolution smooth(const NormalEquations& equations, const RotorTrajectory& linearisation,
                         std::span<const RotorProcess> process, const ParameterPrior& prior,
                         bool covariances);

@@ -26,7 +26,7 @@ struct SpectralLine {
   double phase = 0;             ///< rad, at the reference time
 };
 
-/// Where the shots of one emitter stand on average, the rotors' lines taken off.
+/// Mean position of one emitter's shots, without the rotors' lines.
 struct EmitterConstant {
   std::uint8_t beam = 0;
   double share = 0;  ///< of the shots
@@ -36,29 +36,27 @@ struct EmitterConstant {
 /// A constant for each emitter and a line for each turning rotor, fitted together. To first order a
 /// prism adds a vector that turns with it, so each rotor owns one line.
 struct RotorLines {
-  /// In the order of the speeds they were looked for with; all zero for a rotor that stands still.
+  /// In the order of the given speeds; all zero for a rotor at rest.
   std::vector<SpectralLine> lines;
-  Complex constant;  ///< where the optical axis stands: y + iz, mean of the shots' emitters
+  Complex constant;  ///< position of the optical axis: y + iz, mean of the shots' emitters
   std::vector<EmitterConstant> emitters;  ///< those that have shots
-  double unexplained = 0;  ///< mean square of what the fit leaves, of the unit vector
-  /// How that grows with a change of the lines' complex amplitudes, as change^H normal change,
-  /// [turning rotors squared]. Small where the shots say little about them.
+  double unexplained = 0;                 ///< mean square of the remainder, of the unit vector
+  /// Its increase with a change of the lines' complex amplitudes, as change^H normal change,
+  /// [turning rotors squared]. Small if the shots hardly determine them.
   Eigen::MatrixXcd normal;
 };
 
-/// What stays unexplained, a mean square, when the lines must have these amplitudes and only their
-/// phases are free.
-/// @param amplitude  [lines]; those of rotors that stand still are not looked at
+/// Unexplained mean square when the lines have given amplitudes and only their phases are free.
+/// @param amplitude  [lines]; those of rotors at rest are ignored
 double unexplained_with(const RotorLines& lines, std::span<const double> amplitude);
 
-/// Finds the speeds of the rotors by fitting lines to the shots of a window, at the times that have
-/// shots: half of the field may be missing, because sky returns nothing. A spectrum would be
-/// smeared by such gaps; the fit of all lines together is not. The sums that every choice of speeds
-/// needs come from one Fourier transform of the values and one of each emitter's shots.
-/// docs/theory/start.md
+/// Finds the speeds of the rotors by fitting lines to the shots of a window, at the times with
+/// shots: half of the field may be missing, because sky returns nothing. Such gaps would smear a
+/// spectrum, but not the joint fit of all lines. The sums needed for every choice of speeds come
+/// from one Fourier transform of the values and one of each emitter's shots. docs/theory/start.md
 class LineSearch {
  public:
-  /// Takes the best covered stretch of about 100 ms (more where shots are rare).
+  /// Uses the best covered stretch of about 100 ms (more if shots are rare).
   /// @throws EstimationError when there is no stretch of kShortestStart seconds or it holds too few
   ///         shots
   explicit LineSearch(const AngleSeries& series);
@@ -69,7 +67,7 @@ class LineSearch {
   /// The best minima with speeds within a share of the given ones, rad/s, best first.
   /// @param speeds      one per rotor, 1 to kMaxPrisms; two of them may be equal and opposite
   /// @param with_image  of two speeds: a third line lies as far beyond the second as the first lies
-  ///                    before it, as the beam of a reflector has, which bends it far
+  /// before it, as for the strongly deflected beam of a reflector
   std::vector<RotorLines> near(std::span<const double> speeds, double share, std::size_t most,
                                bool with_image = false) const;
   /// The best minima among all pairs of speeds up to the fastest, rad/s, best first.
@@ -113,9 +111,9 @@ class LineSearch {
   std::vector<Complex> value_;
 };
 
-/// Speeds of a sensor's rotors are looked for so near to what is usual, as a share of it.
+/// Range of the search around a rotor's usual speed, as a share of it.
 inline constexpr double kUsualShare = 0.06;
-/// So many minima of a search for speeds are tried.
+/// Number of minima tried in a search for speeds.
 inline constexpr std::size_t kMostMinima = 4;
 
 /// Duration of the shortest window that separates the rotors of a sensor, s.

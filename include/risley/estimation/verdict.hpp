@@ -8,8 +8,8 @@ namespace risley::estimation {
 
 /// What an estimate comes to. The codes are stable: scripts read them.
 enum class EstimateCode {
-  consistent,    ///< directions agree with the sensor's own belief; walls have not been asked
-  unusual,       ///< they do, but something is not as in a healthy unit
+  consistent,    ///< directions agree with the sensor's own parameters; not tested on walls
+  unusual,       ///< they do, but something is unusual for a healthy unit
   inconsistent,  ///< the model does not describe them
   undecided,     ///< the data cannot decide
 };

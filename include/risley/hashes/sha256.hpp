@@ -16,7 +16,7 @@ std::string sha256_of_file(const io::InputFile& file, const Progress& progress =
 /// SHA-256 of a text as 64 hexadecimal digits.
 std::string sha256(std::string_view text);
 
-/// SHA-256 of a text in base64, as browsers take it.
+/// SHA-256 of a text in base64, as browsers expect it.
 std::string sha256_base64(std::string_view text);
 
 }  // namespace risley::hashes

@@ -11,25 +11,25 @@
 
 namespace risley::identification {
 
-/// A sensor from what its scan revealed.
+/// A sensor identified from its scan.
 struct IdentifiedSensor {
   sensors::Sensor sensor;
-  /// Shots of the sensor for each row of the recording, 1 where nothing shows that some are left
-  /// out. Only shots that share a time show what the sensor's own shots are.
+  /// Shots of the sensor for each row of the recording, 1 if there is no sign of missing ones. Only
+  /// shots that share a time reveal the sensor's own shots.
   int decimation = 1;
 };
 
 /// The best hypothesis as a preset: optics, mean speeds, and the scan from the first shot, so that
-/// its row r is the recording's; the frame's turn is no part of it. What directions do not
-/// determine, such as limits of range, is taken from `rest` and said to be assumed.
+/// its row r is the recording's; the frame's turn is not included. Values that directions do not
+/// determine, such as limits of range, come from `rest` and are marked as assumed.
 /// @param rest  any sensor
 IdentifiedSensor identified_sensor(const Identification& identification, const std::string& name,
                                    const sensors::Sensor& rest);
 
-/// A known sensor that an identified train may be.
+/// A known sensor that matches an identified train.
 struct Likeness {
-  bool mirrored = false;  ///< the known one seen in a mirror, or the recording is
-  double worst = 0;       ///< largest difference, as a share of what is allowed
+  bool mirrored = false;  ///< the known one is mirrored, or the recording is
+  double worst = 0;       ///< largest difference, as a share of the allowed one
 };
 
 /// Whether a hypothesis or one of its equivalents is a sensor's train: the same faces, speeds

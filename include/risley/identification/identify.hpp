@@ -23,29 +23,29 @@ struct IdentifyOptions {
   int most_prisms = 3;            ///< 1 to 3
 };
 
-/// One train that may have made a scan.
+/// A candidate train for a scan.
 struct Hypothesis {
   TrainFit fit;
-  /// By how much it is worse than the best one: chi squared of 2 N independent angles.
+  /// Excess over the best one: chi squared of 2 N independent angles.
   double excess = 0;
   /// Places in Identification::hypotheses of trains whose scans no recording of this kind could
   /// distinguish from this one's.
   std::vector<std::size_t> equivalent_to;
 
-  /// Covariance of the same names as the fit's with the glass of every prism free, where the fit
-  /// took it as one: what is assumed counts; infinite if nothing determines it. Empty unless the
-  /// best.
+  /// Covariance of the same names as the fit's with the glass of every prism free, if the fit
+  /// assumed a single one: it includes that assumption; infinite if nothing determines it. Empty
+  /// unless the best.
   Eigen::MatrixXd total_covariance;
 
   /// The prisms of the fit.
   const PrismTrain& train() const { return fit.model.train; }
 };
 
-/// When the emitters see the rotors.
+/// The times at which the emitters see the rotors.
 enum class EmitterTiming {
   one_emitter,
-  in_turn,   ///< every shot sees the rotors where they are at its own time
-  together,  ///< the shots of a round see them where they are at one time
+  in_turn,   ///< every shot sees the rotors at its own time
+  together,  ///< the shots of a round see them at one common time
   uneven,    ///< neither
 };
 
@@ -58,19 +58,20 @@ struct Motion {
   bool smooth = true;  ///< no jumps between segments
 };
 
-/// What a scan reveals about the train that made it.
+/// Result of identifying the train behind a scan.
 struct Identification {
   std::vector<Hypothesis> hypotheses;  ///< best first; never empty
-  TrainFreedom freedom;                ///< what the data asked to be fitted
-  LineSpectrum spectrum;               ///< of the stretch that the lines were looked for in
-  ShotGrid grid;                       ///< what was fitted to: thinned where there is much of it
-  std::size_t rows = 0;                ///< of the stretch that was used
+  TrainFreedom freedom;                ///< settings of the fit chosen by the data
+  LineSpectrum spectrum;               ///< of the stretch searched for lines
+  ShotGrid grid;                       ///< the shots of the fit: thinned if there are many
+  std::size_t rows = 0;                ///< of the stretch used
   double step = 0;                     ///< between shots, s
   int emitters = 1;
-  bool emitters_named = false;  ///< by the recording; otherwise found from their pattern
+  bool emitters_named = false;  ///< by the recording; otherwise from their pattern
   EmitterTiming timing = EmitterTiming::one_emitter;
-  Motion motion;                       ///< how the rotors' motion had to be described
-  double correlation_time_factor = 1;  ///< shots that count as one because residuals hang together
+  Motion motion;                       ///< the model of the rotors' motion
+  double correlation_time_factor = 1;  ///< effective number of independent shots, given correlated
+                                       ///< residuals
   bool decided = false;                ///< every rival that is not equivalent is far worse
   bool fits = false;                   ///< the best one describes the scan
 
@@ -78,7 +79,7 @@ struct Identification {
   const Hypothesis& best() const { return hypotheses.front(); }
 };
 
-/// A decision is fair when the best rival's chi squared is larger by so much.
+/// A decision requires that the best rival's chi squared is larger by this.
 inline constexpr double kFairLead = 25;
 
 /// Finds number, order, faces, wedges, glass and rotors of the prisms, and the emitters, from

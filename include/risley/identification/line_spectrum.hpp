@@ -13,17 +13,17 @@ namespace risley::identification {
 /// A position across the axis, y + iz.
 using Complex = std::complex<double>;
 
-/// One line of the spectrum of y + iz: a vector of the unit sphere's tangent plane that turns.
+/// One line of the spectrum of y + iz: a rotating vector in the unit sphere's tangent plane.
 struct Line {
   double angular_velocity = 0;  ///< rad/s, signed: right-handed about X is positive
   Complex amplitude;            ///< at the grid's time 0
 };
 
-/// The spectrum of a scan: what stays, what turns, and how what stays changes from shot to shot.
+/// The spectrum of a scan: constants, lines, and the change of the constants from shot to shot.
 struct LineSpectrum {
   std::vector<Line> lines;        ///< strongest first
-  std::vector<Complex> constant;  ///< of every emitter: where its beams stand on average
-  double unexplained = 0;         ///< mean square of what is left, of the unit vector
+  std::vector<Complex> constant;  ///< of every emitter: the mean position of its beams
+  double unexplained = 0;         ///< mean square of the remainder, of the unit vector
 };
 
 /// What to look for.
@@ -35,14 +35,14 @@ struct LineSpectrumOptions {
 /// y + iz of every shot.
 std::vector<Complex> transverse(const ShotGrid& grid);
 
-/// Emitters that fire in turn show as constants that repeat every so many slots: the shortest such
-/// period, 1 where there is none. The lines are taken off before, since a few of them would show as
-/// a weak pattern of any period.
-/// @param grid  one emitter, as the recording names them
+/// Emitters that fire in turn appear as constants that repeat every so many slots: the shortest
+/// such period, 1 if there is none. The lines are removed first, since a few of them would appear
+/// as a weak pattern of any period.
+/// @param grid  one emitter, or as named in the recording
 int emitter_period(const ShotGrid& grid, const std::vector<Line>& lines);
 
-/// The strongest lines, one after another, each time all of them fitted anew together at the times
-/// that have shots. docs/theory/identify.md
+/// The strongest lines, one after another, with a joint fit of all of them each time, at the times
+/// with shots. docs/theory/identify.md
 /// @param grid  with the emitter of every shot
 LineSpectrum line_spectrum(const ShotGrid& grid, const LineSpectrumOptions& options);
 

@@ -11,15 +11,15 @@ namespace risley::identification {
 /// Highest degree of a curve.
 inline constexpr int kMaxCurveDegree = 4;
 
-/// What each coefficient that acts in a segment weighs at a time, and the derivative of that, 1/s.
-/// Times a little outside of the segment follow its polynomial.
+/// Weight of each coefficient of a segment at a time, and its derivative, 1/s. Times slightly
+/// outside of the segment follow its polynomial.
 struct CurveWeights {
   std::array<double, kMaxCurveDegree + 1> value{}, rate{};
 };
 
 /// Rotation angles of all rotors over a stretch of time, cut into segments of equal length. A
-/// smooth curve is a uniform B-spline (one segment of degree 1: constant speed), any other a
-/// polynomial of its own in every segment, so that angles may jump where a recording lost shots.
+/// smooth curve is a uniform B-spline (one segment of degree 1: constant speed), any other has a
+/// separate polynomial in every segment, so that angles may jump where a recording lost shots.
 struct RotorCurves {
   double begin = 0, end = 0;  ///< s
   int segments = 1, degree = 1;
@@ -33,7 +33,7 @@ struct RotorCurves {
   /// Number of coefficients of one rotor.
   int coefficients() const { return smooth ? segments + degree : segments * (degree + 1); }
   double segment_length() const { return (end - begin) / segments; }  ///< s
-  /// The segment of that time, the first or last one beyond them.
+  /// The segment of that time, the first or last one beyond the ends.
   int segment_of(double time) const;
   /// The first of the degree + 1 coefficients that act in a segment.
   int first_coefficient(int segment) const { return smooth ? segment : segment * (degree + 1); }

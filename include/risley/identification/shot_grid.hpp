@@ -12,7 +12,7 @@
 namespace risley::identification {
 
 /// Shots on the grid of the clock that fired them: shot i stands `slot[i]` steps after the first.
-/// Slots of shots that are missing stay empty.
+/// Slots of missing shots stay empty.
 struct ShotGrid {
   std::int64_t origin_ns = 0;  ///< time of slot 0
   double step = 0;             ///< s
@@ -20,7 +20,7 @@ struct ShotGrid {
   std::vector<std::int64_t> slot;
   std::vector<double> time;             ///< s after slot 0
   std::vector<double> azimuth, zenith;  ///< rad
-  std::vector<std::uint8_t> emitter;    ///< place among those that the recording names, from 0
+  std::vector<std::uint8_t> emitter;    ///< index among those named in the recording, from 0
   int emitters = 1;                     ///< that the recording names
 
   std::size_t size() const { return slot.size(); }
@@ -28,7 +28,7 @@ struct ShotGrid {
   double duration() const { return size() == 0 ? 0.0 : time.back(); }
 };
 
-/// Finds the step of the clock from all times together, so that rounded times do not limit it.
+/// Finds the step of the clock from all times together, so that their rounding does not limit it.
 /// @param series  in the order of time, without resets
 /// @throws EstimationError for fewer than 40 shots, or more than half of the times equal
 ShotGrid shot_grid(const estimation::AngleSeries& series, estimation::ShotRange rows);

@@ -9,16 +9,16 @@
 
 namespace risley::identification {
 
-/// Why trains that fit a scan best are nevertheless not those of the sensor.
+/// Reasons why trains that fit a scan best may still not be the sensor's.
 struct Doubt {
   std::string words;  ///< empty: there is none
   /// The train cannot be the sensor's; otherwise the scan does not determine it.
   bool refuted = false;
 };
 
-/// Looks at a train that fits: its parameters have to be possible, which a preset's are, every
-/// prism has to be seen, and what is left has to be noise and not a pattern.
-/// @param sensor  that the best hypothesis amounts to
+/// Checks a train that fits: its parameters must be within a preset's bounds, every prism must be
+/// detectable, and the residuals must be noise and not a pattern.
+/// @param sensor  that corresponds to the best hypothesis
 Doubt doubt_of(const Identification& found, const sensors::Sensor& sensor);
 
 }  // namespace risley::identification

@@ -19,12 +19,12 @@ namespace risley::identification {
 /// Optics and motion that predict every shot of a grid.
 struct TrainModel {
   PrismTrain train;             ///< one emitter for each of the grid's
-  std::vector<double> lag;      ///< [emitters], s: its shots see the rotors so much later
+  std::vector<double> lag;      ///< [emitters], s: delay at which its shots see the rotors
   estimation::FrameTurn frame;  ///< of the recording
   RotorCurves rotors;
 };
 
-/// What is fitted besides the rotors' motion.
+/// Unknowns in addition to the rotors' motion.
 struct TrainFreedom {
   bool glass = false;      ///< indices and deviations of the prisms, angles of faces and mirrors
   bool one_glass = false;  ///< all indices are the same
@@ -36,26 +36,26 @@ struct TrainFreedom {
   friend bool operator==(const TrainFreedom&, const TrainFreedom&) = default;
 };
 
-/// A train and its motion as fitted to the shots of a grid, and how well they describe them.
+/// A train and its motion as fitted to the shots of a grid, and the quality of the fit.
 struct TrainFit {
   TrainModel model;
-  double rms = 0;         ///< of azimuth and zenith together, rad; infinite where nothing fits
+  double rms = 0;         ///< of azimuth and zenith together, rad; infinite if nothing fits
   std::size_t shots = 0;  ///< that count
   std::size_t outliers = 0;
   std::size_t unknowns = 0;
   /// Of the values below, variance of the shots from their rms; independent shots.
   std::vector<std::string> names;  ///< as in parameter_list(), and "lag_2_s", "frame_yaw_deg"
-  /// SI units: what is free of optics, lags and frame; rotation angles where the curves begin, and
-  /// their mean speeds. Infinite variances where nothing determines them.
+  /// SI units: the free parameters of optics, lags and frame; rotation angles where the curves
+  /// begin, and their mean speeds. Infinite variances if nothing determines them.
   Eigen::MatrixXd covariance;
   std::vector<double> azimuth_residual, zenith_residual;  ///< [shots], observed minus predicted
 };
 
-/// When a fit ends, and what it does beside minimising.
+/// Convergence and other settings of a fit.
 struct TrainFitOptions {
   int iterations = 30;
   double tolerance = 1e-7;  ///< a step that gains a smaller share of the sum of squares is the last
-  bool without_outliers = false;  ///< they are left out once the fit stands: outlier_limit()
+  bool without_outliers = false;  ///< they are rejected after convergence: outlier_limit()
   bool covariance = false;
 };
 
@@ -66,14 +66,14 @@ struct TrainFitOptions {
 TrainFit fit_train(const ShotGrid& grid, const TrainModel& start, const TrainFreedom& freedom,
                    const TrainFitOptions& options = {}, const Progress& progress = {});
 
-/// Beyond which a residual is no noise, rad: 6 robust sigmas, by what half of the shots and 95 % of
-/// them stay within.
+/// Residuals beyond this are not noise, rad: 6 robust sigmas, from the quantiles of half of the
+/// shots and of 95 % of them.
 double outlier_limit(const TrainFit& fit);
 
-/// Of all residuals, outliers too, none counted as larger than the limit, rad^2.
+/// Of all residuals, including outliers, each limited to this value, rad^2.
 double mean_square(const TrainFit& fit, double limit);
 
-/// What a model predicts for every shot of a grid, in place of what was seen.
+/// A model's prediction for every shot of a grid, instead of the observation.
 ShotGrid predicted(const ShotGrid& grid, const TrainModel& model);
 
 }  // namespace risley::identification

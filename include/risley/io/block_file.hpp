@@ -24,18 +24,18 @@ class FileDescriptor {
   int get() const { return value_; }                   ///< the descriptor, still owned by this
   int release() { return std::exchange(value_, -1); }  ///< the caller's from now on
 
-  /// @return 0, or errno when the system refuses (a full disk may show only here)
+  /// @return 0, or errno on failure (a full disk may show only here)
   int close();
 
  private:
   int value_;
 };
 
-/// A regular file that is opened once and read by all holders of a copy of this, each at places of
-/// its own and in any thread.
+/// A regular file that is opened once and read through any copy of this, at independent places and
+/// in any thread.
 class InputFile {
  public:
-  /// Opens it: a path is an input file wherever one is expected.
+  /// Opens it: a path converts to an input file.
   /// @param expected  for messages: "a recording"
   /// @throws FileError when it is missing or not a regular file
   InputFile(std::string path,  // NOLINT(google-explicit-constructor)
@@ -43,8 +43,8 @@ class InputFile {
 
   const std::string& path() const { return path_; }  ///< as it was given
   std::uint64_t size() const { return size_; }       ///< bytes, when it was opened
-  /// A name by which a library that opens files itself gets this one, also in a child process,
-  /// whatever has its path by then. Lives as long as this process has the file open.
+  /// A name under which a library that opens files itself finds this one, also in a child process,
+  /// even if its path now leads to another file. Valid as long as this process has the file open.
   std::string name_for_libraries() const;
 
   /// Reads bytes from an offset on. @return how many; fewer than `most` only at the end
@@ -57,7 +57,7 @@ class InputFile {
   std::uint64_t size_ = 0;
 };
 
-/// A binary file read through one block of memory; going forward costs one copy per byte.
+/// A binary file read through one block of memory; reading forward costs one copy per byte.
 class BlockInput {
  public:
   explicit BlockInput(InputFile file);
@@ -68,10 +68,10 @@ class BlockInput {
 
   /// The bytes [offset, offset + count), until the next call; they must lie inside the file.
   /// @param count  at most kBlockBytes
-  /// @throws FileError when the disk fails, InvalidArgument for other bytes
+  /// @throws FileError for a read error, InvalidArgument for other bytes
   const std::uint8_t* at(std::uint64_t offset, std::size_t count);
 
-  /// Most bytes that at() gives at once.
+  /// Most bytes that at() returns at once.
   static constexpr std::size_t kBlockBytes = std::size_t{1} << 18;
 
  private:
@@ -81,8 +81,8 @@ class BlockInput {
   std::size_t block_bytes_ = 0;
 };
 
-/// A binary file written in blocks, with the possibility to fill in a number later. It appears
-/// under its name only with commit().
+/// A binary file written in blocks, which allows a number to be filled in later. It appears under
+/// its name only at commit().
 class BlockOutput {
  public:
   /// @throws FileError
@@ -94,8 +94,8 @@ class BlockOutput {
   /// Room for count more bytes at the end, until the next call. @throws FileError
   std::uint8_t* append(std::size_t count);
 
-  /// Overwrites eight bytes written before by a little-endian number. @throws FileError,
-  /// InvalidArgument where they were not
+  /// Overwrites eight bytes written earlier by a little-endian number. @throws FileError,
+  /// InvalidArgument if they were not
   void patch_u64(std::uint64_t offset, std::uint64_t value);
 
   /// @throws FileError

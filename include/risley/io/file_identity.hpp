@@ -10,10 +10,10 @@
 
 namespace risley::io {
 
-/// Who a file is, by whatever names and links: device and number on it.
+/// Identifies a file independently of names and links: its device and its number there.
 using FileIdentity = std::pair<dev_t, ino_t>;
 
-/// Of a file, folder or device; empty where nothing has that name.
+/// Of a file, folder or device; empty if the name does not exist.
 std::optional<FileIdentity> file_identity(const std::string& path);
 
 }  // namespace risley::io

@@ -6,17 +6,16 @@
 
 namespace risley::io {
 
-/// Makes a folder with those above it where it is missing. @return whether it was missing
+/// Creates a folder and its parents if missing. @return whether it was missing
 /// @throws FileError
 bool make_folder(const std::string& path);
 
-/// A folder for temporary files, under an unpredictable name and for this user
-/// alone: in TMPDIR where that is set, otherwise in memory (/dev/shm) where there is plenty of
-/// room, otherwise where the system has such files (/tmp). The destructor removes it with all that
-/// is in it.
+/// A folder for temporary files, under an unpredictable name and accessible only to this user: in
+/// TMPDIR if set, otherwise in memory (/dev/shm) if there is plenty of room, otherwise in the
+/// system's place (/tmp). The destructor removes it with its contents.
 class TemporaryFolder {
  public:
-  /// @param bytes  that its files may have at the same time, roughly
+  /// @param bytes  approximate largest total size of its files
   /// @throws FileError
   explicit TemporaryFolder(double bytes);
   ~TemporaryFolder();

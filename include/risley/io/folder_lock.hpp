@@ -9,11 +9,11 @@
 
 namespace risley::io {
 
-/// A folder that one writer has for itself. The kernel takes the lock back when its owner ends in
-/// whatever way, and leaves no file behind. File systems without such locks have none.
+/// A folder locked by one writer. The kernel releases the lock however its owner ends, and no file
+/// remains. File systems without such locks have none.
 class FolderLock {
  public:
-  /// @throws FileError where another writer has it, in this process or another
+  /// @throws FileError if another writer has it, in this process or another
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;
@@ -24,7 +24,7 @@ class FolderLock {
   std::optional<FileIdentity> identity_;
 };
 
-/// Whether another process has a folder for itself.
+/// Whether another process has locked a folder.
 bool is_locked_by_other(const std::string& folder);
 
 }  // namespace risley::io

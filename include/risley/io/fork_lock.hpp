@@ -7,9 +7,9 @@
 
 namespace risley::io {
 
-/// Who forks holds it alone; threads within OpenSSL share it. A child has only the thread that
-/// forked, and would wait forever for locks that another one held: NetCDF's library uses OpenSSL.
-/// For the same reason a child never takes this one.
+/// A thread that forks holds it exclusively; threads inside OpenSSL share it. A child has only the
+/// forking thread and would wait forever for a lock held by another thread: NetCDF's library uses
+/// OpenSSL. For the same reason a child never takes this lock.
 class ForkLock {
  public:
   /// The one of the process.

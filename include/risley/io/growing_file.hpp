@@ -18,19 +18,19 @@ namespace risley::io {
 
 struct FileTarget;
 
-/// An output that grows for long and cannot be made again. As OutputFile it gets its name, and
-/// replaces a file of that name and keeps its mode, when it is whole; but until then it has a name
-/// that everybody can find, and stays whatever happens. A thread of its own writes, so that a disk
-/// that pauses does not hold up the caller.
+/// An output that grows for a long time and cannot be recreated. Like OutputFile it gets its name,
+/// and replaces a file of that name and keeps its mode, when it is complete; but until then it has
+/// a predictable name, and it is never removed. A separate thread writes, so that a slow disk does
+/// not block the caller.
 class GrowingFile {
  public:
-  /// What its name ends with until commit().
+  /// Suffix of its name until commit().
   static constexpr const char* kUnfinished = ".unfinished";
   /// Bytes that may wait for the disk: half a second of three sensors at ten times their speed.
   static constexpr std::size_t kMostWaiting = std::size_t{32} << 20U;
 
-  /// @throws FileError as OutputFile; for what is no regular file; where there is an unfinished
-  ///         file of that name, which is never written over
+  /// @throws FileError as OutputFile; for a file that is not regular; if there is an unfinished
+  /// file of that name, which is never overwritten
   explicit GrowingFile(const std::string& path);
   /// Writes what waits.
   ~GrowingFile();
@@ -38,20 +38,19 @@ class GrowingFile {
   GrowingFile& operator=(const GrowingFile&) = delete;
 
   const std::string& path() const { return path_; }  ///< that commit() gives the file
-  /// Its name until commit(): path(), or what a symbolic link of that name leads to, with
-  /// kUnfinished behind. Empty afterwards.
+  /// Its name until commit(): path(), or the target of a symbolic link of that name, followed by
+  /// kUnfinished. Empty afterwards.
   const std::string& unfinished_path() const { return unfinished_path_; }
   std::uint64_t size() const { return size_; }  ///< bytes appended so far
 
-  /// Appends bytes, all or none, soon; waits while more than kMostWaiting wait already.
-  /// @return an empty vector that has room, as soon as others were written: appending again need
-  ///         not ask the system for memory
-  /// @throws FileError when the disk refused something that was appended before: the file ends
-  ///         there
+  /// Appends bytes, all or none, soon; waits while more than kMostWaiting are pending.
+  /// @return a vector with capacity from earlier writes, if there is one: appending again needs no
+  /// new memory
+  /// @throws FileError when an earlier write failed: the file ends there
   std::vector<std::uint8_t> append(std::vector<std::uint8_t> bytes);
   /// Waits until the file has all bytes. @throws FileError as append()
   void settle();
-  /// Puts the bytes on the disk and gives the file its name. @throws FileError
+  /// Syncs the bytes to disk and renames the file. @throws FileError
   void commit();
   /// Removes the file. @throws nothing
   void discard();
@@ -74,7 +73,7 @@ class GrowingFile {
   std::vector<std::uint8_t> spare_;
   std::exception_ptr failure_;
   bool ending_ = false;
-  /// Of the thread: bytes in the file, of which so many went toward the disk and are there.
+  /// Of the thread: bytes in the file, those being synced, and those on disk.
   std::uint64_t written_ = 0, begun_ = 0, on_disk_ = 0;
   std::thread thread_;
 };

@@ -10,10 +10,10 @@
 
 namespace risley::io {
 
-/// Gives a function every byte of a file, in pieces and in order.
+/// Passes every byte of a file to a function, in pieces and in order.
 /// @throws FileError when the file is missing, a folder, or cannot be read to its end
 void read_bytes(const std::string& path, const std::function<void(std::span<const char>)>& take);
-/// The same of an open file.
+/// The same for an open file.
 void read_bytes(const InputFile& file, const std::function<void(std::span<const char>)>& take);
 
 }  // namespace risley::io

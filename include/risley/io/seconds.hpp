@@ -15,8 +15,8 @@ inline std::optional<std::int64_t> nanoseconds_from_seconds(double seconds) {
   return static_cast<std::int64_t>(whole) * 1'000'000'000 + std::llround((seconds - whole) * 1e9);
 }
 
-/// The nearest double; from about 100 days on, where doubles are coarser than 1 ns, the fraction
-/// is added last, so that reading the double and writing it again gives the same double.
+/// The nearest double; from about 100 days on, where doubles are coarser than 1 ns, the fraction is
+/// added last, so that reading the double and writing it again gives the same double.
 inline double seconds_from_nanoseconds(std::int64_t time_ns) {
   constexpr std::int64_t kExact = std::int64_t{1} << 53, kSecond = 1'000'000'000;
   if (time_ns > -kExact && time_ns < kExact) return static_cast<double>(time_ns) / 1e9;

@@ -6,13 +6,13 @@
 
 namespace risley::io {
 
-/// Keeps in mind a file or folder that its owner will remove or rename.
+/// Registers a file or folder that its owner will remove or rename.
 void note_temporary(const std::string& path);
-/// It is gone, or has its final name.
+/// It has been removed or renamed.
 void forget_temporary(const std::string& path);
 
-/// Removes all of them, for a process that ends without its owners' help. Whoever makes another one
-/// waits from then on.
+/// Removes all of them, for a process that ends without running destructors. Any thread that
+/// creates another one blocks from then on.
 void remove_temporaries();
 
 }  // namespace risley::io

@@ -8,11 +8,11 @@ namespace risley::io {
 
 class OutputFile;
 
-/// Reads a whole file. @throws FileError when it is missing, cannot be read, or is longer than any
-/// text that is read at once
+/// Reads a whole file. @throws FileError when it is missing, cannot be read, or is longer than the
+/// limit for texts read at once
 std::string read_text_file(const std::string& path);
 
-/// Writes what a file is to hold, which is then to be committed. @throws FileError
+/// Writes the contents of a file, which must then be committed. @throws FileError
 void write_text(const OutputFile& output, const std::string& text);
 
 /// Writes a whole file through OutputFile. @throws FileError

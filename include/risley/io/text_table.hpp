@@ -23,11 +23,10 @@
 /// Tables in text files: lines, fields, numbers.
 namespace risley::io {
 
-/// First line of a text without byte order mark, line end and blanks: what a header is
-/// recognised by.
+/// First line of a text without byte order mark, line end and blanks: it identifies a header.
 std::string normalized_header(std::string_view text);
 
-/// What lines are of: tables come in plain dialect (TextDialect), other text as it is.
+/// Kind of lines: tables come in plain dialect (TextDialect), other text unchanged.
 enum class LinesOf : std::uint8_t { text, table };
 
 /// Reads a file line by line in large blocks, in constant memory; UTF-16 as UTF-8.
@@ -38,7 +37,7 @@ class LineReader {
 
   /// The next line without its line end (LF or CR LF) and, in line 1, without a byte order mark;
   /// it lives until the next call. false at the end of the file.
-  /// @throws FileError when the disk fails or a line is longer than 64 KiB
+  /// @throws FileError for a read error or a line longer than 64 KiB
   bool next(std::string_view& line);
 
   const InputFile& file() const { return file_; }             ///< that is read
@@ -61,61 +60,61 @@ class LineReader {
   std::string raw_, decoded_, plain_;  ///< bytes of the file, their text, a line in plain dialect
 };
 
-/// What is wrong with one line; its reader adds the file and the line.
+/// The error in one line; its reader adds the file and the line.
 class BadRow : public Error {
  public:
   using Error::Error;
 };
 
-/// A number as it stands in a text: digits * 10^-decimals, exact.
+/// A number as written in a text: digits * 10^-decimals, exact.
 struct Decimal {
   double value = 0.0;
   std::int64_t digits = 0;
-  int decimals = -1;  ///< digits after the point; -1 where only `value` is known (exponents)
+  int decimals = -1;  ///< digits after the point; -1 if only `value` is known (exponents)
 };
 
 /// @throws BadRow with the column's name when the field is not a finite number
 Decimal decimal_field(std::string_view field, std::string_view column);
 
-/// @throws BadRow with the column's name when the field is no whole number in [low, high]
+/// @throws BadRow with the column's name when the field is not a whole number in [low, high]
 std::int64_t integer_field(std::string_view field, std::string_view column, std::int64_t low,
                            std::int64_t high);
 
 /// Seconds as whole nanoseconds, exact up to 9 decimals and rounded beyond.
 /// @throws BadRow when they do not fit 64 bits
 std::int64_t nanoseconds_field(std::string_view field, std::string_view column);
-/// The same for a number that has been read already.
+/// The same for a number already parsed.
 std::int64_t nanoseconds_of(const Decimal& seconds, std::string_view column);
 
 /// A number, or NaN: an empty field, "nan" or an infinity. @throws BadRow for anything else
 Decimal number_or_nan(std::string_view field, std::string_view column);
 
-/// What stands between two fields: this character, or any number of blanks and tabs.
+/// The separator of two fields: this character, or any number of blanks and tabs.
 inline constexpr char kBlanks = ' ';
 
 /// Text without blanks and tabs at its ends.
 std::string_view trimmed(std::string_view text);
 
-/// For messages: short, and without bytes that a terminal would act on.
+/// For messages: short, and without control bytes for a terminal.
 std::string printable(std::string_view text);
 
-/// Fields of a line, without the blanks around them.
+/// Fields of a line, without surrounding blanks.
 std::vector<std::string_view> fields_of(std::string_view line, char delimiter);
 
-/// The same where their number is known. @return how many there are, of which `fields` has as many
-/// as it has room for
+/// The same if their number is known. @return their number; `fields` receives as many as it has
+/// room for
 std::size_t split_fields(std::string_view line, char delimiter, std::span<std::string_view> fields);
 
-/// Powers of ten that 64 bits hold: 10^0 to 10^18. @throws InvalidArgument for others
+/// Powers of ten that fit in 64 bits: 10^0 to 10^18. @throws InvalidArgument for others
 std::int64_t power_of_ten(int exponent);
 
-/// Text that goes to a file in large blocks and appears under its name at close().
+/// Text written to a file in large blocks, which appears under its name at close().
 class TextOutput {
  public:
   /// @throws FileError
   explicit TextOutput(const std::string& path);
 
-  /// What has not gone to the file yet, for fmt to append to.
+  /// Text not yet written to the file, for fmt to append to.
   fmt::memory_buffer& buffer() { return buffer_; }
   /// Text as it is.
   void append(std::string_view text) { buffer_.append(text.data(), text.data() + text.size()); }
@@ -123,7 +122,7 @@ class TextOutput {
   void append_fixed(double value, int decimals);
   /// digits * 10^-decimals.
   void append_decimal(std::int64_t digits, int decimals);
-  /// Hands a full buffer to the file; to be called after each row. @throws FileError
+  /// Writes a full buffer to the file; to be called after each row. @throws FileError
   void end_row() {
     buffer_.push_back('\n');
     if (buffer_.size() >= kBlockSize) flush();

@@ -23,13 +23,12 @@ using ScaleOfName = std::function<long double(const std::string& name)>;
 ///         - [0, 4.0e-6]
 ///
 /// where element [i][j] is in the unit of names[i] times the unit of names[j].
-/// @throws FileError with the line for names that are not allowed or stand twice and a matrix that
-///         is none of their covariance
+/// @throws FileError with the line for names that are not allowed or repeated and a matrix that is
+/// not a covariance of them
 algebra::NamedCovariance read_covariance(const YamlMap& root, const ScaleOfName& scale_of);
 
 /// The same as text; reading it gives the same bits.
-/// @throws InvalidArgument as ScaleOfName, for a matrix of another size and numbers that are not
-///         finite
+/// @throws InvalidArgument as ScaleOfName, for a matrix of another size and non-finite numbers
 std::string covariance_text(const algebra::NamedCovariance& covariance,
                             const ScaleOfName& scale_of);
 

@@ -13,7 +13,7 @@ std::string yaml_quoted(std::string_view text);
 /// The shortest decimal which, read in extended precision and multiplied by the scale, gives
 /// exactly this value.
 /// @param scale  the value's units per unit of the file
-/// @throws InvalidArgument for a value that is not finite and a scale that is not above 0
+/// @throws InvalidArgument for a non-finite value and a scale not above 0
 std::string yaml_decimal(double value, long double scale = 1);
 
 }  // namespace risley::io

@@ -16,7 +16,7 @@
 
 namespace risley::jobs {
 
-/// Where beams were thought to go before and after a calibration, against where they truly went.
+/// Assumed beam directions before and after a calibration, compared with the true ones.
 struct BeamComparison {
   calibration::DirectionErrors before, after;
   sensors::Sensor truth;  ///< of the first recording
@@ -25,14 +25,14 @@ struct BeamComparison {
 };
 
 /// Compares an evenly spread sample of the beams of all recordings.
-/// @param truths  OUT.truth.yaml of each recording's simulation, beside which OUT.truth.nc stands
-/// @throws InvalidArgument unless there is one of each recording; FileError; Cancelled
+/// @param truths  OUT.truth.yaml of each recording's simulation, with OUT.truth.nc beside it
+/// @throws InvalidArgument unless there is one for each recording; FileError; Cancelled
 BeamComparison compare_beams(const std::vector<calibration::RangedRecording>& recordings,
                              const calibration::Calibration& calibration,
                              const std::vector<std::string>& truths, const Progress& progress = {});
 
-/// Where the beams of a moving sensor were thought to go before and after a calibration, boresight
-/// and prisms together, against where they truly went, sensor axes as the mount was designed.
+/// Assumed beam directions of a moving sensor before and after a calibration, boresight and prisms
+/// together, compared with the true ones, sensor axes as the mount was designed.
 struct FlightTruth {
   calibration::DirectionErrors before, after;
   sensors::Sensor sensor;     ///< true, of the first recording
@@ -42,7 +42,7 @@ struct FlightTruth {
 /// Compares an evenly spread sample of the beams of all recordings.
 /// @param flight  made of the recordings
 /// @param given   the mount before the calibration
-/// @param truths  as compare_beams(); beside each stands OUT.mount.truth.yaml, too
+/// @param truths  as for compare_beams(); OUT.mount.truth.yaml is beside each, too
 /// @throws as compare_beams()
 FlightTruth compare_flight_beams(const std::vector<calibration::RangedRecording>& recordings,
                                  const calibration::FlightRecordings& flight,

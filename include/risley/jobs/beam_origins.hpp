@@ -7,7 +7,7 @@
 
 namespace risley::jobs {
 
-/// Where a sensor's beams start, on the paper's grids.                     [B21 App. A, Fig. A1]
+/// Origins of a sensor's beams, on the paper's grids. [B21 App. A, Fig. A1]
 struct BeamOrigins {
   BeamOriginMap map;
   double least_y = 0, greatest_y = 0, least_z = 0, greatest_z = 0;  ///< over the whole field, m

@@ -25,8 +25,8 @@ namespace risley::jobs {
 
 struct CalibratedFlight;
 
-/// What to calibrate in flight, and how. SI units.
-/// A calibration given as the sensor, from walls say, counts with its covariance.
+/// Input and settings of a calibration in flight. SI units. A calibration given as the sensor, for
+/// example from walls, contributes its covariance.
 struct CalibrateFlightOptions : RangedInputOptions {  ///< recordings of one flight
   PlatformFiles platform;                             ///< trajectory and mount; no map
   HeldParameters fixed;
@@ -38,11 +38,12 @@ struct CalibrateFlightOptions : RangedInputOptions {  ///< recordings of one fli
   double knot_spacing = calibration::FlightCalibrationOptions{}.knot_spacing;
   double cell_size = calibration::FlightCalibrationOptions{}.cell_size;
   std::uint64_t seed = 0;
-  /// Path of known ground, see scenes::load_control; may be empty. The flight is fixed on it.
+  /// Path of known ground, see scenes::load_control; may be empty. It fixes the flight's position.
   std::string control;
-  std::vector<std::string> truths;  ///< OUT.truth.yaml of each recording to judge by, or none
+  std::vector<std::string> truths;  ///< OUT.truth.yaml of each recording to compare with, or none
   bool details = false;             ///< wanted in the result
-  bool force = false;  ///< write what is not better, and what a drifting clock has spoilt, too
+  bool force = false;  ///< also write a result that is no better, or that a drifting clock has
+                       ///< spoilt
   /// Names the outputs: calibration.yaml, mount.yaml and trajectory.csv; without them nothing is
   /// written.
   ResultFiles files;
@@ -60,8 +61,8 @@ struct CalibratedFlight : RangedInput {
   calibration::FlightCalibration calibration;
   std::optional<FlightTruth> truth;      ///< where it is known
   std::optional<FlightDetails> details;  ///< where they were asked for
-  bool calibration_written = false;      ///< calibration.yaml, and what goes with it
-  Provenance provenance;    ///< of the options, with the inputs; empty where nothing was written
+  bool calibration_written = false;      ///< calibration.yaml, and its companions
+  Provenance provenance;    ///< of the options, with the inputs; empty if nothing was written
   double solving_time = 0;  ///< s
   double total_time = 0;    ///< of the job, s
 };
@@ -69,9 +70,9 @@ struct CalibratedFlight : RangedInput {
 /// Finds the rotation angles of every recording and calibrates mount and sensor on the strips of
 /// the flight. Stages, for each recording: reading, rotation angles; then calibrating.
 /// @throws EstimationError when recordings and trajectory share no time, for fewer than two strips
-///         that overlap; InvalidArgument, also for a recording that is given twice and where
-///         nothing says how wrong the trajectory may be, and for known ground on a map where the
-///         trajectory has none or the other way about; FileError; Cancelled
+/// that overlap; InvalidArgument, also for a recording given twice and if the trajectory's errors
+/// are not stated, and for known ground on a map if the trajectory has none or vice versa;
+/// FileError; Cancelled
 CalibratedFlight calibrate_flight(const CalibrateFlightOptions& options,
                                   const Progress& progress = {});
 

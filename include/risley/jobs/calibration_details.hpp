@@ -21,21 +21,21 @@ struct FieldCells {
 };
 
 /// Mean distances from the planes over cells of the field of view, of all recordings together.
-/// Cells with few points are left out.
+/// Cells with few points are omitted.
 struct WallField {
   FieldCells cells;
   std::vector<double> mean_before, mean_after;  ///< [cells], m
   std::size_t fewest_points = 0;                ///< that a cell must hold
-  std::size_t points = 0;                       ///< of all cells, those left out too
+  std::size_t points = 0;                       ///< of all cells, including omitted ones
   double rms_before = 0, rms_after = 0;         ///< of the means, m
-  double noise = 0;                             ///< what noise alone would leave of that, m
+  double noise = 0;                             ///< its expected value for pure noise, m
 };
 
 /// Mean errors of reported directions over cells of the field of view, of all recordings together.
 struct PointingField {
   FieldCells cells;
   std::vector<double> total;  ///< [cells], rad
-  std::vector<double> shape;  ///< without the rotation that all beams share, rad
+  std::vector<double> shape;  ///< without the rotation common to all beams, rad
 };
 
 /// Mean of the points of one wall in one cell of the field of view: single points would show
@@ -46,23 +46,23 @@ struct WallPatch {
   double before = 0, after = 0;  ///< mean distance from the plane, m
 };
 
-/// The walls that one recording saw, in space.
+/// The walls of one recording, in space.
 struct WallsInSpace {
   std::size_t recording = 0;
   std::vector<WallPatch> patches;
   std::size_t fewest_points = 0;  ///< that a patch must hold
-  std::size_t points = 0;         ///< of all patches, those left out too
+  std::size_t points = 0;         ///< of all patches, including omitted ones
   double rms_before = 0;          ///< of the patches, m
   double largest = 0;             ///< distance from a plane, before or after, m
   double farthest = 0;            ///< patch from the sensor, m
 };
 
-/// Errors of beams whose truth is known, rad.
+/// Errors of beams with known truth, rad.
 struct BeamErrorMoments {
   estimation::Moments azimuth_before, zenith_before, azimuth_after, zenith_after;
 };
 
-/// What there is to say of a calibration beside the numbers that it found; all of a sample.
+/// Details of a calibration in addition to its numbers; all from a sample.
 struct CalibrationDetails {
   std::vector<SamplePoint> sample;
   std::size_t points_on_planes = 0;                       ///< of the sample

@@ -21,7 +21,7 @@ struct CellParameter {
   double truth = 0;
   double error = 0;             ///< found minus true
   double sigma = 0;             ///< what was held included
-  double sigma_given_held = 0;  ///< if that were exactly as held
+  double sigma_given_held = 0;  ///< if that were exact
 };
 
 /// Errors of one kind over all shots of a cell. SI units.
@@ -39,27 +39,27 @@ std::string name_with_unit(const std::string& errors);
 struct CellOutcome {
   CampaignCell cell;
   bool answered = false;  ///< the estimate or the calibration converged
-  std::string verdict;    ///< its code; empty where there is none
+  std::string verdict;    ///< its code; empty without one
   std::string message;    ///< why there is no answer
   std::vector<CellParameter> parameters;
-  /// Errors of the prisms' parameters together, squared and weighed by their covariance given what
-  /// was held, per degree of freedom; NaN without an answer.
+  /// Squared errors of the prisms' parameters together, weighted by their covariance given the held
+  /// values, per degree of freedom; NaN without a result.
   double nees = 0;
   std::size_t degrees_of_freedom = 0;
   double nees_rotation_angles = 0;  ///< mean over the shots of an estimate; NaN otherwise
   std::vector<CellErrors> errors;
 };
 
-/// Simulates a cell and estimates or calibrates with what was recorded. Cells do not depend on each
-/// other: the outcome is a matter of plan, number and program alone. What cannot be answered is an
+/// Simulates a cell, then estimates or calibrates from the simulated recordings. Cells are
+/// independent of each other: the outcome depends only on plan, number and program. A failure is an
 /// outcome, too.
 /// @throws FileError, InvalidArgument, Cancelled
 CellOutcome run_cell(const CampaignPlan& plan, std::uint64_t number, const Progress& progress = {});
 
-/// Where results of a campaign are kept, and which processes make them.
+/// Folder for results of a campaign, and the processes that compute them.
 struct CampaignOptions {
   std::string folder;   ///< chunks go to chunks/ in it
-  std::string program;  ///< name and version of what computes, part of what makes results the same
+  std::string program;  ///< name and version of the program, part of the identity of results
 };
 
 /// Chunk `number` of `count`, from 1. It has the cells from floor((number - 1) cells / count) on.
@@ -74,16 +74,16 @@ struct CampaignChunk {
   bool made_before = false;
 };
 
-/// Runs the cells of a chunk, several at a time, and writes what comes of them to one file
-/// (chunk-I-of-N.jsonl), which appears when it is whole. If it is there already, whole and made of
-/// the same plan by the same program, nothing is done. The bytes do not depend on threads or on
-/// when and where the chunk ran.
-/// @throws InvalidArgument for a chunk that there is not; FileError, Cancelled
+/// Runs the cells of a chunk, several at a time, and writes the results to one file
+/// (chunk-I-of-N.jsonl), which appears when it is complete. If it exists already, complete and made
+/// from the same plan by the same program, nothing is done. The bytes do not depend on threads or
+/// on when and where the chunk ran.
+/// @throws InvalidArgument for a chunk that does not exist; FileError, Cancelled
 CampaignChunk run_chunk(const CampaignPlan& plan, const ChunkNumber& which,
                         const CampaignOptions& options, const Progress& progress = {});
 
-/// A figure over the cells of a setting, and the band in which 95 of 100 campaigns find it where
-/// covariances are true.
+/// A figure over the cells of a setting, and the range for 95 of 100 campaigns if covariances are
+/// correct.
 struct BandedFigure {
   double value = 0, low = 0, high = 0;
 
@@ -98,10 +98,10 @@ struct ParameterSummary {
   std::uint64_t cells = 0;
   double bias = 0;   ///< mean error
   double rmse = 0;   ///< root mean square error
-  double bound = 0;  ///< root mean square of the sigmas given what was held
-  double sigma = 0;  ///< the same of the sigmas that include it
+  double bound = 0;  ///< root mean square of the sigmas given the held values
+  double sigma = 0;  ///< the same of the sigmas that include their errors
   BandedFigure error_over_bound;
-  /// Share of the errors that are below two sigmas given what was held: 0.9545 is honest.
+  /// Share of the errors below two sigmas given the held values: 0.9545 if the sigmas are correct.
   BandedFigure within_two_sigma;
 };
 
@@ -124,28 +124,26 @@ struct SettingSummary {
   std::vector<ErrorSummary> errors;
 };
 
-/// A campaign, as far as it is done.
+/// A campaign, as far as it has been computed.
 struct CampaignResult {
   std::string table;                     ///< that was written
   std::uint64_t cells = 0, done = 0;     ///< of the plan; of them those with a result
   std::vector<SettingSummary> settings;  ///< in the order of the plan
   /// Cells without a result, as ranges, the last included; the first ones if they are many.
   std::vector<std::pair<std::uint64_t, std::uint64_t>> missing;
-  std::vector<Warning> warnings;  ///< about files that do not count
+  std::vector<Warning> warnings;  ///< about ignored files
 };
 
-/// Reads the chunks that are done, in whatever way the campaign was divided, and writes one table
-/// with a row for each cell, each once and in order. A file that is damaged or was made of another
-/// plan or by another program does not count, and a warning says so. Memory does not grow with the
-/// number of cells.
+/// Reads the finished chunks, for any division of the campaign, and writes one table with a row for
+/// each cell, each once and in order. A file that is damaged or was made from another plan or by
+/// another program is ignored, with a warning. Memory does not grow with the number of cells.
 /// @param table  its ending chooses the format, see tables::TableFile
-/// @throws InvalidArgument for another ending; FileError, also where there is no chunk; Cancelled
+/// @throws InvalidArgument for another ending; FileError, also if there is no chunk; Cancelled
 CampaignResult merge_chunks(const CampaignPlan& plan, const std::string& table,
                             const CampaignOptions& options, const Progress& progress = {});
 
 /// A whole campaign on one machine: chunk after chunk, about 100 cells each, then all of them
-/// merged. When it is stopped, the chunks that are whole stay, and the next run goes on behind
-/// them.
+/// merged. When it is stopped, complete chunks stay, and the next run continues after them.
 /// @throws as run_chunk(), merge_chunks()
 CampaignResult run_campaign(const CampaignPlan& plan, const std::string& table,
                             const CampaignOptions& options, const Progress& progress = {});

@@ -15,23 +15,23 @@
 
 namespace risley::jobs {
 
-/// What a campaign's grid says at one of its points, by name and as it is written there.
+/// Settings at one point of a campaign's grid, by name and as written there.
 using GridPoint = std::vector<std::pair<std::string, std::string>>;
 
 /// "simulate.noise_angle_deg 0.01, estimate.method ekf"; empty without a grid.
 std::string grid_words(const GridPoint& grid);
 
-/// One point of a campaign's grid: what is simulated and what is then done with it.
+/// One point of a campaign's grid: the simulation and its processing.
 struct CampaignSetting {
   GridPoint grid;
   /// One per recording: one, or one at each station. The seed is a cell's.
   std::vector<simulation::SimulationSettings> simulations;
-  std::string format;  ///< ending of the recordings, which chooses their format
+  std::string format;  ///< ending of the recordings, which determines their format
   /// Without recordings and truths, which are a cell's.
   std::variant<EstimateRecordingOptions, CalibrateRecordingsOptions> job;
 };
 
-/// A simulation with what is then made of it, of one setting and one seed.
+/// A simulation and its processing, for one setting and one seed.
 struct CampaignCell {
   std::uint64_t number = 0;  ///< from 0
   std::size_t setting = 0;   ///< place in CampaignPlan::settings
@@ -44,25 +44,25 @@ struct CampaignPlan {
   std::vector<std::string> files;         ///< that it names, each once
   std::vector<CampaignSetting> settings;  ///< the last name of the grid varies first
   std::uint64_t first_seed = 0, seeds = 0;
-  /// All that decides what comes of the cells but the program, as a SHA-256: what the plan says, in
-  /// whatever order and with whatever comments, and the bytes of the files that it names.
+  /// SHA-256 of everything but the program that determines the cells' results: the contents of the
+  /// plan, regardless of order and comments, and the bytes of the files that it names.
   std::string work;
 
   /// Number of all cells.
   std::uint64_t cells() const { return settings.size() * seeds; }
   /// A message with the plan and a setting before it.
   std::string about(const CampaignSetting& setting, const std::string& message) const;
-  /// Cells go through all settings of one seed, then to the next seed, so that any part of them has
-  /// its share of every setting.
+  /// Cells run through all settings of one seed, then the next seed, so that every chunk covers
+  /// every setting.
   CampaignCell cell(std::uint64_t number) const;
 };
 
-/// Reads a plan: the maps `simulate`, and `estimate` or `calibrate`, each with options by the name
-/// that the verb of the command has for them (noise_angle_deg); `grid`, with a list of values for
-/// each name such as simulate.noise_angle_deg; and `seeds`: {first, count}. See docs/files.md.
-/// Files that it names stand beside it.
-/// @throws FileError with the line for what is not such a plan, and for files that it names;
-///         InvalidArgument naming the setting for values that a simulation or an estimate refuses
+/// Reads a plan: the maps `simulate`, and `estimate` or `calibrate`, each with options under the
+/// names of the command's verb (noise_angle_deg); `grid`, with a list of values for each name such
+/// as simulate.noise_angle_deg; and `seeds`: {first, count}. See docs/files.md. Files that it names
+/// are relative to it.
+/// @throws FileError with the line for an invalid plan, and for files that it names;
+/// InvalidArgument naming the setting for values that a simulation or an estimate rejects
 /// @param path  for messages, and to find the files
 /// @param seed  added to the seeds of the plan, for other draws; at most 2^62
 CampaignPlan parse_campaign_plan(const std::string& text, const std::string& path,

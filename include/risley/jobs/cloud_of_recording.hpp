@@ -17,12 +17,16 @@ namespace risley::jobs {
 /// Which points to make.
 struct CloudOfRecordingOptions {
   recordings::Source recording;     ///< of one sensor, with ranges
-  recordings::ReadOptions reading;  ///< see open_in_sensor_frame() where it holds no extrinsics
-  GivenSensor calibration;          ///< as load_result()
-  std::string output;               ///< path; its ending chooses the format unless one is named
-  PlatformFiles platform;           ///< of a sensor that moved
-  cloud::CloudOptions cloud;        ///< without a platform and provenance
-  Provenance provenance;            ///< goes into it, with input's and calibration's SHA-256
+  recordings::ReadOptions reading;  ///< see open_in_sensor_frame() if it holds no extrinsics
+  /// As load_result(); for a calibration in flight its folder, whose mount and trajectory are used
+  /// if the platform names none. Empty: the preset of the recording's sensor, with directions as
+  /// reported.
+  GivenSensor calibration;
+  std::string output;         ///< path; its ending chooses the format unless one is named
+  bool replace = false;       ///< rewrite the recording's bag with rectified points
+  PlatformFiles platform;     ///< of a sensor that moved
+  cloud::CloudOptions cloud;  ///< without a platform and provenance
+  Provenance provenance;      ///< goes into it, with input's and calibration's SHA-256
 };
 
 /// The points of a recording.
@@ -32,10 +36,10 @@ struct RecordingCloud {
   cloud::CloudSummary summary;
 };
 
-/// Points of a recording, piece by piece, for a sink of the caller's.
+/// Points of a recording, piece by piece, for the caller's sink.
 class PointsOfRecording {
  public:
-  /// @param options   output, provenance and the format of a file do not count
+  /// @param options  output, provenance and the format of a file are ignored
   /// @param progress  must outlive this
   /// @throws EstimationError, InvalidArgument, FileError, Cancelled
   PointsOfRecording(const CloudOfRecordingOptions& options, cloud::CloudSink sink,
@@ -46,7 +50,7 @@ class PointsOfRecording {
 
   /// As cloud::CloudMaker::next().
   bool next();
-  /// What came of it; whole once next() has returned false.
+  /// The result; complete once next() has returned false.
   RecordingCloud result() const;
 
  private:
@@ -54,7 +58,8 @@ class PointsOfRecording {
   std::unique_ptr<State> state_;
 };
 
-/// Turns a recording into points with covariance; the output appears when it is whole.
+/// Turns a recording into points with covariance, or, to replace those of its bag, rewrites it with
+/// calibrated directions and everything else unchanged; the output appears when it is complete.
 /// @throws EstimationError, InvalidArgument, FileError, Cancelled
 RecordingCloud cloud_of_recording(const CloudOfRecordingOptions& options,
                                   const Progress& progress = {});

@@ -12,14 +12,14 @@
 
 namespace risley::jobs {
 
-/// Name of the only quantity in a comparison that is no parameter of the train.
+/// Name of the only quantity in a comparison that is not a parameter of the train.
 inline constexpr const char* kRangeOffset = "range_offset_m";
 
-/// Combinations of parameters, in sigmas, with so little of the largest variance are numerically
-/// none; times the number of parameters.
+/// Combinations of parameters, in sigmas, with less than this share of the largest variance are
+/// numerically zero; times the number of parameters.
 inline constexpr double kSmallestVariance = 1e-13;
 
-/// One parameter as two results have it, SI units.
+/// One parameter in two results, SI units.
 struct ParameterDifference {
   std::string name;  ///< as in parameter_list(), or kRangeOffset
   double value_a = 0, value_b = 0;
@@ -28,23 +28,23 @@ struct ParameterDifference {
   double sigma = 0;                 ///< of it, the two results being independent
 };
 
-/// Whether two results are of one and the same optics. The differences of all parameters of the
-/// prisms together, with their joint covariance: what a result hardly determines, such as a
-/// rotation of all beams when the sensor's orientation was unknown, hardly counts.
+/// Whether two results are of the same optics. The differences of all parameters of the prisms
+/// together, with their joint covariance: poorly determined combinations, such as a rotation of all
+/// beams when the sensor's orientation was unknown, have little weight.
 struct ChangeTest {
-  double chi2 = 0;  ///< of independent errors, chi-squared distributed where nothing changed
+  double chi2 = 0;             ///< of independent errors, chi-squared distributed without a change
   int degrees_of_freedom = 0;  ///< 0 where neither result has a covariance
   double p_value = 1;          ///< probability of such differences, or larger ones, by chance
 };
 
-/// Two results side by side: what each says of a sensor of the same kind.
+/// Two results side by side, from sensors of the same kind.
 struct ResultComparison {
   sensors::Sensor a, b;
   std::vector<ParameterDifference> parameters;
   calibration::PointingError beams;  ///< directions of a minus those of b, over all rotation angles
   bool same_unit = false;            ///< the serial numbers are known and equal
-  /// Both are taken to be of one unit and held the same parameters at the same values: what these
-  /// are off by is alike in both, and the sigmas leave it out.
+  /// Both are assumed to be from one unit and held the same parameters at the same values: their
+  /// errors are common to both, and the sigmas exclude them.
   bool held_alike = false;
   ChangeTest change;
 };
@@ -52,10 +52,10 @@ struct ResultComparison {
 /// Whether two results are of one unit, by their serial numbers: "yes", "no" or "not known".
 std::string one_unit_words(const ResultComparison& comparison);
 
-/// Who says that two results are of one unit.
+/// Reason for treating two results as results of one unit.
 enum class OneUnit {
   serials,  ///< their serial numbers, which are known and equal
-  caller,   ///< whoever asks, unless the serial numbers are known and differ
+  caller,   ///< the caller's request, unless the serial numbers are known and differ
 };
 
 /// A quantity's value in a sensor, SI units. @throws InvalidArgument
@@ -72,18 +72,18 @@ FileUnit file_unit_of(const std::string& name, TrainShape shape);
 
 /// Whether the optics of two sensors have the same parameters.
 bool have_same_optics(const sensors::Sensor& a, const sensors::Sensor& b);
-/// Refuses sensors whose optics have not the same parameters. @throws InvalidArgument naming them
+/// Refuses sensors with different optics. @throws InvalidArgument naming them
 void require_same_optics(const sensors::Sensor& a, const sensors::Sensor& b);
 
 /// Whether a name is that of a parameter of a sensor's train.
 bool is_of_train(const std::string& name, const sensors::Sensor& sensor);
 
-/// What a result would know if the parameters that it held were exactly as held: the joint
-/// covariance of the others under that condition.
+/// A result conditioned on exact held parameters: the joint covariance of the others under that
+/// condition.
 algebra::NamedCovariance covariance_given_held(const sensors::Sensor& sensor);
 
 /// Directions of a minus those of b, over all rotation angles.
-/// @param difference  covariance of the difference of the trains; other names do not count
+/// @param difference  covariance of the difference of the trains; other names are ignored
 calibration::PointingError directions_apart(const sensors::Sensor& a, const sensors::Sensor& b,
                                             const algebra::NamedCovariance& difference);
 
@@ -91,8 +91,8 @@ calibration::PointingError directions_apart(const sensors::Sensor& a, const sens
 /// @throws FileError
 sensors::Sensor load_result(const GivenSensor& given);
 
-/// @throws InvalidArgument for sensors with other numbers of prisms or emitters, and where one of
-///         them has an index for all prisms and the other one for each
+/// @throws InvalidArgument for sensors with other numbers of prisms or emitters, and if one of them
+/// has an index for all prisms and the other one for each
 ResultComparison compare_results(const sensors::Sensor& a, const sensors::Sensor& b,
                                  OneUnit one_unit = OneUnit::serials);
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -12,19 +13,18 @@
 
 namespace risley::jobs {
 
-/// The results that are compared, and how rarely chance may be taken for a change.
+/// The results to compare, and the false-alarm probability.
 struct CompareUnitsOptions {
-  /// As load_result(), in order of time; also tables of results (tables::is_table()), of which each
-  /// row without a failure stands for the result in its `output`.
+  /// As load_result(), in order of time; also tables of results (tables::is_table()), in which each
+  /// row without a failure represents the result in its `output`.
   std::vector<GivenSensor> results;
-  /// Probability that at least one pair of results is called changed where nothing changed, and
-  /// that at least one unit is called an outlier where none is one, each.
+  /// Probability that at least one pair of unchanged results is called changed, and that at least
+  /// one unit is called an outlier if there is none, each.
   double false_alarm = 0.01;
-  /// Whether results that a table names are opened wherever they are, or only in its own folder and
-  /// below.
+  /// Whether results listed in a table are opened anywhere, or only in its own folder and below.
   bool anywhere = false;
-  /// Whether a calibration, which says where beams truly go, is compared with an estimate of what
-  /// the sensor believes: they differ in a unit that never changed.
+  /// Whether a calibration, which holds true beam directions, is compared with an estimate of the
+  /// sensor's own parameters: they differ even in a unit that never changed.
   bool unlike = false;
 };
 
@@ -40,7 +40,7 @@ std::string answer_words(const ComparedPair& pair);
 
 /// A unit with its results.
 struct ComparedUnit {
-  std::string serial;                ///< empty where it is not known
+  std::string serial;                ///< empty if it is not known
   std::string sensor;                ///< name of the preset
   std::vector<std::size_t> results;  ///< places in ComparedUnits::results, in order of time
   bool changed = false;              ///< any of its pairs did
@@ -52,7 +52,7 @@ struct ComparedFleet {
   Fleet fleet;
 };
 
-/// A row of a table, or a result that could be of any unit, without an answer.
+/// A row of a table, or a result that could be of any unit, without a result of the comparison.
 struct LeftOut {
   std::string name;     ///< its input, or its path
   std::string reason;   ///< to follow the name
@@ -62,24 +62,26 @@ struct LeftOut {
 /// Units over time, and units against each other.
 struct ComparedUnits {
   std::vector<std::string> results;  ///< their paths
-  std::vector<ComparedUnit> units;   ///< in order of appearance
+  /// When their files were written, UTC since 1970, ms; empty unless that is known for all.
+  std::vector<std::int64_t> written_ms;
+  std::vector<ComparedUnit> units;  ///< in order of appearance
   std::vector<ComparedPair> pairs;
   bool is_one_series = false;  ///< the pairs are of all results in their order
   std::vector<ComparedFleet> fleets;
   std::vector<LeftOut> left_out;
   double false_alarm = 0;
-  double least_p_value = 0;  ///< false_alarm over the number of pairs: changed is what lies below
+  double least_p_value = 0;  ///< false_alarm over the number of pairs: pairs below it are changed
 };
 
-/// Results that are named are one series, whatever their serial numbers are: each is compared with
-/// the one before it and, from the third on, with the first. With a table, serial numbers identify
-/// units apart, each is a series of its own, and up to four units of a kind are compared in pairs,
-/// each by its last result; results without a serial number are of the only unit that there is, and
-/// left out where several are known. From kFewestUnitsOfFleet on, units of a kind are compared as a
+/// Named results form one series, whatever their serial numbers are: each is compared with the one
+/// before it and, from the third on, with the first. With a table, serial numbers distinguish
+/// units, each of which is a separate series, and up to four units of a kind are compared in pairs,
+/// each by its last result; results without a serial number belong to the only unit, and are
+/// skipped if several are known. From kFewestUnitsOfFleet on, units of a kind are compared as a
 /// fleet.
 /// @throws InvalidArgument for fewer than two results, a false alarm outside of 0 to 1, and as
-///         compare_results(); FileError for what was named and is no result, and for a table
-///         without any; Cancelled
+/// compare_results(); FileError for named files that are not results, and for a table without any;
+/// Cancelled
 ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& progress = {});
 
 }  // namespace risley::jobs

@@ -12,12 +12,13 @@
 
 namespace risley::jobs {
 
-/// What to convert, and into what.
+/// Input and output of a conversion.
 struct ConvertTrajectoryOptions {
   std::string trajectory;  ///< path
   std::string output;      ///< path; its ending chooses the format
-  std::string format;      ///< name of a format to write whatever the ending; empty asks the ending
-  std::string accuracy;    ///< path of accuracies (SMRMSG) that the records get; empty: none
+  std::string format;      ///< name of an output format, regardless of the ending; empty uses the
+                           ///< ending
+  std::string accuracy;    ///< path of accuracies (SMRMSG) for the records; empty: none
   std::string topic;       ///< of a bag of ROS; empty: its only one with poses
 };
 
@@ -25,13 +26,13 @@ struct ConvertTrajectoryOptions {
 struct ConvertedTrajectory {
   std::uint64_t records = 0;
   std::string input_format;
-  std::vector<std::string> left_out;  ///< what the format has no place for, in words
+  std::vector<std::string> left_out;  ///< description of the data that the format cannot hold
   std::vector<Warning> warnings;      ///< of reading
 };
 
 /// Reads a trajectory in any known format and writes it in another. Stages: reading, writing.
-/// @throws FileError; InvalidArgument for an unknown ending or format and for what it cannot hold;
-///         Cancelled
+/// @throws FileError; InvalidArgument for an unknown ending or format and for data that it cannot
+/// hold; Cancelled
 ConvertedTrajectory convert_trajectory(const ConvertTrajectoryOptions& options,
                                        const Progress& progress = {});
 

@@ -22,15 +22,15 @@ namespace risley::jobs {
 struct RotorSpeed {
   double mean = 0;              ///< rad/s, outliers left out
   std::vector<double> change;   ///< [states], less the mean, rad/s; rounding beside the mean is 0
-  estimation::Moments moments;  ///< of the change, outliers left out
+  estimation::Moments moments;  ///< of the change, without outliers
 };
 
-/// Mean residuals over a plane of two angles, and which of its cells are worth a look.
+/// Mean residuals over a plane of two angles, and its noteworthy cells.
 struct ResidualPlane {
   estimation::ResidualMap map;
-  /// Cells with fewer shots than this are ignored: few beams say nothing about a cell.
+  /// Cells with fewer shots than this are ignored as unreliable.
   double fewest_shots = 0;
-  /// What noise alone leaves in a typical cell, rad.
+  /// Expected mean in a typical cell for pure noise, rad.
   double azimuth_noise = 0, zenith_noise = 0;
 };
 
@@ -42,12 +42,12 @@ struct PrismPairResiduals {
 
 /// Shots per cell of the field of view.                                            [B21 Fig. 2b]
 struct ShotDensity {
-  double duration = 0;         ///< of the beginning that was counted, s
+  double duration = 0;         ///< of the counted beginning, s
   double cell = 0;             ///< side, rad
   std::vector<double> x, y;    ///< azimuth and zenith of the cells' middles, rad
   std::vector<double> shots;   ///< [cells]
   std::size_t total = 0;       ///< of all cells
-  double mean_per_cell = 1.0;  ///< over the cells that were met
+  double mean_per_cell = 1.0;  ///< over the cells with shots
 };
 
 /// Details of an estimate beyond its numbers.
@@ -62,9 +62,9 @@ struct EstimateDetails {
   ShotDensity density;
 };
 
-/// @param nominal     what the estimation started from
+/// @param nominal  the starting values of the estimation
 /// @param head        every shot of the beginning, as recorded
-/// @param evaluation  where the truth is known
+/// @param evaluation  if the truth is known
 /// @throws Cancelled
 EstimateDetails estimate_details(const estimation::Estimate& estimate,
                                  const sensors::Sensor& nominal,

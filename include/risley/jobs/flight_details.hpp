@@ -11,7 +11,7 @@
 
 namespace risley::jobs {
 
-/// One strip as it was flown. Of the trajectory as given.
+/// One strip as flown. Of the trajectory as given.
 struct FlightStrip {
   std::uint16_t strip = 0;          ///< from 0
   std::size_t shots = 0;            ///< of the sample
@@ -23,15 +23,16 @@ struct FlightStrip {
   std::vector<double> east, north;  ///< of places along it, tangent frame, m
 };
 
-/// What two strips say of the same ground, over squares of it, as columns of one length: the second
-/// less the first, along the normals, m. NaN where they cannot be compared.
+/// Differences of two strips on the same ground, over squares of it, as columns of one length: the
+/// second less the first, along the normals, m. NaN if they cannot be compared.
 struct StripDifferences {
   std::uint16_t first = 0, second = 0;
   std::vector<double> east, north;    ///< middles of the squares, tangent frame, m
   std::vector<double> before, after;  ///< m
 };
 
-/// The ground that several strips saw, over squares of it, as columns of one length. NaN: unknown.
+/// The ground covered by several strips, over squares of it, as columns of one length. NaN:
+/// unknown.
 struct FlightGround {
   std::vector<double> east, north;    ///< middles of the squares, tangent frame, m
   std::vector<double> before, after;  ///< differences of all pairs of strips, RMS, m
@@ -40,15 +41,15 @@ struct FlightGround {
   std::vector<double> strips;         ///< most that saw one plane
 };
 
-/// What there is to draw of a calibration in flight beside the numbers that it found. Its size is
-/// bounded whatever the flight.
+/// Data for drawing a calibration in flight, in addition to its numbers. Its size is bounded for
+/// any flight.
 struct FlightDetails {
-  std::size_t shots = 0;                ///< of the random sample that all of it is of
+  std::size_t shots = 0;                ///< of the random sample behind all of it
   double plane_size = 0;                ///< side of the cells with a plane each, m
   double square_size = 0;               ///< side of the squares, each of several cells, m
   std::size_t strip_count = 0;          ///< of the flight
   std::vector<FlightStrip> strips;      ///< the first ones of many
-  std::size_t pair_count = 0;           ///< of strips that saw the same ground
+  std::size_t pair_count = 0;           ///< of strips over the same ground
   std::vector<StripDifferences> pairs;  ///< those with the most ground in common
   FlightGround ground;
 };
@@ -59,11 +60,11 @@ struct FlightDetailsOptions {
   std::size_t most_squares = 2000;     ///< of a picture
 };
 
-/// How strips lie on each other with what was given, and with what was found.
-/// @param shots, trajectory, options  what calibrate_flight() was given
+/// Agreement of the strips with the given and with the adjusted values.
+/// @param shots, trajectory, options  the arguments of calibrate_flight()
 /// @param found                       what it gave
-/// @throws InvalidArgument for a calibration that is not of these shots, bounds below 1000 shots or
-///         1 square, and as poses_of(); Cancelled
+/// @throws InvalidArgument for a calibration of other shots, bounds below 1000 shots or 1 square,
+/// and as poses_of(); Cancelled
 FlightDetails flight_details(const calibration::FlightShots& shots,
                              const trajectories::Trajectory& trajectory,
                              const calibration::FlightCalibrationOptions& options,

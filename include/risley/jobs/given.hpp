@@ -17,13 +17,13 @@ struct Trajectory;
 
 namespace risley::jobs {
 
-/// What an option names: a file by its path, a preset by its name, or the thing itself in memory.
-/// recordings::Source is the same of a recording.
+/// Value of an option: a file by its path, a preset by its name, or an object in memory.
+/// recordings::Source is the same for a recording.
 template <class T>
 class Given {
  public:
   Given() = default;
-  // A path or a name is given wherever something is expected.
+  // A path or a name converts to it.
   Given(std::string path) : name_(std::move(path)) {}        // NOLINT(google-explicit-constructor)
   Given(const char* path) : name_(path) {}                   // NOLINT(google-explicit-constructor)
   Given(const std::filesystem::path& path) : name_(path) {}  // NOLINT(google-explicit-constructor)
@@ -32,11 +32,11 @@ class Given {
   Given(std::shared_ptr<const T> value, std::string name)
       : name_(std::move(name)), value_(std::move(value)) {}
 
-  /// The path, or the name of what is in memory.
+  /// The path, or the name of the object in memory.
   const std::string& name() const { return name_; }
-  /// What is in memory; none where it is a path.
+  /// The object in memory; none for a path.
   const std::shared_ptr<const T>& value() const { return value_; }
-  /// The path; empty for what is in memory.
+  /// The path; empty for an object in memory.
   std::string path() const { return value_ ? std::string() : name_; }
   bool empty() const { return name_.empty() && !value_; }
 

@@ -15,13 +15,13 @@
 
 namespace risley::jobs {
 
-/// What to identify, and where the answer goes.
+/// Input and output of an identification.
 struct IdentifyRecordingOptions {
   recordings::Source recording;     ///< of one sensor
   recordings::ReadOptions reading;  ///< no pose of the header is used: the frame is found
   identification::IdentifyOptions identify;
   std::string output;      ///< preset to write; empty: none
-  bool undecided = false;  ///< it is written even if the answer is not sure
+  bool undecided = false;  ///< it is written even if the result is uncertain
   Provenance provenance;   ///< goes into it, together with the recording's SHA-256
 };
 
@@ -29,7 +29,7 @@ struct IdentifyRecordingOptions {
 enum class IdentificationVerdict {
   identified,    ///< one train, or one class of equivalent trains, describes the scan
   undecided,     ///< several trains that are not equivalent describe it as well
-  inconsistent,  ///< no train that was tried describes it
+  inconsistent,  ///< no tried train describes it
 };
 
 /// The name of the enumerator: "identified", "undecided" or "inconsistent".
@@ -41,8 +41,8 @@ struct IdentifiedRecording {
   identification::IdentifiedSensor sensor;
   IdentificationVerdict verdict = IdentificationVerdict::undecided;
   std::string words, to_do;
-  std::string like;                       ///< the built-in preset that has this train; empty: none
-  bool like_mirrored = false;             ///< it is that one's mirror image
+  std::string like;                       ///< the built-in preset with this train; empty: none
+  bool like_mirrored = false;             ///< it is the preset's mirror image
   std::vector<std::string> unobservable;  ///< what such recordings cannot determine
   std::vector<Warning> warnings;
   bool cropped = false;  ///< packets lack points; times follow from a preset's optics
@@ -50,9 +50,9 @@ struct IdentifiedRecording {
   double reading_time = 0, solving_time = 0;  ///< s
 };
 
-/// Identifies the train of prisms that made a recording from its times and directions alone.
-/// Stages: reading, identifying.
-/// @throws EstimationError when the data cannot answer; InvalidArgument; FileError; Cancelled
+/// Identifies the train of prisms behind a recording from its times and directions alone. Stages:
+/// reading, identifying.
+/// @throws EstimationError when the data give no result; InvalidArgument; FileError; Cancelled
 IdentifiedRecording identify_recording(const IdentifyRecordingOptions& options,
                                        const Progress& progress = {});
 

@@ -31,9 +31,9 @@ struct InspectedRecording {
   std::optional<SensorChoice> choice;
   recordings::TimeAuditResult audit;
   std::vector<Warning> warnings;
-  /// By which times that had to be guessed may be off, s; 0: there are none.
+  /// Possible error of guessed times, s; 0: there are none.
   double time_uncertainty = 0;
-  std::optional<FileError> damage;  ///< of its body; what came before it is in the audit
+  std::optional<FileError> damage;  ///< of its body; the audit covers the part before it
   std::optional<recordings::Excerpt> excerpt;
 };
 

@@ -21,14 +21,14 @@ struct InspectTrajectoryOptions {
   std::string topic;       ///< of a bag of ROS; empty: its only one with poses
 };
 
-/// Whether an input that may be a recording, too, is to be read as a trajectory: a file of one, or
-/// a bag whose topic of poses is named.
+/// Whether to read an input that may be a recording as a trajectory: a file of one, or a bag with a
+/// named topic of poses.
 /// @param reading  options that only recordings have
 /// @throws InvalidArgument for options of the other kind; FileError
 bool is_trajectory(const InspectTrajectoryOptions& options, const recordings::ReadOptions& reading,
                    const Progress& progress = {});
 
-/// What a file of poses or accuracies holds.
+/// Contents of a file of poses or accuracies.
 struct InspectedTrajectory {
   std::optional<trajectories::Trajectory> trajectory;     ///< nothing where accuracies were given
   std::optional<trajectories::TrajectoryAudit> audit;     ///< of the trajectory

@@ -17,7 +17,7 @@
 
 namespace risley::jobs {
 
-/// How work ended; of the command, what the shell sees.
+/// How work ended; for the command, its exit status.
 enum ExitStatus : int {
   kDone = 0,
   kNumbersFailed = 1,
@@ -27,23 +27,23 @@ enum ExitStatus : int {
   kInterrupted = 130,  ///< 128 + SIGINT, as shells have it
 };
 
-/// Which inputs are meant, and where what comes of them goes.
+/// The inputs, and the destination of their results.
 struct ManyInputsOptions {
   std::vector<std::string> names;  ///< see InputNames
   std::string list;                ///< see InputNames
-  /// Of one input the output itself, of several a folder, in which every output stands where its
-  /// input does below the folder that all share; empty: none.
+  /// For one input the output itself, for several a folder, whose layout mirrors that of the inputs
+  /// below their common folder; empty: none.
   std::string output;
-  bool into_folder = false;  ///< whether it is such a folder, which is made where it is missing
+  bool into_folder = false;  ///< whether it is a folder; it is created if missing
   std::string table;         ///< to write with one row per input; empty: none
-  bool resume = false;       ///< leave results that are whole as they are, see InputRun
+  bool resume = false;       ///< keep complete results, see InputRun
 };
 
 /// One input with its output.
 struct InputJob {
   std::string input;
   std::string output;       ///< empty: none
-  std::string place;        ///< of its results below a folder, unlike that of any other job
+  std::string place;        ///< of its results below a folder, unique among the jobs
   std::string device = {};  ///< of the input's, where each has a job
 };
 
@@ -52,10 +52,10 @@ struct InputOutcome {
   ExitStatus status = kDone;
   std::string json;           ///< an object of this input alone
   std::string text;           ///< one line for people
-  std::uint64_t counted = 0;  ///< what all inputs are summed up in, such as points
+  std::uint64_t counted = 0;  ///< count over all inputs, such as points
 };
 
-/// The same, as it stands in the journal.
+/// The same, as written in the journal.
 struct InputResult {
   InputOutcome outcome;
   std::vector<std::string> hashes;  ///< SHA-256 of the input's files
@@ -63,27 +63,27 @@ struct InputResult {
   bool skipped = false;             ///< it had been made before
 };
 
-/// What came of all of them.
+/// Result of all of them.
 struct InputCounts {
-  std::size_t done = 0;     ///< how many went well, without those made before
-  std::size_t skipped = 0;  ///< how many had been made before, and well
+  std::size_t done = 0;     ///< number of successes, without earlier ones
+  std::size_t skipped = 0;  ///< number of earlier successes
   std::size_t failed = 0;
-  std::uint64_t counted = 0;  ///< the sum
-  /// kDone when all went well, otherwise the highest status of those that did not.
+  std::uint64_t counted = 0;  ///< the sum kDone when all succeeded, otherwise the highest status of
+                              ///< those that failed.
   ExitStatus status = kDone;
 };
 
-/// How each input is worked through.
+/// How each input is processed.
 struct InputWork {
   std::string verb;           ///< "estimate"
   std::string label;          ///< for a bar, "estimating"
-  std::string counted;        ///< name in the JSON of what is summed up, if anything
-  bool into_folders = false;  ///< outputs are folders, created when they are filled
+  std::string counted;        ///< name of the sum in the JSON, if any
+  bool into_folders = false;  ///< outputs are folders, created when needed
   std::string ending;         ///< of files in a folder for all, ".las"; empty: not known
-  /// Files that a job writes; without it the output alone.
+  /// Files that a job writes; without it only the output.
   std::function<std::vector<std::string>(const InputJob&)> files;
   std::function<InputOutcome(const InputJob&, const Progress&)> run;
-  /// What came of a job whose exception is being handled.
+  /// Outcome of a job that threw an exception.
   std::function<InputOutcome(const InputJob&)> failed;
 
   /// Those of `files`, or the output.
@@ -93,49 +93,49 @@ struct InputWork {
 /// All of them.
 struct InputPlan {
   std::vector<InputJob> jobs;
-  /// Whether results are shown as a list. What was asked for decides, not how many inputs matched.
+  /// Whether results are shown as a list. The request decides, not the number of matching inputs.
   bool many = false;
-  std::string folder;   ///< that all results go to; empty: none, or each into one of its own
-  std::string journal;  ///< file that says what was made; empty: none is kept
+  std::string folder;   ///< for all results; empty: none, or one for each
+  std::string journal;  ///< record of finished results; empty: none is kept
 };
 
-/// Finds the inputs and says where their outputs go.
+/// Finds the inputs and assigns their outputs.
 /// @throws InvalidArgument, FileError, Cancelled
 InputPlan plan_inputs(const ManyInputsOptions& options, const InputWork& work,
                       const Progress& progress = {});
 
-/// Settings by name, with their values, as a text that is the same for the same work: names of
-/// existing files are replaced by the SHA-256 of what they hold.
-/// @param program  that does it, with its version and verb  @throws FileError, Cancelled
+/// Settings by name, with their values, as a text that identifies the work: names of existing files
+/// are replaced by the SHA-256 of their contents.
+/// @param program  its name, version and verb @throws FileError, Cancelled
 std::string work_text(const std::string& program,
                       const std::vector<std::pair<std::string, std::vector<std::string>>>& settings,
                       const Progress& progress = {});
 
-/// Runs all jobs, several at a time. One that fails does not stop the rest. What comes of them
-/// waits in a file, so that memory does not grow: in the plan's journal, or in a temporary one.
+/// Runs all jobs, several at a time. A failure does not stop the rest. Their results wait in a
+/// file, so that memory does not grow: in the plan's journal, or in a temporary one.
 ///
-/// The journal has a line per input, written when its result is whole: the work, SHA-256 of the
-/// input and of every file of the result, and the outcome. With resume, a result is left as it is
-/// where the same work made it from the same bytes and its files still have the bytes that were
-/// written; contents decide, not times of files. What could not be read or written may be the
-/// machine's fault and is tried again.
+/// The journal has a line per input, written when its result is complete: the work, SHA-256 of the
+/// input and of every file of the result, and the outcome. With resume, a result is kept if the
+/// same work made it from the same bytes and its files still have the bytes that were written;
+/// contents decide, not file times. Inputs that could not be read or written may have failed
+/// because of the machine and are tried again.
 class InputRun {
  public:
   /// @param plan, work  must outlive it  @param work_text  see there
-  /// @throws FileError where the table or the journal cannot be written, or another run has the
-  ///         folder
+  /// @throws FileError if the table or the journal cannot be written, or another run has locked the
+  /// folder
   InputRun(const InputPlan& plan, const InputWork& work, const std::string& work_text,
            const ManyInputsOptions& options);
   ~InputRun();
   InputRun(const InputRun&) = delete;
   InputRun& operator=(const InputRun&) = delete;
 
-  /// Called when a job has ended, from its thread, one at a time.
+  /// Called at the end of a job, from its thread, one at a time.
   using Ended = std::function<void(std::size_t ended, std::size_t failed)>;
-  /// @return false where it was cancelled: what was finished is there all the same
+  /// @return false if it was cancelled: finished results are still available
   bool run(const Progress& progress, const Ended& ended = {});
 
-  /// Calls with what came of each input, in their order.
+  /// Calls with the result of each input, in their order.
   void for_each(const std::function<void(const InputJob&, const InputResult&)>& call) const;
   /// Files of inputs with their SHA-256.
   FileHashes hashes() const;

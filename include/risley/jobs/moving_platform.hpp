@@ -22,10 +22,10 @@ struct PlatformFiles {
   std::string datum;     ///< as cloud::MovingPlatform; empty: WGS 84
 };
 
-/// Whether anything of them is given.
+/// Whether any of them is given.
 bool moves(const PlatformFiles& files);
 
-/// The paths among them that are given, for provenance and for telling outputs from inputs.
+/// The paths given, for provenance and for distinguishing outputs from inputs.
 std::vector<std::string> paths_of(const PlatformFiles& files);
 
 /// The mount that was given. @throws FileError
@@ -34,7 +34,7 @@ trajectories::Mount mount_of(const GivenMount& given);
 trajectories::Trajectory trajectory_of(const GivenTrajectory& given, const std::string& topic,
                                        const Progress& progress = {});
 
-/// @throws InvalidArgument where the trajectory or the mount is missing; FileError
+/// @throws InvalidArgument if the trajectory or the mount is missing; FileError
 cloud::MovingPlatform load_platform(const PlatformFiles& files, const Progress& progress = {});
 
 }  // namespace risley::jobs

@@ -14,7 +14,7 @@
 
 namespace risley::jobs {
 
-/// Which recording to judge, planned or made. SI units.
+/// The recording to judge, planned or real. SI units.
 struct ObservabilityOptions {
   recordings::Source recording;       ///< empty: a plan is judged
   recordings::ReadOptions reading;    ///< of the recording

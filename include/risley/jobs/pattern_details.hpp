@@ -13,13 +13,13 @@
 
 namespace risley::jobs {
 
-/// What a page shows of a scan pattern.
+/// Contents of a page on a scan pattern.
 struct PatternDetails {
   sensors::Sensor sensor;
   sensors::PatternCoverage coverage;
   /// The first shots, as long as the longest integration time, thinned for drawing.
   sensors::ScanPattern rosette;
-  std::uint64_t rosette_every = 1;  ///< one shot of this many is drawn
+  std::uint64_t rosette_every = 1;  ///< one of this many shots is drawn
 };
 
 /// @param sensor  as sensors::load_sensor()

@@ -22,7 +22,7 @@ struct PlanCalibrationOptions {
   /// As calibration::CalibrationPlan has them.
   double duration = calibration::CalibrationPlan{}.duration;
   std::optional<double> rate, range_noise, prior_sigma;
-  bool flat_walls = false;  ///< exact planes, and no range errors but a constant one
+  bool flat_walls = false;  ///< exact planes, and no range errors except a constant one
   double range_offset_sigma = calibration::CalibrationPlan{}.range_offset_sigma;
   bool beam_origin = true;
 };

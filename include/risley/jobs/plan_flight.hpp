@@ -22,13 +22,13 @@ namespace risley::jobs {
 /// The flight to plan. SI units.
 struct PlanFlightOptions {
   trajectories::FlightPlan plan;
-  trajectories::Mount mount;        ///< its sigmas are what is known before
-  trajectories::ErrorModel errors;  ///< of the trajectory that will come of it; states all sigmas
+  trajectories::Mount mount;                    ///< its sigmas are the prior knowledge
+  trajectories::ErrorModel errors;              ///< of the resulting trajectory; states all sigmas
   std::optional<scenes::TerrainParts> terrain;  ///< empty: level ground at a height of 0
   GivenSensor sensor;                           ///< as load_result(); empty: kUsualSensor
   HeldParameters fixed;
   std::vector<std::string> additional;  ///< further parameters to free
-  /// As calibration::FlightForecastOptions and calibration::FlightCalibrationOptions have them.
+  /// As in calibration::FlightForecastOptions and calibration::FlightCalibrationOptions.
   std::optional<double> rate, range_noise, prior_sigma;
   double range_offset_sigma = calibration::FlightCalibrationOptions{}.range_offset_sigma;
   double knot_spacing = calibration::FlightCalibrationOptions{}.knot_spacing;
@@ -37,32 +37,32 @@ struct PlanFlightOptions {
   cloud::PointDistributionOptions distribution;
 };
 
-/// What a plan is made of; paths, where they are texts.
+/// Inputs of a plan; texts are paths.
 struct FlightPlanFiles {
   std::string plan;
   GivenMount mount;
-  std::string errors;  ///< none so far may be empty
+  std::string errors;  ///< none of those above may be empty
   std::string scene;   ///< with a terrain; empty: level ground
 };
 
-/// Whether a file is the plan of a flight, and not a scene of walls. @throws FileError
+/// Whether a file is a flight plan, and not a scene of walls. @throws FileError
 bool is_flight_plan(const std::string& path);
 
-/// Puts what the files hold into the options.
-/// @throws InvalidArgument for a file that is missing and for a scene without terrain; FileError
+/// Loads the files into the options.
+/// @throws InvalidArgument for a missing file and for a scene without terrain; FileError
 void load_flight_plan(const FlightPlanFiles& files, PlanFlightOptions& options);
 
-/// What the flight will come to.
+/// Forecast of a flight.
 struct PlannedFlightResult {
   sensors::Sensor sensor;
   calibration::FlightForecast forecast;
-  /// Of all shots that the sensor fires; empty where the sensor does not look down.
+  /// Of all shots that the sensor fires; empty if the sensor does not look down.
   std::optional<cloud::PointDistributionSummary> distribution;
   std::vector<Warning> warnings;
 };
 
-/// Accuracy of a calibration on the strips of a planned flight, and how its points lie on the
-/// ground. Stages: calibration, points.
+/// Accuracy of a calibration on the strips of a planned flight, and the distribution of its points
+/// on the ground. Stages: calibration, points.
 /// @throws EstimationError when fewer than two strips overlap or no ground is found;
 ///         InvalidArgument; FileError; Cancelled
 PlannedFlightResult plan_flight(const PlanFlightOptions& options, const Progress& progress = {});

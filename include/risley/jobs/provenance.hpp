@@ -13,11 +13,11 @@
 
 namespace risley::jobs {
 
-/// Name and value pairs such as command, version, seed, input_sha256: how to make a result again.
+/// Name and value pairs such as command, version, seed, input_sha256, for reproducing a result.
 using Provenance = std::vector<std::pair<std::string, std::string>>;
 
-/// Names and SHA-256 of inputs. The hashes are found while their owner does something else: for a
-/// recording they take a twentieth of the time of estimating from it.
+/// Names and SHA-256 of inputs. The hashes are computed in the background: for a recording they
+/// take a twentieth of the time of estimating from it.
 class InputHashes {
  public:
   /// @param progress  its flag must outlive this; no progress is reported
@@ -27,11 +27,11 @@ class InputHashes {
   InputHashes(const InputHashes&) = delete;
   InputHashes& operator=(const InputHashes&) = delete;
 
-  /// Appends those of every input: "input", "input_sha256", "input_2", ...; of a folder of ROS 2
-  /// those of each of its files, of columns in memory, and of pipes, the name alone.
+  /// Appends those of every input: "input", "input_sha256", "input_2", ...; for a folder of ROS 2
+  /// those of each of its files, for columns in memory, and for pipes, only the name.
   /// @throws FileError, Cancelled
   Provenance with_inputs(Provenance provenance);
-  /// The same of one alone, as the only input. @param input  its place, from 0
+  /// The same for a single one, as the only input. @param input  its place, from 0
   Provenance with_input(Provenance provenance, std::size_t input);
 
  private:

@@ -14,7 +14,7 @@
 
 namespace risley::jobs {
 
-/// Recordings to calibrate with, and how their rotation angles are found. SI units.
+/// Recordings to calibrate with, and settings for their rotation angles. SI units.
 struct RangedInputOptions {
   std::vector<recordings::Source> recordings;  ///< of one sensor, each with ranges
   recordings::ReadOptions reading;             ///< see open_in_sensor_frame()
@@ -24,7 +24,7 @@ struct RangedInputOptions {
   std::optional<bool> mirrored;                ///< the elevation's sign is turned; empty: find out
 };
 
-/// What reading them leaves beside their shots.
+/// Result of reading them, in addition to their shots.
 struct RangedInput {
   std::vector<ReadRecording> recordings;
   std::uint64_t observations = 0;            ///< rows of all recordings

@@ -16,7 +16,7 @@
 
 namespace risley::jobs {
 
-/// One recording that was read to its end.
+/// One recording, read to its end.
 struct ReadRecording {
   std::string path;  ///< as recordings::Source::name()
   recordings::RecordingHeader header;
@@ -26,15 +26,15 @@ struct ReadRecording {
   const std::string& serial() const { return header.devices.front().serial; }
 };
 
-/// What is to be read for an estimation.
+/// Settings for reading a recording for an estimation.
 struct EstimationInputOptions {
   recordings::Source recording;            ///< of one sensor, with times
   recordings::ReadOptions reading;         ///< see prepare_recording() where it holds no extrinsics
   GivenSensor sensor;                      ///< as given_sensor()
-  estimation::SelectionOptions selection;  ///< ranges of whole steps are kept all the same
+  estimation::SelectionOptions selection;  ///< ranges of whole steps are kept anyway
 };
 
-/// What reading a recording leaves for an estimation.
+/// Result of reading a recording for an estimation.
 struct EstimationInput {
   ReadRecording recording;
   SensorChoice choice;
@@ -53,7 +53,7 @@ struct EstimationInput {
 EstimationInput read_for_estimation(const EstimationInputOptions& options,
                                     const Progress& progress = {});
 
-/// Reports which shots were left out because their times do not show when they were fired.
+/// Reports which shots were skipped because their times do not show when they were fired.
 void warn_of_left_out(const estimation::SelectionCounts& counts, std::vector<Warning>& warnings);
 
 }  // namespace risley::jobs

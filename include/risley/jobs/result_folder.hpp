@@ -17,12 +17,12 @@
 
 namespace risley::jobs {
 
-/// A folder for results in the making, see ResultFiles. One run at a time has it; files that risley
-/// did not write stay where they are. Without a name it does nothing.
+/// A folder for results in preparation, see ResultFiles. Only one run at a time has it; files that
+/// risley did not write stay unchanged. Without a name it does nothing.
 class ResultFolder {
  public:
-  /// Makes the folder, before an hour of computing. @throws FileError, also where another run has
-  /// it
+  /// Creates the folder, before an hour of computation. @throws FileError, also if another run has
+  /// locked it
   explicit ResultFolder(const std::string& folder);
   /// Removes what was not committed.
   ~ResultFolder();
@@ -39,13 +39,13 @@ class ResultFolder {
   /// Any other file.
   void add_text(const NamedText& text);
   /// Gives all files their names.
-  /// @return what happened to results of an earlier run, in sentences
+  /// @return treatment of an earlier run's results, in sentences
   std::vector<Warning> commit();
 
  private:
   std::string path(const std::string& name) const;
   void write(const std::string& name, const std::string& text);
-  /// @throws FileError where it would replace what risley did not write
+  /// @throws FileError if it would replace a file that risley did not write
   io::OutputFile& output(const std::string& name);
   /// Results of an earlier run that this one does not replace, by name.
   std::vector<std::string> left_over() const;

@@ -16,13 +16,14 @@ namespace risley::jobs {
 /// Parameters by name with values in SI units.
 using ParameterValues = std::vector<std::pair<std::string, double>>;
 
-/// What to simulate, as files and names have it. SI units; an empty optional takes the sensor's own
+/// A simulation, described by files and names. SI units; an empty optional takes the sensor's own
 /// value.
 struct SimulationOptions {
   GivenSensor sensor = kUsualSensor;  ///< as load_result()
   ParameterValues set;                ///< of the true sensor
-  bool reported_nominal = false;      ///< the sensor believes that it has no errors
-  ParameterValues reported;           ///< what it believes besides, where that is not the truth
+  bool reported_nominal = false;      ///< the sensor assumes that it has no errors
+  ParameterValues reported;           ///< parameters that it believes in addition, if they differ
+                                      ///< from the truth
   /// Length, s; empty: 1, or to the trajectory's end.
   std::optional<double> duration;
   std::optional<double> rate, angle_noise, range_noise;
@@ -35,7 +36,7 @@ struct SimulationOptions {
   // Of a sensor that moves. Paths, where they are texts.
   GivenTrajectory trajectory;  ///< along which it truly moves
   std::string topic;           ///< of its poses, of a bag that has several
-  std::string flight;          ///< a plan that makes the trajectory instead
+  std::string flight;          ///< a plan for the trajectory instead
   GivenMount mount;
   std::string trajectory_errors;           ///< of the trajectory that is written for users
   std::string trajectory_ending = ".csv";  ///< which chooses its format

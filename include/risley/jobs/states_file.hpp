@@ -15,11 +15,11 @@
 
 namespace risley::jobs {
 
-/// What a file of rotor states holds.
+/// Contents of a file of rotor states.
 struct StatesContent {
   std::size_t rows = 0;
   int prisms = 0;
-  /// The states of rows [begin, end); asked for in order, so that not all need exist at once.
+  /// The states of rows [begin, end); requested in order, so that not all need exist at once.
   std::function<estimation::RotorStates(estimation::ShotRange)> block;
   /// Mean residuals over the rotation angle of every prism [prisms].
   std::vector<estimation::AngleProfile> residuals_over_angle;
@@ -35,7 +35,7 @@ struct StatesContent {
 /// @throws FileError
 void write_states(const std::string& path, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes);
-/// The same, left for the caller to commit.
+/// The same, without commit.
 void write_states(const io::OutputFile& output, const StatesContent& content,
                   const std::vector<std::pair<std::string, std::string>>& attributes);
 

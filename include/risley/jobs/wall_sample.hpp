@@ -21,7 +21,7 @@ struct SamplePoint {
 };
 
 /// At most 20,000 shots of all recordings together, evenly spread.
-/// @param recordings  that the calibration was made from
+/// @param recordings  the inputs of the calibration
 /// @throws InvalidArgument for other recordings
 std::vector<SamplePoint> wall_sample(const std::vector<calibration::RangedRecording>& recordings,
                                      const calibration::Calibration& calibration);

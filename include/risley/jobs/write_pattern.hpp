@@ -42,12 +42,12 @@ struct WrittenPattern {
   std::uint64_t rows = 0;
   std::uint64_t blocked = 0;  ///< of them, shots that do not get through the prisms
   std::string firing;         ///< "in_turn" or "together"
-  /// What the pattern has and the format cannot hold, one sentence each.
+  /// Properties of the pattern that the format cannot hold, one sentence each.
   std::vector<std::string> not_carried;
   std::optional<sensors::HeliosScanner> helios;  ///< where the format is that of HELIOS++
 };
 
-/// Which shots of a scan a time begins and ends with.
+/// First and last shot of a scan for a given time.
 struct PatternRows {
   std::uint64_t first = 0;
   std::size_t count = 0;
@@ -63,7 +63,7 @@ void pattern_directions(const sensors::Sensor& sensor, std::uint64_t first_row,
                         std::span<Number> out, const sensors::ScanPatternOptions& scan,
                         const Progress& progress = {});
 
-/// Writes the scan pattern of a sensor for a simulator; the output appears when it is whole.
+/// Writes the scan pattern of a sensor for a simulator; the output appears when it is complete.
 /// @throws InvalidArgument for an unknown sensor or format and for numbers out of range; FileError;
 ///         Cancelled
 WrittenPattern write_pattern(const WritePatternOptions& options, const Progress& progress = {});

@@ -12,25 +12,25 @@
 
 namespace risley::json {
 
-/// The columns of a table in which every row is one of many results, by docs/schemas/columns.json.
-/// A result is an object of json::of() to which `input`, `status`, `message`, and further names of
-/// docs/files.md were added. Columns are those for which any result has a value, so the results are
-/// looked at twice: first note() for each, then cells().
+/// The columns of a table with one result per row, by docs/schemas/columns.json. A result is an
+/// object of json::of() to which `input`, `status`, `message`, and further names of docs/files.md
+/// were added. Columns are those with a value in any result, so there are two passes over the
+/// results: first note() for each, then cells().
 class ResultColumns {
  public:
   ResultColumns();
-  /// Looks at a result, so that what it has gets its columns.
+  /// Registers the columns of a result.
   void note(const Json& result);
 
   /// Names, kinds, units and descriptions.
   std::vector<tables::TableColumn> columns() const;
-  /// One cell per column; what a result does not have, or has of another kind, is empty.
+  /// One cell per column; empty if the result has no value of that kind.
   std::vector<tables::TableCell> cells(const Json& result) const;
 
  private:
   struct Column {
     tables::TableColumn shown;
-    std::vector<std::string> places;  ///< JSON pointers, of which the first with a value counts
+    std::vector<std::string> places;  ///< JSON pointers; the first one with a value is used
     bool used = false;
   };
   void note_parameters(const Json& result);

@@ -25,6 +25,8 @@ struct CalibratedFlight;
 struct CalibratedRecordings;
 struct CampaignChunk;
 struct CampaignResult;
+struct CloudOfStations;
+struct ComparedClouds;
 struct ComparedUnits;
 struct ConvertedRecording;
 struct ConvertedTrajectory;
@@ -48,14 +50,14 @@ struct WrittenPattern;
 
 namespace risley::json {
 
-/// Keys stay in the order in which they were put.
+/// Keys keep the order of insertion.
 using Json = nlohmann::ordered_json;
 
-/// Of every object that is printed or handed out; changes when a key changes its meaning.
+/// Of every object that is printed or returned; changes when a key changes its meaning.
 inline constexpr int kFormatVersion = 1;
 
-// What every job found, in the keys, units and codes that docs/schemas describe: angles in degrees,
-// numbers that are not finite as null.
+// Results of all jobs, in the keys, units and codes of docs/schemas: angles in degrees, non-finite
+// numbers as null.
 
 /// Of `risley estimate`.
 Json of(const jobs::EstimatedRecording& found);
@@ -73,13 +75,15 @@ Json of(const jobs::JudgedObservability& judged);
 Json of(const jobs::IdentifiedRecording& found);
 /// Of `risley cloud`.
 Json of(const jobs::RecordingCloud& made);
+/// Of `risley cloud --station`.
+Json of(const jobs::CloudOfStations& made);
 /// Of `risley info` about a recording.
 Json of(const jobs::InspectedRecording& found);
 /// Of every verb: `warnings`.
 Json of(const std::vector<Warning>& warnings);
-/// What the reader found out about the recording of a result, and how sound its times are.
+/// Findings of the reader about the recording of a result, and the quality of its times.
 Json of(const jobs::ReadRecording& recording);
-/// How well a calibration on walls knows directions; without the `kind` of the datum.
+/// Accuracy of the directions of a calibration on walls; without the `kind` of the datum.
 Json of(const calibration::FormalDatum& datum);
 /// Of `risley convert` with a recording.
 Json of(const jobs::ConvertedRecording& done);
@@ -93,6 +97,8 @@ Json of(const jobs::WrittenPattern& written);
 Json of(const jobs::BeamOrigins& found);
 /// Of `risley report` about two results.
 Json of(const jobs::ResultComparison& compared);
+/// Of `risley compare` about two clouds.
+Json of(const jobs::ComparedClouds& compared);
 /// Of `risley compare`.
 Json of(const jobs::ComparedUnits& compared);
 /// Of `risley campaign` for one chunk.
@@ -105,7 +111,7 @@ Json of(const simulation::SimulationResult& simulated);
 Json of(const std::vector<jobs::FoundSensor>& found);
 /// Of `risley record`.
 Json of(const jobs::RecordedSensors& recorded);
-/// A recording while it runs: events of its page.
+/// A running recording: events of its page.
 Json of(const jobs::LiveRecording& live);
 /// Of `risley emulate`.
 Json of(const jobs::EmulatedSensor& truth);

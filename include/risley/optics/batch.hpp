@@ -22,11 +22,10 @@ struct DirectionColumns {
   PrismGeometry geometry{};  ///< of the prisms, for the origin
 };
 
-/// Where many shots of one train point. A shot that does not get through is NaN in every column.
+/// Directions of many shots of one train. A shot that does not get through is NaN in every column.
 /// @param rotation_angles  one column per prism in beam order, rad, all of the same length. Of any
 ///                         number of turns; a batch with an angle beyond 1e6 rad takes longer
-/// @param beam             number of the emitter of every shot, counted from 0; empty: all the
-///                         first
+/// @param beam  number of each shot's emitter, counted from 0; empty: all the first
 /// @param set              instruction set, for tests and benchmarks; default the best available
 /// @return number of shots that are not valid
 /// @throws InvalidArgument when column counts or lengths differ, for a beam that the train does not

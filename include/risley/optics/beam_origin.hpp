@@ -11,8 +11,8 @@
 #include "risley/optics/observation_adjoint.hpp"
 
 /// @file
-/// Where the beam leaves the sensor. The prisms shift it sideways on its way through them, so it
-/// does not start at the frame's origin.                                          [B21 App. A]
+/// The point where the beam leaves the sensor. The prisms shift it sideways on its way, so it does
+/// not start at the frame's origin. [B21 App. A]
 namespace risley {
 
 /// Size and place of the prisms, in beam order: no value for 0, or one for all of a train, or one
@@ -31,21 +31,21 @@ struct PrismSize {
   PrismGeometry rate;  ///< d geometry / d number: ones and zeros
 };
 
-/// The sizes that all prisms share, prism_thickness_m and prism_spacing_m.
+/// The sizes common to all prisms, prism_thickness_m and prism_spacing_m.
 std::vector<PrismSize> shared_prism_sizes();
 /// The prisms' own: prism_thickness_a_m ..., then prism_spacing_a_m (from prism A to B) ...
 /// @throws InvalidArgument for a number of prisms that no train has
 std::vector<PrismSize> own_prism_sizes(int prisms);
 
 /// X of the points where the faces, in beam order, cross the axis, m [2 prisms]. The perpendicular
-/// face of the last prism stands at 0, where the frame has its origin. Zeros where an element
-/// reflects, whatever the geometry: see beam_path().
+/// face of the last prism is at 0, the frame's origin. Zeros if an element reflects, whatever the
+/// geometry: see beam_path().
 /// @throws InvalidArgument for a number of prisms that no train has, and for a geometry of another
 ///         number of prisms or with sizes that are not finite
 std::vector<double> face_positions(const std::vector<FaceOrder>& face_order,
                                    const PrismGeometry& geometry);
 
-/// Where the beam crosses every face.
+/// Points where the beam crosses every face.
 template <ModelScalar T, TrainLayout N>
 struct BeamPath {
   std::array<Vector3<T>, 2 * N> point;  ///< m, sensor frame
@@ -57,10 +57,10 @@ struct BeamPath {
 };
 
 /// The incident beam meets the first face on the axis; every further point is where the beam meets
-/// the next face. A face is taken to cross the axis at the same point whatever its tilt.
-/// [B21 App. A] Where an element reflects, all faces meet the beam at the frame's origin: a unit
-/// was found to have one centre within 0.13 mm.
-/// @param face_position  as face_positions() gives them
+/// the next face. Assumes that a face crosses the axis at the same point at any tilt. [B21 App. A]
+/// Where an element reflects, all faces meet the beam at the frame's origin: a unit was found to
+/// have one centre within 0.13 mm.
+/// @param face_position  as returned by face_positions()
 template <ModelScalar T, TrainLayout N>
 BeamPath<T, N> beam_path(const Trace<T, N>& trace, const std::array<T, 2 * N>& face_position) {
   BeamPath<T, N> path;
@@ -89,7 +89,7 @@ Vector3<T> beam_origin(const Trace<T, N>& trace, const std::array<T, 2 * N>& fac
   return beam_path(trace, face_position).origin();
 }
 
-/// What a result that depends on the beam's origin adds to the derivatives at the faces.
+/// Contribution of the beam's origin to the derivatives at the faces.
 template <ModelScalar T, TrainLayout N>
 struct BeamPathAdjoint {
   std::array<Vector3<T>, 2 * N> incident, normal;  ///< d result / d beam and normal of each face
@@ -131,7 +131,7 @@ BeamPathAdjoint<T, N> beam_path_adjoint(const Trace<T, N>& trace, const BeamPath
 
 /// A beam as a line in space.
 struct Ray {
-  Vector3<double> origin;     ///< where it leaves the last face, m, sensor frame
+  Vector3<double> origin;     ///< exit point on the last face, m, sensor frame
   Vector3<double> direction;  ///< unit vector, sensor frame
   bool valid = false;         ///< when false, all others are NaN
 };

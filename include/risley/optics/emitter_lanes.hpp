@@ -20,7 +20,7 @@ std::array<Batch, parameter_count(N)> parameter_batches(const double* parameters
 }
 
 /// Face orders of plain arguments, without a std::array function of FaceOrder: its name would not
-/// say the instruction set.
+/// contain the instruction set.
 template <class Batch, TrainLayout N>
 std::array<FaceOrder, N> face_orders(const FaceOrder* order) {
   std::array<FaceOrder, N> result;
@@ -42,13 +42,13 @@ PreparedDerivatives<Batch, N> prepared_derivatives(const double* parameters, con
                                        face_orders<Batch, N>(order), wanted);
 }
 
-/// The emitters of a kernel's shots. With several, every lane has an emitter of its own: incident
-/// beam and its derivatives are taken from a small table, lane by lane. With one, nothing is done
-/// at all, and everything stays as prepare() made it.
+/// The emitters of a kernel's shots. With several, every lane has its own emitter: incident beam
+/// and its derivatives are taken from a small table, lane by lane. For a single one nothing is
+/// done, and everything remains as prepare() made it.
 template <class Batch, TrainLayout N>
 class EmitterLanes {
  public:
-  /// Shots that are computed at once.
+  /// Number of shots computed at once.
   static constexpr std::size_t kLanes = Batch::size;
   /// Places of the flat vector, with those of all emitters.
   static constexpr std::size_t kPlaces =
@@ -69,7 +69,7 @@ class EmitterLanes {
 
   bool several() const { return emitters_ > 1; }  ///< whether lanes can differ at all
 
-  /// Turns to shots [shot, shot + kLanes); beyond `end` the last one is repeated.
+  /// Selects shots [shot, shot + kLanes); beyond `end` the last one is repeated.
   void select(std::size_t shot, std::size_t end) {
     if (!several()) return;
     alignas(64) double lanes[kLanes];
@@ -80,7 +80,7 @@ class EmitterLanes {
     number_ = Batch::load_aligned(lanes);
   }
 
-  /// Turns to shots of one emitter.
+  /// Selects shots of one emitter.
   void select(std::size_t emitter) {
     for (std::size_t& index : index_) index = emitter;
     number_ = Batch(static_cast<double>(emitter));

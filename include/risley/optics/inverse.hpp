@@ -10,13 +10,13 @@
 
 namespace risley {
 
-/// One pair of rotation angles that points the beam as asked, rad, both in [0, 2 pi).
+/// One pair of rotation angles for the requested direction, rad, both in [0, 2 pi).
 struct RotationPair {
   double first = 0;   ///< of the last prism but one
   double second = 0;  ///< of the last prism
 };
 
-/// So many pairs point the beam in one direction, at most: docs/theory/inverse.md
+/// Largest number of pairs for one direction: docs/theory/inverse.md
 inline constexpr int kMostRotationPairs = 4;
 
 /// Every answer of the inverse.
@@ -29,9 +29,9 @@ struct InverseSolution {
   bool continuum = false;
 };
 
-/// The rotation angles of the last two prisms that point the beam in a direction, for the
-/// practical model. The forward model is followed backwards through the last prism, which leaves
-/// one unknown angle; docs/theory/inverse.md derives the method.
+/// The rotation angles of the last two prisms for a given beam direction, by the practical model.
+/// The forward model is followed backwards through the last prism, which leaves one unknown angle;
+/// docs/theory/inverse.md derives the method.
 /// @param direction      unit vector, sensor frame
 /// @param fixed_angles   rotation angles, rad, of all prisms before the last two: more than two
 ///                       prisms reach a direction in infinitely many ways, and the caller chooses

@@ -27,7 +27,7 @@ T derivative_by(const Gradient<T, N>& gradient, int at, int beam) {
   return gradient.parameters[static_cast<std::size_t>(place::incident_beam_horizontal() + first)];
 }
 
-/// What the derivatives need of a train, computed once for all shots.
+/// A train's part of the derivatives, computed once for all shots.
 template <ModelScalar T, TrainLayout N>
 struct PreparedDerivatives {
   /// A small turn of both normals about an axis w changes a result by w times its torque: see
@@ -40,14 +40,14 @@ struct PreparedDerivatives {
     T wedge_by_exit{};       ///< that times the normal of a reflector's last face: constant
     T first_is_angled{}, second_is_angled{};        ///< one is 1, the other 0
     std::array<T, 2> ratio_by_glass, ratio_by_air;  ///< d index ratio / d refractive indices
-    /// Whether anybody wants these derivatives, which otherwise are zero.
+    /// Whether these derivatives are needed; otherwise they are zero.
     bool wedge_wanted = true, tilt_horizontal_wanted = true;
   };
   Vector3<T> incident_horizontal, incident_vertical;  ///< of the emitter that fires
   std::array<Prism, N> prisms;
 };
 
-/// What prepare_derivatives() asks whether anybody wants a derivative: everything is wanted.
+/// Default filter of prepare_derivatives(): all derivatives are needed.
 struct AllWanted {
   constexpr bool operator()(int) const { return true; }
 };
@@ -73,7 +73,8 @@ void prepare_prism_derivatives(const Parameters& parameters, FaceOrder order, co
     out.tilt_horizontal = turning_about(axis.direction, Vector3<T>{zero, zero, T(-1.0)});
   }
   if (N.has_bearing(prism)) {
-    // The axis and all that turns about it lean together, but for what the tilts turn the normals.
+    // The axis and everything that turns about it lean together, except for the part due to the
+    // tilts.
     Vector3<T> bearing_level = leaning_horizontal_rate<T>(axis.horizontal, level_angle);
     out.bearing_vertical = turning_about(axis.direction, level - bearing_level);
     out.bearing_vertical.along = out.bearing_vertical.along + bearing_level;
@@ -114,8 +115,8 @@ void prepare_incident_derivatives(const Sines& sines, PreparedDerivatives<T, N>&
 }
 
 /// @copydoc prepare
-/// @param wanted  called with a place of the flat vector of a train with one emitter: where it says
-///                false, the dearest derivatives are left out, which then are zero
+/// @param wanted  called with a place of the flat vector of a train with one emitter: if it returns
+/// false, the most expensive derivatives are skipped and are zero
 template <ModelScalar T, TrainLayout N, class Wanted = AllWanted>
 PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_count(N)>& parameters,
                                               const std::array<FaceOrder, N>& face_order,
@@ -130,13 +131,13 @@ PreparedDerivatives<T, N> prepare_derivatives(const std::array<T, parameter_coun
   return derivatives;
 }
 
-/// For results that depend on the beam behind the last face alone.
+/// For results that depend only on the beam after the last face.
 struct NothingAtFaces {
   template <class Vector>
   void operator()(std::size_t, std::size_t, Vector&, Vector&) const {}
 };
 
-/// How far the reverse passes of some results have come, from the last prism to the first.
+/// State of the reverse passes of some results, from the last prism to the first.
 template <ModelScalar T, TrainLayout N, std::size_t Results>
 struct ReversePass {
   std::array<Gradient<T, N>, Results> gradients;
@@ -167,11 +168,11 @@ ReversePass<T, N, Results> begin_reverse(const Vector3<T>& direction,
 /// last face:
 ///   in_K' = N_K.g dk_K/din_K,  in_i' = (N_i.g / m + sum_(j > i) N_i.N_j in_j') dk_i/din_i,
 ///   d result / d L = g + in_1' N_1 + m sum_(j > 1) in_j' N_j.
-/// Whoever turns beam and surfaces together turns L'' with them: so the torque of all normals, the
-/// sum of N x d result / d N, is L'' x g less L x d result / d L. Every angle but those of single
+/// Turning beam and surfaces together turns L'' with them: so the torque of all normals, the sum of
+/// N x d result / d N, is L'' x g less L x d result / d L. Every angle except those of single
 /// surfaces turns all normals about some axis w, and w times the torque is its derivative.
 /// Derivation: docs/theory/derivatives.md
-/// @param at_face  not called where an element reflects: see beam_path()
+/// @param at_face  not called if an element reflects: see beam_path()
 template <ModelScalar T, TrainLayout N, std::size_t Results, class AtFace = NothingAtFaces>
 void reverse_prism(const PreparedTrain<T, N>& train, const PreparedDerivatives<T, N>& derivatives,
                    const Trace<T, N>& forward, std::size_t prism, ReversePass<T, N, Results>& pass,
@@ -307,10 +308,10 @@ void end_reverse(const PreparedDerivatives<T, N>& d, ReversePass<T, N, Results>&
 }
 
 /// Reverse pass: the gradients of some scalar results from their derivatives with respect to the
-/// emergent direction, all at once because they share how the faces move.
+/// emergent direction, all at once because they share the motion of the faces.
 /// @param seeds    d result / d direction [results][3]
-/// @param at_face  called as (face, result, beam, normal): adds to d result / d incident beam of
-///                 the face and d result / d its normal what does not come through the refraction
+/// @param at_face called as (face, result, beam, normal): adds to d result / d incident beam of the
+/// face and d result / d its normal the part that does not come through the refraction
 template <ModelScalar T, TrainLayout N, std::size_t Results, class AtFace = NothingAtFaces>
 std::array<Gradient<T, N>, Results> trace_adjoint(const PreparedTrain<T, N>& train,
                                                   const PreparedDerivatives<T, N>& d,
@@ -331,7 +332,7 @@ struct AngleSeeds {
   Vector3<T> azimuth, zenith;
 };
 
-/// Derivatives of both angles by a direction of length 1: what trace_adjoint() starts from.
+/// Derivatives of both angles by a direction of length 1: the starting point of trace_adjoint().
 template <ModelScalar T>
 AngleSeeds<T> angle_seeds(const Vector3<T>& direction) {
   using std::sqrt;
@@ -364,8 +365,8 @@ AngleLinearisation<T, N> linearise_angles(const PreparedTrain<T, N>& train,
           gradients[1], forward.valid()};
 }
 
-/// What a small turn of a direction about the Z axis (yaw) and the Y axis (pitch) of the train's
-/// frame, whose X is the axis of rotation, does to its angles.
+/// Effect of a small turn of a direction about the Z axis (yaw) and the Y axis (pitch) of the
+/// train's frame, whose X is the axis of rotation, on its angles.
 template <ModelScalar T>
 struct TurnDerivatives {
   T azimuth_by_yaw, zenith_by_yaw, azimuth_by_pitch, zenith_by_pitch;

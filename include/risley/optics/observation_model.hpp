@@ -68,7 +68,7 @@ constexpr double wedge_sign(FaceOrder order, int surface_of_element) {
   return surface_of_element == 1 ? 1.0 : 0.0;
 }
 
-/// A vector as its prism turns, such as a face's unit normal: along + cos(angle) cosine +
+/// A vector that turns with its prism, such as a face's unit normal: along + cos(angle) cosine +
 /// sin(angle) sine. This is Rodrigues' form of the rotation that the paper writes with quaternions.
 /// [B21 Eq. (19-26)]
 template <ModelScalar T>
@@ -95,13 +95,13 @@ TurningVector<T> turning_about(const Vector3<T>& axis, const Vector3<T>& vector)
   return {along, vector - along, cross(axis, vector)};
 }
 
-/// A train with everything computed that does not depend on the rotation angles.
+/// A train with everything precomputed that does not depend on the rotation angles.
 template <ModelScalar T, TrainLayout N>
 struct PreparedTrain {
   /// One surface of an element.
   struct Face {
     TurningVector<T> normal;
-    T index_ratio;  ///< index before the face over index behind it, 1 for a mirror
+    T index_ratio;  ///< index before the face over index after it, 1 for a mirror
   };
   Vector3<T> incident;  ///< of the emitter that fires
   std::array<Face, N.surfaces()> faces;
@@ -115,7 +115,7 @@ constexpr std::size_t pair_of_surfaces(std::size_t element, std::size_t one, std
   return other == 1 ? element : static_cast<std::size_t>(N) + one;
 }
 
-/// Surfaces of an element, a constant as long as no element reflects.
+/// Surfaces of an element, a constant unless an element reflects.
 template <TrainLayout N>
 [[gnu::always_inline]] constexpr std::size_t surfaces_of(std::size_t element) {
   if constexpr (N.reflects()) return N.surfaces(element);
@@ -141,15 +141,15 @@ template <TrainLayout N, class Vector>
   }
 }
 
-/// The angles by which incident beam, axes and normals lean, as places of one array, so that
-/// whoever prepares a train for every shot computes all their sines at once.
+/// The angles by which incident beam, axes and normals lean, as places of one array, so that a
+/// train prepared for every shot gets all their sines at once.
 namespace leaning {
 constexpr std::size_t incident_horizontal() { return 0; }  ///< of the emitter that fires
 constexpr std::size_t incident_vertical() { return 1; }    ///< of the emitter that fires
 /// Of both normals of a prism.
 constexpr std::size_t horizontal(std::size_t prism) { return 2 + 5 * prism; }
 /// Of the normal of an element's face, 0 or 1, in which the wedge or the mirror may be. The third
-/// surface of a reflector stands a right angle below its tilt.
+/// surface of a reflector is at a right angle below its tilt.
 constexpr std::size_t vertical(std::size_t prism, std::size_t face) { return 3 + 5 * prism + face; }
 /// Of a prism's axis; behind the end where TrainLayout::has_bearing() says that it is X.
 constexpr std::size_t bearing_horizontal(std::size_t prism) { return 5 + 5 * prism; }
@@ -212,7 +212,7 @@ struct PrismAxis {
   SinePair<T> horizontal;
 };
 
-/// @param sines  by leaning angle: an array of SinePair<T>, or what gives its elements
+/// @param sines  by leaning angle: an array of SinePair<T>, or an equivalent
 template <ModelScalar T, TrainLayout N, class Sines>
 PrismAxis<T> prism_axis(const Sines& sines, std::size_t prism) {
   const T zero(0.0), one(1.0);
@@ -233,7 +233,7 @@ Vector3<T> normal_at_zero(const Sines& sines, std::size_t element, std::size_t s
 }
 
 /// One prism of prepare().
-/// @param parameters  flat vector: an array of T, or what gives its elements
+/// @param parameters  flat vector: an array of T, or an equivalent
 /// @param sines       as prism_axis()
 template <ModelScalar T, TrainLayout N, class Parameters, class Sines>
 void prepare_prism(const Parameters& parameters, const Sines& sines, std::size_t prism,
@@ -271,20 +271,20 @@ PreparedTrain<T, N> prepare(const std::array<T, parameter_count(N)>& parameters,
   return train;
 }
 
-/// How one beam goes through all elements: what a forward pass leaves behind for the reverse
-/// passes, in the train's frame.
+/// The path of one beam through all elements: the result of a forward pass for the reverse passes,
+/// in the train's frame.
 template <ModelScalar T, TrainLayout N>
 struct Trace {
   static constexpr std::size_t kSurfaces = N.surfaces();  ///< of all elements
   std::array<T, N> sine, cosine;                          ///< of the rotation angles
-  std::array<Vector3<T>, N + 1> beam;  ///< before each element and behind the last, unit vectors
+  std::array<Vector3<T>, N + 1> beam;  ///< before each element and after the last, unit vectors
   std::array<Vector3<T>, N> inside;    ///< behind each element's first face: trace_forward()
   std::array<Vector3<T>, kSurfaces> normal;  ///< of the surfaces, unit vectors
   /// Of the angles of incidence and refraction at the surfaces; out is NaN from where the beam does
   /// not get through. At a mirror out = -in.
   std::array<T, kSurfaces> cosine_in, cosine_out;
 
-  /// The emergent beam: unit vector, sensor frame; NaN where not valid.
+  /// The emergent beam: unit vector, sensor frame; NaN if not valid.
   decltype(auto) direction() const { return in_sensor_frame<N>(beam[N]); }
   /// The beam that meets a face of a prism.
   const Vector3<T>& incident(std::size_t face) const {
@@ -342,7 +342,7 @@ void pass_prism(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>
   trace.beam[prism + 1] = behind;
 }
 
-/// The beam behind the first face of an element, L' = m L + k1 N1. @param[in,out] trace  as
+/// The beam after the first face of an element, L' = m L + k1 N1. @param[in,out] trace as
 /// pass_prism() left it
 template <ModelScalar T, TrainLayout N>
 void set_inside(const PreparedTrain<T, N>& train, std::size_t prism, Trace<T, N>& trace) {
@@ -372,11 +372,11 @@ Trace<T, N> trace_forward(const PreparedTrain<T, N>& train,
 /// A beam that has left the sensor.
 template <ModelScalar T>
 struct Beam {
-  Vector3<T> direction;  ///< unit vector, sensor frame; NaN where not valid
+  Vector3<T> direction;  ///< unit vector, sensor frame; NaN if not valid
   Mask<T> valid;         ///< false when the beam does not get through the prisms
 };
 
-/// As trace_forward(), of which only the emergent beam is wanted.
+/// As trace_forward(), for the emergent beam only.
 template <ModelScalar T, TrainLayout N>
 Beam<T> trace(const PreparedTrain<T, N>& train, const RotationAngles<T, N>& rotation_angle) {
   Trace<T, N> forward;
@@ -397,7 +397,7 @@ struct Observation {
   bool valid = false;         ///< when false, all others are NaN
 };
 
-/// Where one shot of a train points.
+/// Direction of one shot of a train.
 /// @param rotation_angles  [prisms], rad, beam order
 /// @param beam             number of the emitter, counted from 0
 /// @throws InvalidArgument when there are not as many angles as prisms, and as check_beam()

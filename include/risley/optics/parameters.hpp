@@ -13,7 +13,7 @@ namespace risley {
 /// Largest number of emitters behind one train (Livox builds one and six).
 inline constexpr int kMaxEmitters = 8;
 
-/// Which elements and how many emitters a train has: what its parameters depend on.
+/// Which elements and how many emitters a train has: they determine its parameters.
 struct TrainShape {
   TrainLayout prisms;
   int emitters = 1;
@@ -27,8 +27,8 @@ struct TrainShape {
 void check_shape(TrainShape shape);
 
 /// Places in the flat parameter vector of a train: air, incident beam of the first emitter, then
-/// six per prism in beam order, then two per further emitter. A shot sees the part that a train
-/// with one emitter has, with its own emitter's beam. Where the last prism's axis is the X axis of
+/// six per prism in beam order, then two per further emitter. A shot depends on the part for a
+/// train with one emitter, with its own emitter's beam. If the last prism's axis is the X axis of
 /// the sensor, its two bearing-tilt places exist only to keep the stride and always hold zero.
 namespace place {
 constexpr int refractive_index_air() { return 0; }      ///< of the medium around the prisms
@@ -42,7 +42,7 @@ constexpr int incident_beam_horizontal(int emitter, int prisms) {
 constexpr int incident_beam_vertical(int emitter, int prisms) {
   return incident_beam_horizontal(emitter, prisms) + 1;
 }
-/// The emitter that a place belongs to, or -1.
+/// The emitter of a place, or -1.
 constexpr int emitter(int at, int prisms) {
   if (at == incident_beam_horizontal() || at == incident_beam_vertical()) return 0;
   return at < 3 + 6 * prisms ? -1 : (at - 1 - 6 * prisms) / 2;
@@ -53,21 +53,21 @@ constexpr int refractive_index(int prism) { return 3 + 6 * prism; }
 /// mirrors' angles are those of their normals from the axis.
 constexpr int wedge_angle(int prism) { return 4 + 6 * prism; }
 constexpr int prism_tilt_horizontal(int prism) { return 5 + 6 * prism; }  ///< against its bearing
-/// Against its bearing; of a wedge its first face alone.
+/// Against its bearing; for a wedge only its first face.
 constexpr int prism_tilt_vertical(int prism) { return 6 + 6 * prism; }
 /// Of the axis about which a prism turns, against the frame's; zero unless has_bearing().
 constexpr int bearing_tilt_horizontal(int prism) { return 7 + 6 * prism; }
 /// Of the axis about which a prism turns, against the frame's; zero unless has_bearing().
 constexpr int bearing_tilt_vertical(int prism) { return 8 + 6 * prism; }
-/// Where the turn of a recording's frame is free, derivatives keep in the last prism's two bearing
-/// places what a small turn of the whole emergent beam about Z (yaw) and about Y (pitch) of the
-/// train's frame does: turn_derivatives(). A bearing of the last prism is held then.
+/// If the turn of a recording's frame is free, the last prism's two bearing places hold the
+/// derivatives with respect to a small turn of the whole emergent beam about Z (yaw) and about Y
+/// (pitch) of the train's frame: turn_derivatives(). A bearing of the last prism is held then.
 constexpr int frame_yaw(int prisms) { return bearing_tilt_horizontal(prisms - 1); }
 /// As frame_yaw(), of the pitch.
 constexpr int frame_pitch(int prisms) { return bearing_tilt_vertical(prisms - 1); }
 }  // namespace place
 
-/// Length of the flat parameter vector with one emitter: what one shot depends on.
+/// Length of the flat parameter vector with one emitter: the parameters of one shot.
 constexpr int parameter_count(int prisms) { return 3 + 6 * prisms; }
 /// Length of the whole flat parameter vector.
 constexpr int parameter_count(TrainShape shape) {
@@ -105,8 +105,8 @@ const std::vector<ParameterInfo>& parameter_list(TrainShape shape);
 /// The entry of that name. @throws InvalidArgument that lists the known names
 const ParameterInfo& find_parameter(std::string_view name, TrainShape shape);
 
-/// The entry of that name in whatever train has it, for use before the train is known: a name
-/// means the same in each. Null where no train has it.
+/// The entry of that name in any train that has it, for use before the train is known: a name means
+/// the same in each. Null if no train has it.
 const ParameterInfo* find_parameter_of_any_train(std::string_view name);
 
 /// An SI value in the unit that the name states. @throws InvalidArgument as find_parameter()

@@ -20,11 +20,11 @@ inline constexpr int kMaxPrisms = 4;
 enum class FaceOrder : std::uint8_t {
   perpendicular_angled,         ///< PA: a prism
   angled_perpendicular,         ///< AP: a prism
-  angled_angled,                ///< AA: a wedge of which each face has an angle of its own
-  perpendicular_mirror_upright  ///< PMU: a body that turns the beam aside by a reflection within it
+  angled_angled,                ///< AA: a wedge whose faces each have their own angle
+  perpendicular_mirror_upright  ///< PMU: a body that deflects the beam by a reflection within it
 };
 
-/// What a template has to know of an element: which surfaces it has and what leans them.
+/// Properties of an element for templates: its surfaces and the angles that lean them.
 enum class ElementKind : std::uint8_t {
   prism,      ///< two faces; one angle, between them
   wedge,      ///< two faces; an angle each
@@ -38,8 +38,8 @@ constexpr ElementKind kind_of(FaceOrder order) {
   return ElementKind::prism;
 }
 
-/// The part of a train that templates are made for: its elements and where their axis points.
-/// Where a number is needed, such as in 2 * N, it is the number of its elements.
+/// The part of a train that is a template argument: its elements and the direction of their axis.
+/// If a number is needed, such as in 2 * N, it is the number of its elements.
 struct TrainLayout {
   int elements = 0;
   ElementKind kind[kMaxPrisms] = {};  ///< beam order; prism beyond the last element
@@ -60,7 +60,7 @@ struct TrainLayout {
     return elements > 0 && is_reflector(static_cast<std::size_t>(elements) - 1);
   }
   /// Whether the axis of an element leans in the sensor's frame. X is the last one's by definition;
-  /// where the axes point up, the sensor's housing defines the frame and all may lean.
+  /// if the axes point up, the sensor's housing defines the frame and all may lean.
   [[gnu::always_inline]] constexpr bool has_bearing(std::size_t element) const {
     return axis_up || element != static_cast<std::size_t>(elements) - 1;
   }
@@ -74,7 +74,8 @@ struct TrainLayout {
   }
 };
 
-/// The number of a layout's elements as a plain number: gcc 12 unrolls no loop that ends elsewhere.
+/// The number of a layout's elements as a plain number: gcc 12 does not unroll loops with other
+/// bounds.
 template <TrainLayout N>
 inline constexpr auto kElements = static_cast<std::size_t>(N.elements);
 
@@ -97,10 +98,10 @@ constexpr bool same_layout(const TrainLayout& a, const TrainLayout& b) {
 }
 
 /// The layout of elements in beam order.
-/// @throws InvalidArgument where the model is not made for such a train, naming what it is made for
+/// @throws InvalidArgument if the model does not support such a train, naming the supported ones
 TrainLayout layout_of(const std::vector<FaceOrder>& face_order);
 
-/// @throws InvalidArgument naming the layout and what is allowed
+/// @throws InvalidArgument naming the layout and the allowed ones
 [[noreturn]] void refuse_layout(const TrainLayout& layout);
 
 /// Calls `function.template operator()<N>()` for a layout: the one place where run-time and
@@ -124,7 +125,7 @@ decltype(auto) with_layout(const TrainLayout& layout, Function&& function) {
 }
 
 /// Face orders of a train in beam order from text such as "PA-AP" or "AA-PMU".
-/// @throws InvalidArgument naming the text and what is allowed
+/// @throws InvalidArgument naming the text and the allowed ones
 std::vector<FaceOrder> parse_face_order(std::string_view text);
 
 /// The inverse of parse_face_order.

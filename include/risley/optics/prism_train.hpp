@@ -13,11 +13,11 @@
 
 namespace risley {
 
-/// Some prisms in beam order, the emitters in front of them, and all their parameters: what the
-/// optics know of a sensor.
+/// Some prisms in beam order, the emitters in front of them, and all their parameters: the optical
+/// model of a sensor.
 class PrismTrain {
  public:
-  /// No prisms at all, to assign a train to: whatever needs a train refuses this one.
+  /// No prisms at all, as a placeholder: any use of it as a train throws.
   PrismTrain() = default;
   /// Ideal train: every error zero, air 1.0, glass 1.51, wedges 18 deg.           [B21 Eq. (30)]
   /// A wedge and a reflector have the glass (1.9682) and the angles (10, 29 and 50 deg) that repeat
@@ -29,7 +29,7 @@ class PrismTrain {
   int emitters() const { return emitters_; }                 ///< how many
   TrainLayout layout() const { return layout_; }             ///< which elements
   TrainShape shape() const { return {layout_, emitters_}; }  ///< elements and number of emitters
-  /// Which face of every prism the beam meets first [prisms], beam order.
+  /// First face in beam order, of every prism [prisms].
   const std::vector<FaceOrder>& face_order() const { return face_order_; }
 
   /// The flat vector, SI units, length parameter_count(shape()); see namespace place.
@@ -68,12 +68,12 @@ class PrismTrain {
 };
 
 /// @param beam  number of the emitter, counted from 0, as in recordings
-/// @throws InvalidArgument naming the number and what is allowed
+/// @throws InvalidArgument naming the number and the allowed range
 void check_beam(const PrismTrain& train, int beam);
 
-/// What a shot of one emitter sees of a train's parameters, as a fixed-size array, for the
+/// The parameters of a train that one emitter's shot depends on, as a fixed-size array, for the
 /// templates of the observation model.
-/// @param beam  as check_beam(), which the caller has asked
+/// @param beam  valid by check_beam(), which the caller has called
 template <TrainLayout N>
 std::array<double, parameter_count(N)> parameter_array(const PrismTrain& train, int beam = 0) {
   std::array<double, parameter_count(N)> values{};

@@ -23,7 +23,7 @@ T refraction_cosine(const T& cosine_in, const T& index_ratio) {
                 T(std::numeric_limits<double>::quiet_NaN()));
 }
 
-/// What refraction_cosine() is of a mirror, whose index ratio is 1: NaN for one met from behind.
+/// refraction_cosine() for a mirror, whose index ratio is 1: NaN if it is met from behind.
 /// @param cosine_in  of the angle of incidence
 template <ModelScalar T>
 T reflection_cosine(const T& cosine_in) {
@@ -41,7 +41,7 @@ Vector3<T> reflect(const Vector3<T>& incident, const Vector3<T>& normal) {
 /// @param incident     unit vector along propagation, sensor frame
 /// @param normal       unit vector of the face, sensor frame, on the side the beam leaves to
 /// @param index_ratio  index before the face over index behind it, > 0
-/// @return unit vector, sensor frame; NaN where refraction_cosine() is
+/// @return unit vector, sensor frame; NaN if refraction_cosine() is
 template <ModelScalar T>
 Vector3<T> refract(const Vector3<T>& incident, const Vector3<T>& normal, const T& index_ratio) {
   const T cosine_in = dot(normal, incident);

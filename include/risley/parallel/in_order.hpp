@@ -10,9 +10,9 @@
 
 namespace risley::parallel {
 
-/// Calls make(i) for i = 0, 1, ... from several threads, and take(result) with what each call
-/// returned from one thread at a time, in that order: sums that are taken so do not depend on the
-/// number of threads. Few results wait at a time.
+/// Calls make(i) for i = 0, 1, ... from several threads, and take(result) with each returned value
+/// from one thread at a time, in that order: sums formed this way do not depend on the number of
+/// threads. Few results wait at a time.
 template <class Make, class Take>
 void in_order(std::size_t count, const Make& make, const Take& take) {
   struct Slot {

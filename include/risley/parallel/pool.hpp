@@ -10,7 +10,7 @@
 
 namespace risley::parallel {
 
-/// Memory that parallel work uses again and again: no more of it than is in use at a time.
+/// Memory that parallel work reuses: no more of it than is in use at a time.
 template <class T>
 class Pool {
   struct GiveBack {
@@ -24,11 +24,11 @@ class Pool {
  public:
   using Item = std::unique_ptr<T, GiveBack>;  ///< goes back by itself
 
-  /// One that is not in use, as its last user left it or new.
+  /// An unused one, as its last user left it, or a new one.
   Item take() {
     const std::scoped_lock lock(mutex_);
     if (spare_.empty()) {
-      spare_.reserve(++made_);  // so that giving back needs no memory
+      spare_.reserve(++made_);  // so that returning one needs no memory
       return Item(new T(), {this});
     }
     Item item(spare_.back().release(), {this});

@@ -8,8 +8,8 @@
 
 namespace risley::recordings {
 
-/// The middle of where a point was whose coordinates were cut off towards zero at whole steps:
-/// every coordinate but 0 is half a step further from zero.
+/// The middle of the possible positions of a point whose coordinates were truncated towards zero to
+/// whole steps: every coordinate but 0 is half a step further from zero.
 inline Vector3<double> middle_of_cut(const Vector3<double>& point, double step) {
   const auto moved = [step](double c) {
     return std::abs(c) < 0.5 * step ? c : c + std::copysign(0.5 * step, c);

@@ -23,7 +23,7 @@ struct ExcerptOptions {
   std::uint64_t most_shots_without_times = 100'000;
 };
 
-/// What an excerpt came to hold.
+/// Contents of an excerpt.
 struct Excerpt {
   std::string path;                ///< of its file
   std::uint64_t observations = 0;  ///< rows, those without return included
@@ -40,12 +40,12 @@ struct Excerpt {
   std::optional<FileError> damage;  ///< of the recording, behind the rows searched
 };
 
-/// The same in words, for the person who sends it.
+/// The same in words, for the sender.
 struct ExcerptContents {
   std::vector<std::string> holds, lacks;
 };
 
-/// What an excerpt holds and lacks, item by item.
+/// Contents and omissions of an excerpt, item by item.
 ExcerptContents contents_of(const Excerpt& excerpt);
 
 /// Writes a small and anonymous part of a recording in the lossless NetCDF form: the stretch of one
@@ -53,18 +53,18 @@ ExcerptContents contents_of(const Excerpt& excerpt);
 /// a direction. Reads the recording twice; memory does not grow with its length.
 ///
 /// It holds, bit by bit, directions, resolutions, number of return, tag, beam and validity of every
-/// row, shots without return in their places; times from 0 (shot numbers from 0 where the recording
-/// has no times); the type of the sensor and the format the rows came from. With
-/// ExcerptOptions::ranges it also holds ranges and their resolution. It does not hold serial
-/// numbers, extrinsics, absolute times, intensities, packet headers, inertial samples or details.
+/// row, shots without return in their places; times from 0 (shot numbers from 0 if the recording
+/// has no times); the type of the sensor and the format of the rows. With ExcerptOptions::ranges it
+/// also holds ranges and their resolution. It does not hold serial numbers, extrinsics, absolute
+/// times, intensities, packet headers, inertial samples or details.
 ///
-/// Coordinates in whole steps give their range away: by the angular resolution, step / range, and
-/// by the direction, which only one point in whole steps may have. Without ranges such rows have
-/// resolutions rounded to the nearest power of two, and angles to a quarter of that, which leaves
-/// the range known to a factor of two and adds a sixteenth to the variance of the rounding.
+/// Coordinates in whole steps reveal their range: by the angular resolution, step / range, and by
+/// the direction, which may belong to only one point in whole steps. Without ranges the resolutions
+/// of such rows are rounded to the nearest power of two, and angles to a quarter of that, which
+/// leaves the range known to a factor of two and adds a sixteenth to the variance of the rounding.
 ///
 /// @param recording  of any known format
-/// @param path  must end in ".nc"; appears when it is whole
+/// @param path  must end in ".nc"; appears when it is complete
 /// @throws InvalidArgument for another ending, for an output that is the recording and for limits
 ///         that are not positive; FileError, also when there is no shot with a direction
 Excerpt write_excerpt(const Source& recording, const std::string& path,

@@ -10,8 +10,8 @@
 
 namespace risley::recordings {
 
-/// Pose of a sensor in the frame of a hub or a vehicle, as LVX has it: p_recorded = R p_sensor + t
-/// with R = Rz(yaw) Ry(pitch) Rx(roll), each by the right-hand rule.
+/// Pose of a sensor in the frame of a hub or a vehicle, as in LVX: p_recorded = R p_sensor + t with
+/// R = Rz(yaw) Ry(pitch) Rx(roll), each by the right-hand rule.
 struct Extrinsics {
   double yaw = 0, pitch = 0, roll = 0;  ///< rad
   Vector3<double> translation;          ///< t, m
@@ -24,8 +24,8 @@ bool is_identity(const Extrinsics& pose);
 /// @throws InvalidArgument for an angle that is not finite
 std::array<Vector3<double>, 3> sensor_axes(const Extrinsics& pose);
 
-/// The pose that a recording's header holds of a sensor; empty when all its numbers are 0, or when
-/// one is not finite. It says nothing of whether the recorded points were moved by it.
+/// The pose of a sensor in a recording's header; empty when all its numbers are 0, or when one is
+/// not finite. It does not show whether the recorded points were moved by it.
 std::optional<Extrinsics> stored_extrinsics(const Device& device);
 
 }  // namespace risley::recordings

@@ -26,7 +26,7 @@ inline constexpr std::array<std::uint8_t, 11> kRecordBytes{20, 28, 26, 34, 57, 6
 /// Whether a point format is one of LAS 1.4's own: wider return numbers, a scanner channel.
 constexpr bool is_modern(int point_format) { return point_format >= 6; }
 
-/// Byte of a point record at which its GPS time stands; empty for the formats without one.
+/// Byte of a point record with its GPS time; empty for the formats without one.
 constexpr std::optional<std::size_t> gps_time_at(int point_format) {
   if (point_format == 0 || point_format == 2) return std::nullopt;
   return is_modern(point_format) ? 22 : 20;
@@ -45,15 +45,15 @@ inline constexpr const char* kSpecificationUser = "LASF_Spec";
 /// Number of the record that describes extra bytes.
 inline constexpr std::uint16_t kExtraBytesNumber = 4;
 inline constexpr std::size_t kDescriptorBytes = 192;  ///< of one description in it
-/// Extra bytes by which clouds keep what LAS has no field for, each a uint8.
+/// Extra bytes in which clouds store fields that LAS lacks, each a uint8.
 inline constexpr const char* kTagField = "Tag";
 /// As kTagField, for the emitter that fired.
 inline constexpr const char* kBeamField = "Beam";
 
 /// Bit of the global encoding: GPS times are adjusted standard GPS time.
 inline constexpr unsigned kAdjustedGpsTime = 1;
-/// What sensors report from 0 to 255 stands in the 16 bits of the intensity times so much, which
-/// the specification asks of a range of 256.
+/// Intensities that sensors report from 0 to 255 are stored in 16 bits times this, as the
+/// specification requires for a range of 256.
 inline constexpr unsigned kIntensityFactor = 256;
 
 inline constexpr std::int64_t kSecond = 1'000'000'000;  ///< ns

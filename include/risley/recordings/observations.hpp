@@ -20,23 +20,23 @@ namespace risley::recordings {
 struct Observations {
   /// Time of the shot, ns. The origin is the recording's (RecordingHeader::time_reference); a
   /// clock that wraps every second (PPS) has been made continuous by the reader. The number of the
-  /// shot in firing order where the recording has no times (RecordingHeader::has_times).
+  /// shot in firing order if the recording has no times (RecordingHeader::has_times).
   std::vector<std::int64_t> time_ns;
-  /// Azimuth from X towards Y in (-pi, pi], zenith from Z in [0, pi], rad. Meaningful where
-  /// valid; a null return keeps the angles its record holds, or NaN when it holds none.
+  /// Azimuth from X towards Y in (-pi, pi], zenith from Z in [0, pi], rad. Meaningful if valid; a
+  /// null return keeps the angles in its record, or NaN if there are none.
   std::vector<double> azimuth, zenith;
-  /// Range, m; 0 where the shot had no return, NaN where the format holds no ranges.
+  /// Range, m; 0 if the shot had no return, NaN if the format holds no ranges.
   std::vector<double> range;
-  /// Width of the format's rounding step at this point, rad, rad and m; 0 where values are not
-  /// rounded or the step is unknown. A Cartesian record of step q has q / (r sin zenith), q / r
-  /// and q: its rounding error is the same in all directions.
+  /// Width of the format's rounding step at this point, rad, rad and m; 0 if values are not rounded
+  /// or the step is unknown. A Cartesian record of step q has q / (r sin zenith), q / r and q: its
+  /// rounding error is the same in all directions.
   std::vector<float> azimuth_resolution, zenith_resolution, range_resolution;
   std::vector<std::uint8_t> intensity;      ///< as the sensor reports it, 0-255
   std::vector<std::uint8_t> return_number;  ///< from 1
-  std::vector<std::uint8_t> tag;            ///< the format's tag byte, 0 where it has none
+  std::vector<std::uint8_t> tag;            ///< the format's tag byte, 0 without one
   std::vector<std::uint8_t> beam;           ///< firing beam ("line") from 0; 0 on one-beam sensors
   std::vector<std::uint8_t> device;         ///< row of RecordingHeader::devices
-  std::vector<std::uint8_t> valid;          ///< 1 where the direction can be trusted
+  std::vector<std::uint8_t> valid;          ///< 1 if the direction can be trusted
 
   std::size_t size() const { return time_ns.size(); }
   void clear();                    ///< leaves no row
@@ -62,7 +62,7 @@ struct ObservationColumn {
   const char *unit, *meaning;   ///< as NetCDF has them
 };
 
-/// All columns: rows are made, taken and checked, the lossless format is written and read, and
+/// All columns: rows are created, copied and checked, the lossless format is written and read, and
 /// Python's arrays are made by this list.
 inline constexpr ObservationColumn kObservationColumns[] = {
     {&Observations::time_ns, "time_ns", "time", "ns", "time of the shot"},
@@ -81,20 +81,20 @@ inline constexpr ObservationColumn kObservationColumns[] = {
     {&Observations::tag, "tag", "tag", "1", "tag byte of the sensor"},
     {&Observations::beam, "beam", "beam", "1", "firing beam, from 0"},
     {&Observations::device, "device", "device", "1", "row of the device table"},
-    {&Observations::valid, "valid", "valid", "1", "1 where the direction can be trusted"},
+    {&Observations::valid, "valid", "valid", "1", "1 if the direction can be trusted"},
 };
 
 /// @throws InvalidArgument when a column has another length than time_ns
 void require_columns(const Observations& rows);
-/// Sets `valid` for columns that somebody else filled: 1 where both angles are finite and the
-/// range, unless it is NaN, is above 0.
+/// Sets `valid` for columns filled elsewhere: 1 if both angles are finite and the range, unless it
+/// is NaN, is above 0.
 void mark_valid(Observations& rows);
-/// @throws InvalidArgument naming the row of a valid direction whose azimuth is not in [-pi, pi] or
-///         whose zenith is not in [0, pi]
+/// @throws InvalidArgument with the row of a valid direction with an azimuth outside [-pi, pi] or a
+/// zenith outside [0, pi]
 void require_angles(const Observations& rows);
 
-/// Whether a row is a further return of the shot of the row before, which has the same time: it
-/// says so, or shows the same direction to within rounding. @param row  at least 1
+/// Whether a row is a further return of the previous row's shot, at the same time: by its return
+/// number, or by the same direction to within rounding. @param row  at least 1
 bool is_further_return(const Observations& rows, std::size_t row);
 
 /// Header of one sensor data packet as it was recorded, kept so that a packet format can be
@@ -120,8 +120,8 @@ struct ImuSample {
   std::array<float, 3> angular_velocity{}, acceleration_g{};
 };
 
-/// A piece of a recording: rows, and, for packet formats, the packets they came in. The packets
-/// stand in file order, and each IMU packet owns the next entry of imu.
+/// A piece of a recording: rows, and, for packet formats, the packets they came in. The packets are
+/// in file order, and each IMU packet owns the next entry of imu.
 struct Chunk {
   Observations observations;
   std::vector<Packet> packets;
@@ -130,7 +130,7 @@ struct Chunk {
   /// RecordingHeader::packet_shots.
   std::vector<std::size_t> packet_begins;
 
-  /// Leaves no row, packet or inertial sample.
+  /// Clears all rows, packets and inertial samples.
   void clear();
   /// What follows this one.
   void append(Chunk&& next);
@@ -165,22 +165,22 @@ inline constexpr std::array kLivoxTypes{
     LivoxType{kAvia2, "Avia2", true, false}};
 /// One by its number, or nullptr.
 const LivoxType* livox_type(std::uint8_t number);
-/// "1 (Mid-40), 2 (Tele-15), ...": those of a generation, which messages allow.
+/// "1 (Mid-40), 2 (Tele-15), ...": those of a generation that messages list as allowed.
 std::string livox_types_text(bool first_generation = true);
 /// Whether sensors of this type send the packets of the second generation.
 bool is_second_generation(std::uint8_t type);
-/// Device::type of a sensor that a format does not name, or only as no Mid-40.
+/// Device::type of a sensor that a format does not name, or only as not a Mid-40.
 inline constexpr std::uint8_t kUnknownDeviceType = 255;
 
 /// One sensor of a recording.
 struct Device {
   std::string serial;      ///< broadcast code, e.g. "0TFDG3B006H2Z11"; empty when unknown
-  std::string topic;       ///< of a bag, on which its messages are; empty in other formats
+  std::string topic;       ///< of a bag, with its messages; empty in other formats
   std::string hub_serial;  ///< broadcast code of the hub, empty without one
   std::string address;     ///< of the second generation, "192.168.1.112"; empty when unknown
   std::uint8_t index = 0;  ///< the key by which packets name it
   std::uint8_t type = kMid40;
-  /// The file does not name the type: it is what rates, tags and numbers of returns leave.
+  /// The file does not name the type: it is derived from rates, tags and numbers of returns.
   bool type_inferred = false;
   bool extrinsic_enabled = false;
   std::array<float, 3> roll_pitch_yaw_deg{};
@@ -190,22 +190,22 @@ struct Device {
 /// Commercial name of a Livox device type, "unknown" for others.
 std::string device_type_name(std::uint8_t type);
 
-/// What the origin of the times is.
+/// Origin of the times.
 enum class TimeReference : std::uint8_t { relative, power_on, ptp, utc, pps };
 
 /// "relative", "power-on", "PTP", "UTC" or "PPS".
 std::string to_string(TimeReference reference);
 
-/// A place where the count of a recording's shots is wrong.
+/// An error in the count of a recording's shots.
 struct ShotSlip {
-  std::uint64_t row = 0;   ///< first observation behind it, counted from 0
-  std::int64_t shots = 0;  ///< that are missing before that row; below 0: that are there twice
-  /// Their number is known; otherwise only which emitters fire behind it (shots modulo their
-  /// number), and times go on after kUnknownGap.
+  std::uint64_t row = 0;   ///< first observation after it, counted from 0
+  std::int64_t shots = 0;  ///< missing ones before that row; below 0: repeated ones
+  /// Their number is known; otherwise only which emitters fire after it (shots modulo their
+  /// number), and times continue after kUnknownGap.
   bool counted = true;
 };
 
-/// What is known about a recording before its first row is read.
+/// Properties of a recording known before its first row is read.
 struct RecordingHeader {
   std::string format;           ///< short name, e.g. "lvx-1.1", "scan-sequence-csv"
   std::vector<Device> devices;  ///< at least one
@@ -215,24 +215,24 @@ struct RecordingHeader {
   /// false when the file holds no times of single shots: Observations::time_ns then has shot
   /// numbers 0, 1, 2, ..., in which shots without return and lost ones keep their places.
   bool has_times = true;
-  /// Where it holds none: there are times, and all of them are the same.
+  /// If it holds none: there are times, but all of them are the same.
   bool all_times_equal = false;
-  /// Shots per second that the times were counted with, Hz; 0 where they are the recording's own.
+  /// Shots per second with which the times were counted, Hz; 0 if they are the recording's own.
   double counted_rate = 0;
-  std::vector<ShotSlip> slips;  ///< of the count that were mended
-  /// Shots of a whole packet, where the file has one time for all rows of a packet and keeps the
-  /// order of the rows, but not the places of those that are missing; 0 in other formats. Times are
-  /// then right in packets that lack nothing.
+  std::vector<ShotSlip> slips;  ///< corrected errors of the count
+  /// Shots of a complete packet, if the file has one time for all rows of a packet and keeps the
+  /// order of the rows, but not the places of missing ones; 0 in other formats. Times are then
+  /// correct in complete packets.
   int packet_shots = 0;
   bool has_range = true;
   bool has_intensity = true;
   bool cartesian = false;  ///< records hold x, y, z and not angles
-  /// Nothing says in which unit coordinates or ranges stand: the likely one was taken.
+  /// The unit of coordinates or ranges is not stated: the likely one was assumed.
   bool length_unit_assumed = false;
   int returns_per_shot = 1;
   std::uint32_t frame_duration_ms = 50;
-  /// Format-specific details a writer of the same format needs to write the same bytes again
-  /// (decimals, firmware type, ...), as name = value.
+  /// Format-specific details needed to write the same bytes again in the same format (decimals,
+  /// firmware type, ...), as name = value.
   std::vector<std::pair<std::string, std::string>> details;
 
   /// Value of a detail, or the fallback.

@@ -16,7 +16,7 @@
 
 namespace risley::recordings {
 
-/// Smallest and largest value seen; empty when there was none.
+/// Smallest and largest value; empty when there was none.
 struct ValueRange {
   double min, max;
 };
@@ -24,36 +24,36 @@ struct ValueRange {
 /// Missing time inside a recording.
 struct TimeGaps {
   std::uint64_t count = 0;
-  double total_s = 0;    ///< missing time: the steps without the nominal step each would have had
-  double largest_s = 0;  ///< missing time of the largest one
+  double total_s = 0;                 ///< missing time: the steps without their nominal steps
+  double largest_s = 0;               ///< missing time of the largest one
   std::int64_t largest_after_ns = 0;  ///< time of the last shot before it
   std::uint64_t largest_at_row = 0;   ///< first row after it, from 0
 };
 
-/// What a sensor of the second generation sent.
+/// Packet statistics of a sensor of the second generation.
 struct NumberedAudit {
   std::int64_t lost_packets = 0;   ///< missing between others, by their numbers
-  std::uint64_t outside_view = 0;  ///< rows outside the field of view that was set
+  std::uint64_t outside_view = 0;  ///< rows outside the configured field of view
   std::array<std::uint64_t, 256> observations_by_tag{};  ///< valid rows
 };
 
-/// What a recording holds and how sound its times are.
+/// Contents of a recording and quality of its times.
 struct TimeAuditResult {
   std::uint64_t observations = 0;  ///< rows: one per return
   std::uint64_t shots = 0;
-  /// Rows that are not valid, without those outside a field of view that was set.
+  /// Rows that are not valid, without those outside a configured field of view.
   std::uint64_t no_return = 0;
   std::int64_t first_time_ns = 0, last_time_ns = 0;  ///< of the first and the last row
-  /// From the first to the last shot of the device that covers most, s; jumps of the clock, back
-  /// or to another time source, do not count.
+  /// From the first to the last shot of the device with the longest recording, s; jumps of the
+  /// clock, back or to another time source, do not count.
   double duration_s = 0;
   double nominal_step_s = 0;  ///< median time between two shots of one device
-  double rate_hz = 0;         ///< shots of one device per second, gaps left out; 0 when unknown
+  double rate_hz = 0;         ///< shots of one device per second, excluding gaps; 0 when unknown
   TimeGaps gaps;              ///< steps longer than 1.8 nominal steps
-  /// Backward jumps, and jumps where the source of time changes. Packets that are repeated or
-  /// come late by less than 10 ms are none.
+  /// Backward jumps, and jumps at a change of the time source. Packets that are repeated or late by
+  /// less than 10 ms do not count.
   std::uint64_t time_resets = 0;
-  std::uint64_t non_monotonic_packets = 0;    ///< not later than the device's packet before
+  std::uint64_t non_monotonic_packets = 0;    ///< not later than the device's previous packet
   std::uint64_t pps_wraps = 0;                ///< Reader::clock_wraps(), when a reader was audited
   std::optional<ValueRange> azimuth, zenith;  ///< of valid rows, rad
   std::optional<ValueRange> range;            ///< of valid rows that have one, m
@@ -69,7 +69,7 @@ struct TimeAuditResult {
 class TimeAudit {
  public:
   TimeAudit() = default;
-  /// Of a recording whose devices it names.
+  /// Of a recording with these devices.
   explicit TimeAudit(const RecordingHeader& header);
 
   /// @throws InvalidArgument as require_columns()
@@ -79,7 +79,7 @@ class TimeAudit {
   TimeAuditResult result() const;
 
  private:
-  /// Steps that are kept until the nominal step is known.
+  /// Number of steps kept until the nominal step is known.
   static constexpr std::size_t kStepsForMedian = 4096;
 
   struct TimeStep {
@@ -88,7 +88,7 @@ class TimeAudit {
     bool source_changed;
   };
 
-  /// One device. A shot is compared with the shot before it of the same device.
+  /// One device. A shot is compared with the previous shot of the same device.
   struct DeviceState {
     std::uint64_t rows = 0;
     bool started = false, source_changed = false, late_packet = false;

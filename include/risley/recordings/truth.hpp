@@ -11,21 +11,21 @@
 
 namespace risley::recordings {
 
-/// What a simulation knows of every shot and a sensor does not report. SI units. One row per shot;
-/// a recording in a format of fixed rate can have more rows, so rows are matched by their time.
+/// True values of every shot that a sensor does not report. SI units. One row per shot; a recording
+/// in a format of fixed rate can have more rows, so rows are matched by their time.
 struct TruthColumns {
   std::vector<std::int64_t> time_ns;                  ///< as in the recording, ascending
   std::vector<std::vector<double>> rotation_angle;    ///< [prisms][rows], rad, not wrapped
   std::vector<std::vector<double>> angular_velocity;  ///< [prisms][rows], rad/s
   std::vector<double> azimuth, zenith;                ///< of the beam, rad
-  std::vector<double> range;                          ///< m, NaN where the beam hits nothing
+  std::vector<double> range;                          ///< m, NaN if the beam hits nothing
 
   std::size_t size() const { return time_ns.size(); }
   /// Number of columns of rotation angles.
   int prisms() const { return static_cast<int>(rotation_angle.size()); }
   /// @throws InvalidArgument for a negative number of prisms or more than 26
   void resize(int prisms, std::size_t rows);
-  /// Appends all rows of others; columns without rows take on their number of prisms.
+  /// Appends all rows of others; columns without rows adopt their number of prisms.
   /// @throws InvalidArgument as require_columns()
   void append(const TruthColumns& others);
 };
@@ -56,8 +56,8 @@ class TruthWriter {
 /// Reads a whole truth file. @throws FileError
 TruthColumns load_truth(const std::string& path);
 
-/// Reads the rows of some times, as many as the file has of them; memory does not grow with the
-/// length of the file. @param time_ns  ascending
+/// Reads the rows of given times, as many as the file has; memory does not grow with the length of
+/// the file. @param time_ns  ascending
 /// @throws InvalidArgument for times that descend, FileError
 TruthColumns load_truth(const std::string& path, std::span<const std::int64_t> time_ns);
 

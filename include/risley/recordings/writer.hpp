@@ -7,9 +7,15 @@
 #include <string>
 #include <vector>
 
+#include "risley/bags/lidar_topic.hpp"
 #include "risley/recordings/observations.hpp"
 
 namespace risley::recordings {
+
+/// What formats leave to choose.
+struct WriteOptions {
+  bags::LidarTopicOptions messages;  ///< of bags
+};
 
 /// Writes one recording in pieces. The file appears under its name only at close(); a writer
 /// destroyed before leaves nothing.
@@ -17,19 +23,19 @@ class Writer {
  public:
   virtual ~Writer() = default;
 
-  /// Appends rows. @throws FileError when the disk refuses, InvalidArgument for columns of
-  /// different lengths and when the format cannot hold a value (the message names the column, the
-  /// row and the allowed range)
+  /// Appends rows. @throws FileError when writing fails, InvalidArgument for columns of different
+  /// lengths and when the format cannot hold a value (the message names the column, the row and the
+  /// allowed range)
   void write(const Chunk& chunk) {
     require_columns(chunk.observations);
     append(chunk);
   }
 
-  /// Completes the file and gives it its name. @throws FileError
+  /// Completes the file and renames it to its final name. @throws FileError
   virtual void close() = 0;
 
-  /// Rows given so far that the format has no place for and that were left out: those without a
-  /// return in formats that only list points, further returns in a scan sequence.
+  /// Rows so far that the format cannot hold and that were dropped: those without a return in
+  /// formats that only list points, further returns in a scan sequence.
   std::uint64_t left_out() const { return left_out_; }
 
  protected:
@@ -39,7 +45,7 @@ class Writer {
   std::uint64_t left_out_ = 0;
 };
 
-/// A format that can be written, and how it is chosen by the end of a file name.
+/// An output format, and the file name ending that selects it.
 struct WritableFormat {
   std::string name;    ///< as RecordingHeader::format
   std::string ending;  ///< ".lvx"; the longest ending that fits wins
@@ -49,14 +55,14 @@ struct WritableFormat {
 /// All formats that can be written.
 const std::vector<WritableFormat>& writable_formats();
 
-/// Creates a recording in the format that the file name's ending asks for.
-/// @param header  of the recording the rows come from; what the format cannot hold is dropped
-/// @param format  name of a writable format that is to be written whatever the ending; empty asks
-///                the ending
+/// Creates a recording in the format given by the file name's ending.
+/// @param header of the recording the rows come from; parts that the format cannot hold are dropped
+/// @param format  name of an output format, regardless of the ending; empty uses the ending
+/// @param options  of the format
 /// @throws InvalidArgument for an unknown ending or format (the message lists the known ones),
-///         MissingTimes for a recording without times and a format that holds nothing else,
-///         FileError
+/// MissingTimes for a recording without times and a format that needs them, FileError
 std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header,
-                                         const std::string& format = {});
+                                         const std::string& format = {},
+                                         const WriteOptions& options = {});
 
 }  // namespace risley::recordings

@@ -11,8 +11,8 @@
 namespace risley::report {
 
 /// One self-contained HTML page with the maps of [B21 Fig. A1]: least and greatest Y and Z of the
-/// beam's origin over the field of view, and how far they lie apart.
-/// @param provenance  how to make it again: name and value pairs
+/// beam's origin over the field of view, and their difference.
+/// @param provenance  how to reproduce it: name and value pairs
 std::string beam_origin_page(const BeamOriginMap& map, const sensors::Sensor& sensor,
                              const jobs::Provenance& provenance);
 

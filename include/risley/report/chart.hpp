@@ -19,7 +19,7 @@
 
 namespace risley::report {
 
-/// A value that is not known: a gap in a line.
+/// An unknown value: a gap in a line.
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// How a series is drawn.
@@ -30,12 +30,12 @@ enum class SeriesKind {
   cells,  ///< rectangles about x and y, coloured by value
 };
 
-/// What the axes of a diagram are.
+/// Kind of the axes of a diagram.
 enum class ChartKind {
   plain,
   full_turn,  ///< x runs from 0 to 360 degree
   two_turns,  ///< square, both axes run from 0 to 360 degree
-  map,        ///< square, equal scales, both axes turned: a view along the beam
+  map,        ///< square, equal scales, both axes reversed: a view along the beam
   panorama,   ///< equal scales, x from 180 to -180 degree, y up: a view all around
   ground,     ///< square, equal scales: from above or from the side, x to the right, y up
   space,      ///< three axes of equal scale, can be rotated; points only
@@ -53,42 +53,36 @@ struct Series {
   std::string colour;  ///< of the page: "a", "b", "c", "d", "ink", "bad"
   SeriesKind kind = SeriesKind::points;
   std::vector<double> x, y;
-  std::vector<double> z = {};      ///< where the diagram has a third axis
-  std::vector<double> value = {};  ///< what colours points or cells; empty: all in one colour
+  std::vector<double> z = {};      ///< if the diagram has a third axis
+  std::vector<double> value = {};  ///< quantity that colours points or cells; empty: all in one
+                                   ///< colour
+  std::vector<double> sigma = {};  ///< half the length of bars along y; empty: no bars
   double cell_width = 0, cell_height = 0;
-};
-
-/// What colours the points of a diagram while the reader has chosen it.
-struct Colouring {
-  std::string label;
-  std::vector<double> value;  ///< [points of the first series]; NaN: not known, not drawn
-  std::optional<std::pair<double, double>> value_range = {};  ///< as Chart::value_range
 };
 
 /// One diagram with labelled axes.
 struct Chart {
   std::string title, x_label, y_label;
   std::vector<Series> series;
-  std::string note;  ///< under the diagram: what was thinned
+  std::string note;  ///< under the diagram: how the data were thinned
   ChartKind kind = ChartKind::plain;
+  bool dates = false;  ///< x is UTC since 1970, ms
   std::string z_label = {};
   std::string value_label = {};
   Palette palette = Palette::sequential;
-  /// Values that the ends of the colours stand for; without it the least and the greatest.
+  /// Values at the ends of the colours; without it the least and the greatest.
   std::optional<std::pair<double, double>> value_range = {};
-  /// Seconds in which the points of the first series came one after another; the page can
-  /// show how.
+  /// Duration in which the points of the first series were fired one after another, s; the page can
+  /// animate it.
   std::optional<double> grows_for = {};
-  /// Choices for the colours of the first series, instead of its values; the first is shown first.
-  std::optional<std::vector<Colouring>> colourings = {};
 };
 
 /// A diagram over azimuth and zenith in degrees as one looks out of the sensor: a map about X or,
 /// of a sensor that scans all around, a panorama of azimuth and elevation.
 Chart view_of_directions(Chart chart, bool all_around);
 
-/// Diagrams as pages and report.json have them; what is not finite is null. Columns keep seven
-/// significant digits, and more where numbers differ little beside their size, as the speeds of a
+/// Diagrams in the form for pages and report.json; non-finite values are null. Columns keep seven
+/// significant digits, and more if numbers differ little relative to their size, as the speeds of a
 /// steady rotor do.
 json::Json chart_json(const Chart& chart);
 /// The same of several.
@@ -96,27 +90,29 @@ json::Json charts_json(const std::vector<Chart>& charts);
 
 /// A diagram of chart_json() as a figure element, which page.js fills.
 std::string figure_html(const json::Json& chart, std::size_t number);
-/// The data of figure_html()'s diagram for page.js: JSON that may stand inside a script element.
+/// JSON that is safe inside a script element.
+std::string json_in_script(const json::Json& json);
+/// The data of figure_html()'s diagram for page.js.
 std::string script_text(json::Json chart, std::size_t number);
 
 /// Value of a row.
 using Column = std::function<double(std::size_t)>;
 
-/// Every row that a thinning to a largest number of points keeps: all, or each n-th.
+/// The rows kept when thinning to a largest number of points: all, or each n-th.
 std::vector<std::size_t> every_nth(std::size_t rows, std::size_t most);
 /// The same in words.
 std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view what = "shots");
 
-/// A line that keeps peaks: of every bin of rows the smallest and the largest value, in the order
-/// they stand; short columns stay as they are.
+/// A line that keeps peaks: of every bin of rows the smallest and the largest value, in their
+/// order; short columns stay unchanged.
 Series peak_line(std::string label, std::string colour, std::size_t rows, const Column& x,
                  const Column& y);
 /// Which rows peak_line() draws, as a sentence.
 std::string peak_line_note(std::size_t rows);
 
 /// Counts per bin within 4.5 standard deviations of the mean (9 to 61 bins, by the cube root of the
-/// number of values), and the normal curve of the same mean, deviation and count. Values beyond
-/// stand in the outermost bins.
+/// number of values), and the normal curve of the same mean, deviation and count. Values beyond are
+/// counted in the outermost bins.
 std::vector<Series> histogram(const std::string& label, const std::string& colour,
                               std::span<const double> values, std::span<const unsigned char> skip,
                               const estimation::Moments& moments, double scale);

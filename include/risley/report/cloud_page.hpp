@@ -10,14 +10,14 @@
 
 namespace risley::report {
 
-/// Points that a page of a cloud draws at most: some megabytes, which a telephone still turns.
-inline constexpr std::size_t kCloudPagePoints = 40'000;
+/// Most points on a page of a cloud: some 5 bytes of the page each.
+inline constexpr std::size_t kCloudPagePoints = 6'000'000;
 
-/// One self-contained HTML page of a point cloud: the points in three dimensions, how sure they are
-/// and on what it depends, and what is not in the cloud.
+/// One self-contained HTML page of a point cloud: a viewer of the points, their uncertainty and its
+/// causes, and the shots without a point.
 /// @param cloud       with a sample of its points
-/// @param recording   what it was made of
-/// @param provenance  how to make it again: name and value pairs
+/// @param recording  its source
+/// @param provenance  how to reproduce it: name and value pairs
 /// @throws InvalidArgument for a cloud without a sample
 std::string cloud_page(const cloud::CloudSummary& cloud, const std::string& recording,
                        const jobs::Provenance& provenance);

@@ -16,9 +16,9 @@ struct ComparedResult {
   const Report& report;
 };
 
-/// One self-contained HTML page of two results side by side: their verdicts, by how much their
-/// beams differ, and every parameter with its difference.
-/// @param provenance  how to make it again: name and value pairs
+/// One self-contained HTML page of two results side by side: their verdicts, the difference of
+/// their beams, and every parameter with its difference.
+/// @param provenance  how to reproduce it: name and value pairs
 std::string comparison_page(const ComparedResult& a, const ComparedResult& b,
                             const jobs::ResultComparison& comparison,
                             const jobs::Provenance& provenance);

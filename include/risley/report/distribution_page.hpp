@@ -9,10 +9,10 @@
 
 namespace risley::report {
 
-/// One self-contained HTML page of how points lie on the ground: densities across every strip and
-/// on the map, gaps, coverage.
-/// @param flight      what the points are of, text
-/// @param provenance  how to make it again: name and value pairs
+/// One self-contained HTML page on the distribution of points on the ground: densities across every
+/// strip and on the map, gaps, coverage.
+/// @param flight  description of the points' flight, text
+/// @param provenance  how to reproduce it: name and value pairs
 std::string distribution_page(const cloud::PointDistributionSummary& distribution,
                               const std::string& flight, const jobs::Provenance& provenance);
 

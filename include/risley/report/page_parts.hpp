@@ -13,6 +13,7 @@
 
 namespace risley::report {
 
+class PointViewer;
 class View;
 
 /// Errors beyond this many sigmas are highlighted.
@@ -38,38 +39,38 @@ struct Verdict {
   bool converged = false;
   std::string reason;                 ///< why not converged
   std::string code, words, to_do;     ///< as results have them
-  std::vector<std::string> warnings;  ///< any makes a converged result one to use with care
+  std::vector<std::string> warnings;  ///< any of them makes a converged result one to use with care
   std::string facts;
-  std::string mend;  ///< what else to do when it did not converge; empty: nothing
-  /// A reason for care that needs more than a line: paragraphs, or nothing.
+  std::string mend;  ///< further advice if it did not converge; empty: none
+  /// A warning that needs more than a line: paragraphs, or nothing.
   std::string care_html;
 };
-/// The box at the top of a page that says whether the result can be used, and why not.
+/// The box at the top of a page that states whether the result can be used, and why not.
 std::string verdict_html(const Verdict& verdict);
 
-/// What stands before a row and above a column of correlations.
+/// Labels of a row and a column of correlations.
 struct CorrelationHead {
   std::string row_html, symbol_html;
 };
 
 /// Headings of sections that several pages have.
 inline constexpr const char* kCorrelations = "Correlations of the parameters";
-/// Where a page says how regular the times of its recordings are.
+/// Section on the regularity of the recordings' times.
 inline constexpr const char* kTimes = "Times of the recording";
-/// Where a page gives the command that made it, and its inputs.
+/// Section with the command that made the page, and its inputs.
 inline constexpr const char* kHowToRepeat = "How to make it again";
 
 /// Correlations as a table in colours; nothing when there are none.
 /// @param matrix  [heads, heads]
 std::string correlation_html(const std::vector<CorrelationHead>& heads, const View& matrix);
 
-/// How sound the times of recordings are, as a table.
+/// Quality of the times of recordings, as a table.
 std::string time_audit_html(const View& recordings);
 
-/// How to make a result again: name and value pairs.
+/// How to reproduce a result: name and value pairs.
 std::string provenance_html(const jobs::Provenance& provenance);
 
-/// The diagrams of one page in one numbering, and the data that they draw.
+/// The diagrams of one page with common numbering, and their data.
 class Figures {
  public:
   /// The figure element of a diagram, whose data are kept.
@@ -87,34 +88,35 @@ class Figures {
   bool has_space_ = false;
 };
 
-/// Diagrams side by side, as far as the page is wide.
-/// @param first  how many stand elsewhere already
+/// Diagrams side by side, as far as the page's width allows.
+/// @param first  number of diagrams already placed elsewhere
 std::string charts_html(const std::vector<Chart>& charts, Figures& figures, std::size_t first = 0);
 /// The same of diagrams in a report.
 std::string charts_html(const json::Json& charts, Figures& figures, std::size_t first = 0);
 
-/// A number that a page says before its tables.
+/// A key number shown before the tables of a page.
 struct KeyNumber {
   std::string text;   ///< with its unit, "0.4034° ± 0.0007°"
   std::string words;  ///< what it is
 };
 
-/// What stands under the verdict: a few numbers beside the first of some diagrams, if there is one.
+/// Content below the verdict: a few numbers beside the first of some diagrams, if there is one.
 std::string overview_html(const std::vector<KeyNumber>& numbers, const std::vector<Chart>& charts,
                           Figures& figures);
 /// The same of diagrams in a report.
 std::string overview_html(const std::vector<KeyNumber>& numbers, const json::Json& charts,
                           Figures& figures);
 
-/// The sections of a page under their headings. Each unfolds, and a table of contents leads to it.
+/// The sections of a page under their headings. Each can be expanded, and a table of contents links
+/// to it.
 class Sections {
  public:
-  /// Whether a section is open when a page is.
+  /// Whether a section is initially open.
   enum class Shown { folded, unfolded };
-  /// @param html  empty: there is no such section
+  /// @param html  empty: the section is omitted
   void add(const std::string& title, const std::string& html, Shown shown = Shown::folded);
   /// @param id      for links to it
-  /// @param remark  what the contents say beside the title
+  /// @param remark  text of the contents beside the title
   void add(const std::string& title, const std::string& html, const std::string& id,
            const std::string& remark);
   /// Contents and sections.
@@ -129,9 +131,10 @@ class Sections {
 
 /// One self-contained page (Apache ECharts included, no network).
 /// @param lead       one sentence under the title, text
-/// @param head_html  what is read first: verdict_html(), overview_html()
+/// @param head_html  top of the page: verdict_html(), overview_html()
+/// @param viewer     fills the window, with the rest below it; none: nullptr
 std::string page_html(const std::string& title, const std::string& lead,
                       const std::string& head_html, const Sections& sections,
-                      const Figures& figures);
+                      const Figures& figures, const PointViewer* viewer = nullptr);
 
 }  // namespace risley::report

@@ -9,9 +9,9 @@
 
 namespace risley::report {
 
-/// One self-contained HTML page of a scan pattern: the rosette as it grows, how it fills the field
-/// of view, and the prisms that make it.
-/// @param provenance  how to make it again: name and value pairs
+/// One self-contained HTML page of a scan pattern: the rosette as it grows, its coverage of the
+/// field of view, and its prisms.
+/// @param provenance  how to reproduce it: name and value pairs
 std::string pattern_page(const jobs::PatternDetails& details, const jobs::Provenance& provenance);
 
 }  // namespace risley::report

@@ -13,33 +13,32 @@
 
 namespace risley::report {
 
-/// What the page of a result says and draws: json::of() the result, its diagrams (`charts`), what
-/// only the page says (`page`) and how to make it again (`provenance`), as
-/// docs/schemas/report_file.json describes them. Diagrams are thinned and binned, and say so.
+/// Contents of a result's page: json::of() the result, its diagrams (`charts`), data for the page
+/// only (`page`) and its provenance (`provenance`), as docs/schemas/report_file.json describes
+/// them. Diagrams are thinned and binned, and state it.
 struct Report {
   json::Json json;
   std::string path = "report.json";  ///< for errors
 };
 
-/// Of an estimate. @throws InvalidArgument when it was not asked for details
+/// Of an estimate. @throws InvalidArgument when details were not requested
 Report report_of(const jobs::EstimatedRecording& found);
 /// Of a calibration on walls. @throws InvalidArgument as above
 Report report_of(const jobs::CalibratedRecordings& found);
 /// Of a calibration in flight. @throws InvalidArgument as above
 Report report_of(const jobs::CalibratedFlight& found);
 
-/// The text of report.json; numbers that are not finite are null, and diagrams keep the digits that
-/// can be seen.
+/// The text of report.json; non-finite numbers are null, and diagrams keep the visible digits.
 std::string report_text(const Report& report);
 
-/// @throws FileError naming the byte where the text breaks off, or the place that is missing or
-///         wrong; for files of versions that no page is drawn from any more
+/// @throws FileError naming the byte where the text ends prematurely, or the place that is missing
+/// or wrong; for files of versions that are no longer supported
 Report read_report(const std::string& path);
 /// The same of a text. @param path  how errors name it
 Report parse_report(const std::string& text, const std::string& path);
 
-/// One self-contained HTML page (Apache ECharts included, no network), the verdict first. What is
-/// not finite shows as a dash. @throws FileError as parse_report()
+/// One self-contained HTML page (Apache ECharts included, no network), the verdict first.
+/// Non-finite numbers appear as a dash. @throws FileError as parse_report()
 std::string report_page(const Report& report);
 
 /// "estimate" or "calibrate": the verb that made it.

@@ -9,9 +9,9 @@
 
 namespace risley::report {
 
-/// One self-contained HTML page of units over time and against each other: whether any changed,
-/// which pairs say so, which units are not like the others, and every parameter over the results.
-/// @param provenance  how to make it again: name and value pairs
+/// One self-contained HTML page of units over time and against each other: whether any changed, the
+/// pairs that show it, the units that differ from the others, and every parameter over the results.
+/// @param provenance  how to reproduce it: name and value pairs
 std::string units_page(const jobs::ComparedUnits& compared, const jobs::Provenance& provenance);
 
 }  // namespace risley::report

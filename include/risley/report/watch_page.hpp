@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The page that shows a recording while it runs. It gets its numbers as events from /events, which
-// are json::of(jobs::LiveRecording).
+// The page of a running recording. It gets its numbers as events from /events, which are
+// json::of(jobs::LiveRecording).
 #pragma once
 
 #include <string_view>

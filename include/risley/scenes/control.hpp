@@ -10,7 +10,7 @@
 
 namespace risley::scenes {
 
-/// A circle of ground that somebody has measured: a point of it, and perhaps how it leans.
+/// A measured circle of ground: a point of it, and possibly its inclination.
 struct KnownGround {
   std::string name;
   Vector3<double> place;  ///< on it, m
@@ -20,15 +20,15 @@ struct KnownGround {
   double normal_sigma = 0;                ///< of each of its two tilts, 1 sigma, rad
 };
 
-/// Ground that is known on a map, or in the frame of a trajectory that has none.
+/// Known ground on a map, or in the frame of a trajectory without a map.
 struct Control {
   std::string crs;    ///< of the places, as cloud::MapProjection; empty: the trajectory's frame
   std::string datum;  ///< of the trajectory's positions; empty: WGS 84
   std::vector<KnownGround> ground;
 };
 
-/// @throws InvalidArgument for numbers that are not finite, sigmas and radii that are not above 0,
-///         normals that are no unit vectors
+/// @throws InvalidArgument for non-finite numbers, sigmas and radii not above 0, normals that are
+/// not unit vectors
 void require_known_ground(const KnownGround& ground);
 
 /// Reads risley_control: 1, crs, datum (optional), ground: [{name, place_m, sigma_m, radius_m,

@@ -9,10 +9,10 @@
 
 namespace risley::scenes {
 
-/// Reflectivity of a surface that states none: what data sheets mean by a bright target.
+/// Reflectivity of a surface that states none: a bright target in the sense of data sheets.
 inline constexpr double kMattReflectivity = 0.8;
 
-/// A piece of furniture or a pillar: a box that stands upright.
+/// A piece of furniture or a pillar: an upright box.
 struct SceneBox {
   std::string name;
   Vector3<double> center;                     ///< m

@@ -31,7 +31,7 @@ inline constexpr std::size_t kMostPatches = 64;
 
 /// A pane mirrors: it gives a return where the angle of incidence is at most this, rad. Assumed.
 inline constexpr double kGlassReturnAngle = 0.01;
-/// Part of the light that is left on the way to a target behind a pane and back. Assumed: 8 % are
+/// Share of the light that remains on the way to a target behind a pane and back. Assumed: 8 % are
 /// lost at the two faces of a pane, on each way.
 inline constexpr double kGlassTransmission = 0.85;
 
@@ -47,8 +47,8 @@ struct ScenePlane {
   std::optional<std::array<double, 2>> extent;
   std::array<double, 2> center{0.0, 0.0};   ///< middle of the extent from the foot, same axes, m
   std::optional<double> normal_sigma;       ///< how well the normal is known, rad
-  double reflectivity = kMattReflectivity;  ///< (0, 1]
-  /// Whether rays pass through it, but for those that it mirrors back to the sensor.
+  double reflectivity = kMattReflectivity;  ///< (0, 1] Whether rays pass through it, except those
+                                            ///< that it mirrors back to the sensor.
   bool glass = false;
   WallShape shape;             ///< its deviation from the plane without steps
   std::vector<Patch> patches;  ///< steps and materials; the last one counts where they overlap
@@ -65,16 +65,16 @@ struct Station {
   Vector3<double> scene_from_sensor(const Vector3<double>& direction) const;
 };
 
-/// What stands around: planes and furniture around the origin, or a terrain on a map, or both; and
-/// the places where the sensor stands.
+/// Surroundings of a sensor: planes and furniture around the origin, or a terrain on a map, or
+/// both; and the stations of the sensor.
 struct Scene {
   std::vector<ScenePlane> planes;
   std::vector<Station> stations;
   std::optional<Terrain> terrain = {};
   std::vector<SceneBox> boxes = {};
   std::vector<Person> people = {};
-  /// Whether simulated beams are as wide as the sensor says, so that shots on edges meet several
-  /// surfaces, and not lines.
+  /// Whether simulated beams are as wide as stated for the sensor, so that shots on edges meet
+  /// several surfaces, or lines.
   bool footprint = false;
   /// Whether dark and tilted surfaces give no return at ranges at which a bright one does.
   bool limit_by_reflectivity = false;
@@ -87,7 +87,7 @@ struct Scene {
   /// boxes and people.
   std::size_t surfaces() const;
   /// Name of a plane, of a surface of the terrain, of a box or of a person.
-  /// @throws InvalidArgument for a surface that there is not
+  /// @throws InvalidArgument for a surface that does not exist
   std::string surface_name(std::size_t surface) const;
 };
 
@@ -95,10 +95,10 @@ struct Scene {
 /// with relief within kFarthestGround. Rays pass through glass unless it mirrors them back.
 /// @param origin       scene frame, m
 /// @param direction    unit vector, scene frame
-/// @param penetration  how much of its way through a bush the ray gets, (0, 1)
-/// @param time         when, for people who walk, s
-/// @throws InvalidArgument for an origin or a time that is not finite, a direction that is no unit
-///         vector or a penetration that is not between 0 and 1
+/// @param penetration  share of a bush that the ray gets through, (0, 1)
+/// @param time         of the shot, at which walking people are placed, s
+/// @throws InvalidArgument for an origin or a time that is not finite, a direction that is not a
+/// unit vector or a penetration that is not between 0 and 1
 std::optional<Hit> nearest_hit(const Scene& scene, const Vector3<double>& origin,
                                const Vector3<double>& direction, double penetration = 0.5,
                                double time = 0.0);

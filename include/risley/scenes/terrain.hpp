@@ -27,7 +27,7 @@ struct Hit {
   double reflectivity = kMattReflectivity;  ///< seen through all panes before it, (0, 1]
 };
 
-/// Where a map lies on the Earth: geodetic latitude and longitude, rad, and height above the
+/// Location of a map on the Earth: geodetic latitude and longitude, rad, and height above the
 /// ellipsoid, m.
 struct MapOrigin {
   double latitude = 0, longitude = 0, height = 0;
@@ -44,7 +44,7 @@ struct Waves {
   double amplitude = 0, wavelength = 0, heading = 0;
 };
 
-/// The ground: a height, m, and what is added to it.
+/// The ground: a height, m, and additions to it.
 struct Ground {
   double height = 0;
   std::vector<Relief> relief;
@@ -54,8 +54,8 @@ struct Ground {
   double height_at(double x, double y) const;
 };
 
-/// Two rectangular faces that meet at a ridge. Heights of everything that stands on the ground are
-/// above the ground at its centre.
+/// Two rectangular faces that meet at a ridge. Heights of all objects are above the ground at their
+/// centre.
 struct GableRoof {
   std::string name;
   std::array<double, 2> center{0.0, 0.0};  ///< x, y below the middle of the ridge, m
@@ -76,14 +76,14 @@ struct Building {
   double heading = 0;                      ///< rad, clockwise from north
 };
 
-/// An upright ellipsoid on the ground. A ray ends somewhere inside it, not at its hull.
+/// An upright ellipsoid on the ground. A ray ends somewhere inside it, not at its surface.
 struct Bush {
   std::string name;
   std::array<double, 2> center{0.0, 0.0};  ///< x, y, m
   double radius = 0, height = 0;           ///< m
 };
 
-/// What a terrain consists of, on a map: x east, y north, z up, m.
+/// Contents of a terrain, on a map: x east, y north, z up, m.
 struct TerrainParts {
   std::optional<MapOrigin> origin;
   std::optional<Ground> ground;  ///< without it there is nothing below, and heights are above z = 0
@@ -107,7 +107,7 @@ struct VillageSettings {
 
 /// Adds a village's roofs, "village roof 1", ..., and bushes, "village bush 1", ... The same
 /// settings give the same village.
-/// @throws InvalidArgument for settings that make no sense, and where the roofs do not find room
+/// @throws InvalidArgument for invalid settings, and if the roofs do not fit
 void add_village(const VillageSettings& settings, TerrainParts& parts);
 
 /// A flat convex polygon, seen from both sides.
@@ -117,33 +117,33 @@ struct Face {
   std::vector<Vector3<double>> corners;  ///< in order, m
 };
 
-/// Ground with houses and bushes, in which rays are followed fast: faces and bushes are looked up
-/// in a grid over x and y, and ground with relief is approached by steps that cannot jump over it.
-/// Rays from above and from below end. docs/theory/terrain.md
+/// Ground with houses and bushes, in which rays are traced fast: faces and bushes are looked up in
+/// a grid over x and y, and ground with relief is approached by steps that cannot jump over it.
+/// Rays from above and from below terminate. docs/theory/terrain.md
 class Terrain {
  public:
-  /// @throws InvalidArgument for parts that make no sense or terrain without anything
+  /// @throws InvalidArgument for invalid parts or an empty terrain
   explicit Terrain(TerrainParts parts);
 
-  /// The parts that it was made of.
+  /// The parts from which it was made.
   const TerrainParts& parts() const { return parts_; }
   /// All roofs, tops and walls: surfaces 0, 1, ... The bushes follow them, then the ground.
   const std::vector<Face>& faces() const { return faces_; }
-  /// Number of surfaces: those of faces(), the bushes and, where there is one, the ground.
+  /// Number of surfaces: those of faces(), the bushes and, if there is one, the ground.
   std::size_t surfaces() const;
-  /// "barn, right face", "ground". @throws InvalidArgument for a surface that there is not
+  /// "barn, right face", "ground". @throws InvalidArgument for a surface that does not exist
   std::string surface_name(std::size_t surface) const;
 
   /// The nearest surface in front of a ray, or nothing. Arguments are not checked.
   /// @param origin       m
   /// @param direction    unit vector
-  /// @param farthest     of surfaces that are of interest, m
-  /// @param penetration  how much of its way through a bush a ray gets, (0, 1)
+  /// @param farthest  distance of interest, m
+  /// @param penetration  share of a bush that a ray gets through, (0, 1)
   std::optional<Hit> nearest_hit(const Vector3<double>& origin, const Vector3<double>& direction,
                                  double farthest, double penetration) const;
 
  private:
-  /// A face as rays meet it: the plane, and planes through its edges, positive inside.
+  /// A face for ray tracing: the plane, and planes through its edges, positive inside.
   struct Slab {
     Vector3<double> normal;
     double offset = 0;

@@ -23,24 +23,24 @@ struct WallWaves {
 /// Number of sinusoids of one random field.
 inline constexpr int kSinusoidsOfWaves = 16;
 
-/// How far a wall is from its plane at one place.
+/// Deviation of a wall from its plane at one place.
 struct Deviation {
   double height = 0;            ///< along the plane's normal, m
   double horizontal_slope = 0;  ///< d height / d place along the plane's horizontal axis, 1
   double vertical_slope = 0;    ///< the same along its vertical axis, 1
 };
 
-/// How a wall deviates from its plane without steps: waves and a bow.
+/// Deviation of a wall from its plane without steps: waves and a bow.
 class WallShape {
  public:
   WallShape() = default;  ///< flat
 
   /// @param bow     height in the middle of the extent; one half wave of a cosine along both axes,
   ///                0 at all four edges, m; positive away from the scene's origin
-  /// @param extent  width and height, m; needed for a bow alone
+  /// @param extent  width and height, m; needed only for a bow
   /// @param center  of the extent from the plane's foot, m
-  /// @throws InvalidArgument for numbers that are not finite, half waves that are not above 0, a
-  ///         negative peak to valley and a bow without extent
+  /// @throws InvalidArgument for non-finite numbers, half waves not above 0, a negative peak to
+  /// valley and a bow without extent
   WallShape(std::span<const WallWaves> waves, double bow,
             const std::optional<std::array<double, 2>>& extent,
             const std::array<double, 2>& center);
@@ -50,8 +50,8 @@ class WallShape {
   Deviation at(double horizontal, double vertical) const;
 
   double highest() const { return highest_; }      ///< no |height| is above this, m
-  double steepest() const { return steepest_; }    ///< no slope in any direction is above this, 1
-  double strongest_bend() const { return bend_; }  ///< no second derivative is above this, 1/m
+  double steepest() const { return steepest_; }    ///< upper bound of the slope in any direction, 1
+  double strongest_bend() const { return bend_; }  ///< upper bound of the second derivatives, 1/m
 
  private:
   using Each = std::array<double, kSinusoidsOfWaves>;

@@ -8,15 +8,15 @@
 
 namespace risley::sensors {
 
-/// Along which axes the horizontal and the vertical divergence of a beam spread it. Unit vectors,
-/// perpendicular to the beam and to each other, in the frame of the beam's direction.
+/// Axes of the horizontal and the vertical divergence of a beam. Unit vectors, perpendicular to the
+/// beam and to each other, in the frame of the beam's direction.
 struct FootprintAxes {
   Vector3<double> horizontal;  ///< perpendicular to the sensor's Z, to the left
   Vector3<double> vertical;    ///< upwards for a beam along X
 };
 
-/// Prisms deflect a beam and hardly turn it about itself, so that its footprint lies as the emitter
-/// does. A beam along Z has its horizontal axis along Y.
+/// Prisms deflect a beam and hardly rotate it about itself, so that its footprint keeps the
+/// emitter's orientation. A beam along Z has its horizontal axis along Y.
 /// @param direction  unit vector, sensor frame
 inline FootprintAxes footprint_axes(const Vector3<double>& direction) {
   const double level = std::hypot(direction.x, direction.y);

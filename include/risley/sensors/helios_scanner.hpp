@@ -13,15 +13,15 @@
 
 namespace risley::sensors {
 
-/// Prisms that a scanner of HELIOS++ has at most.
+/// Most prisms of a HELIOS++ scanner.
 inline constexpr int kHeliosPrisms = 3;
 
-/// A sensor as the Risley scanner of HELIOS++ can have it, and what that costs. HELIOS++ has the
-/// axes x right, y forward, z up. Its prisms all have the thin edge up at time 0 and turn at
-/// constant speed, with the thin edge from up to the right where the speed is positive; a positive
-/// wedge angle is that of the face which the beam meets first, a negative one that of the second.
-/// Time advances by one pulse before it is used, so that pulse p, counted from 0, is at (p + 1) /
-/// pulse_frequency. Every emitter fires at every pulse. Then the whole scanner is turned.
+/// A sensor as a Risley scanner of HELIOS++, and the resulting losses. HELIOS++ has the axes x
+/// right, y forward, z up. Its prisms all have the thin edge up at time 0 and turn at constant
+/// speed, with the thin edge from up to the right if the speed is positive; a positive wedge angle
+/// is that of the face which the beam meets first, a negative one that of the second. Time advances
+/// by one pulse before it is used, so that pulse p, counted from 0, is at (p + 1) /
+/// pulse_frequency. Every emitter fires at every pulse. Then the whole scanner is rotated.
 struct HeliosScanner {
   std::vector<double> rotor_frequency;   ///< [prisms], signed, Hz
   std::vector<double> angle;             ///< [prisms], signed, rad
@@ -30,7 +30,7 @@ struct HeliosScanner {
   std::vector<Vector3<double>> incident_beam;  ///< [emitters], unit vectors, axes of HELIOS++
   std::array<double, 3> turn{};  ///< about y, then x, then z of fixed axes, right-handed, rad
   long pulse_frequency = 0;      ///< of each emitter, Hz
-  /// What a shot of the pattern at time t is in HELIOS++, is there at t + time_lag, s.
+  /// A shot of the pattern at time t is at t + time_lag in HELIOS++, s.
   double time_lag = 0;
 
   std::vector<std::string> not_carried;  ///< one sentence each; empty: the pattern itself
@@ -38,13 +38,12 @@ struct HeliosScanner {
   double rms = 0, worst = 0;             ///< angle to the sensor's own pattern, rad
 };
 
-/// The HELIOS++ scanner of a sensor: the rotors' start becomes a turn about the beam and a time
-/// lag as far as it can, and where prisms or bearings are tilted the scanner is turned as fits the
-/// pattern best.
-/// @param rows  of the pattern are compared, at most a million
+/// The HELIOS++ scanner of a sensor: the rotors' start becomes a rotation about the beam and a time
+/// lag as far as possible, and if prisms or bearings are tilted the scanner is rotated for the best
+/// fit to the pattern.
+/// @param rows  of the pattern to compare, at most a million
 /// @throws InvalidArgument as scan_pattern(), for more than kHeliosPrisms prisms and for every
-/// other
-///         than 1; Cancelled
+/// other than 1; Cancelled
 HeliosScanner helios_scanner(const Sensor& sensor, std::uint64_t rows,
                              const ScanPatternOptions& options = {}, const Progress& progress = {});
 

@@ -16,7 +16,7 @@ struct NamedValue {
   std::string unit;
 };
 
-/// Every parameter of a sensor; a name shared by all prisms only where the prisms agree.
+/// Every parameter of a sensor; a name shared by all prisms only if the prisms agree.
 std::vector<NamedValue> named_values(const Sensor& sensor);
 
 }  // namespace risley::sensors

@@ -16,16 +16,16 @@ struct CoverageOptions {
   std::vector<double> after = {0.1, 0.2, 0.5, 1.0};  ///< integration times, s, rising
   double cell = radians_from_degrees(0.5);           ///< edge of a cell, rad
   double ring = radians_from_degrees(1.0);           ///< width of a ring about the axis, rad
-  /// The field of view is what a scan of so many seconds reaches, if not more than ten million
-  /// shots, and not less than the last of `after`.
+  /// The field of view covered by a scan of this many seconds, if not more than ten million shots,
+  /// and not less than the last of `after`.
   double field_after = 30.0;
 };
 
-/// What a scan has reached after a time.
+/// Coverage of a scan after a time.
 struct CoverageAfter {
   double time = 0;           ///< s
   std::uint64_t shots = 0;   ///< that got through the prisms
-  double covered = 0;        ///< share of the field of view whose cells hold a shot, [0, 1]
+  double covered = 0;        ///< share of the field of view's cells with a shot, [0, 1]
   double mean_density = 0;   ///< shots per steradian of the field of view
   double least_density = 0;  ///< of the cell with the fewest, shots per steradian
   double greatest_density = 0;
@@ -36,20 +36,20 @@ struct CoverageAfter {
   double gap_azimuth = 0, gap_zenith = 0;  ///< of its centre, rad
   std::vector<std::uint32_t> cell_shots;   ///< [cells]
   std::vector<double> ring_density;        ///< [rings], shots per steradian of field of view; NaN
-                                           ///< where a ring has none
+                                           ///< if a ring has none
 };
 
 /// Shares of the field of view for which time_to_cover() is given, percent.
 inline constexpr int kToldShares[] = {50, 90, 99};
 
-/// How a scan fills the field of view. Cells are squares of an equal-area map of Lambert and have
-/// the same solid angle: of the azimuthal map about X, which near it is in radians from it, or, of
-/// a sensor that scans all around its Z, of the cylindrical map about Z, true to scale at an
+/// Coverage of the field of view by a scan. Cells are squares of an equal-area map of Lambert and
+/// have the same solid angle: of the azimuthal map about X, which near it is in radians from it,
+/// or, of a sensor that scans all around its Z, of the cylindrical map about Z, true to scale at an
 /// elevation of about 30 degrees. The axis is X or Z accordingly.
 struct PatternCoverage {
   bool all_around = false;    ///< about Z
   double cell = 0, ring = 0;  ///< rad
-  /// The field of view is every cell that a scan of so many seconds reaches.
+  /// The field of view is every cell covered by a scan of this many seconds.
   double field_after = 0;
   double field_solid_angle = 0;         ///< sr
   double field_half_angle = 0;          ///< of the cone about the axis that holds every shot, rad
@@ -58,11 +58,11 @@ struct PatternCoverage {
   std::vector<double> azimuth, zenith;  ///< [cells], the same as directions, rad
   std::vector<CoverageAfter> after;     ///< [options.after]
 
-  /// [cells], when the first shot came, s; infinite where none did within the last of `after`
+  /// [cells], time of the first shot, s; infinite if none came within the last of `after`
   std::vector<double> first_shot;
 
   std::size_t cells() const { return left.size(); }  ///< cells of the map
-  /// After which time that share of the field of view holds a shot, s; infinite where the last of
+  /// Time after which that share of the field of view has a shot, s; infinite if the last of
   /// `after` is too short. @throws InvalidArgument for a share outside of 0 to 1
   double time_to_cover(double share) const;
 };

@@ -11,19 +11,18 @@
 
 namespace risley::sensors {
 
-/// The size of that name, one that all prisms share or a prism's own; empty for other names.
-/// @throws InvalidArgument for a number of prisms that no train has
+/// The size of that name, common to all prisms or a prism's own; empty for other names.
+/// @throws InvalidArgument for an unsupported number of prisms
 std::optional<PrismSize> find_prism_size(std::string_view name, int prisms);
 
-/// Value of a size, m; of one that all share, the first prism's. 0 where the sensor has none.
+/// Value of a size, m; of a common one, the first prism's. 0 if the sensor has none.
 double prism_size(const Sensor& sensor, const PrismSize& size);
 
-/// Standard deviation of a size by what is known of it, m, what was held included; 0 where nothing
-/// is.
+/// Standard deviation of a size, m, including the uncertainty of held values; 0 if not stated.
 double prism_size_sigma(const Sensor& sensor, const PrismSize& size);
 
-/// The sizes whose errors a sensor states: those in its covariance, and of the others those with
-/// a sigma. A covariance that names sizes of a kind, thickness or spacing, says all of this kind.
+/// The sizes with stated errors: those in a sensor's covariance, and of the others those with a
+/// sigma. A covariance that names sizes of a kind, thickness or spacing, covers all of this kind.
 std::vector<PrismSize> uncertain_prism_sizes(const Sensor& sensor);
 
 }  // namespace risley::sensors

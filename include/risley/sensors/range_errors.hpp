@@ -8,8 +8,8 @@
 
 namespace risley::sensors {
 
-/// Systematic errors of ranges beside the constant one, which is Sensor::range_offset: reported
-/// less true range is
+/// Systematic errors of ranges in addition to the constant one, which is Sensor::range_offset:
+/// reported less true range is
 ///
 ///   range_offset + near exp((1 m - range) / kNearDecay) + incidence footprint_depth
 ///     + per_decade log10(kWalkIntensity / intensity) + emitter[beam]
@@ -18,7 +18,7 @@ namespace risley::sensors {
 struct RangeErrors {
   double near = 0;              ///< at 1 m, m; falls by e with every kNearDecay
   double incidence = 0;         ///< part of the footprint's depth, see footprint_depth(), 1
-  double per_decade = 0;        ///< what a tenth of the intensity adds, m
+  double per_decade = 0;        ///< increase per tenth of the intensity, m
   std::vector<double> emitter;  ///< m [emitters]; empty: all 0
 
   friend bool operator==(const RangeErrors&, const RangeErrors&) = default;

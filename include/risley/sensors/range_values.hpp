@@ -11,10 +11,10 @@
 
 namespace risley::sensors {
 
-/// A number of what a sensor adds to true ranges, see RangeErrors.
+/// A number in a sensor's range error model, see RangeErrors.
 struct RangeValue {
   std::string name;  ///< "range_offset_m", "range_near_m", "range_incidence", "range_emitter_1_m"
-  std::string unit;  ///< "m" or "1": files hold the value as it is
+  std::string unit;  ///< "m" or "1": files hold the value unchanged
   double lower = 0, upper = 0;  ///< allowed
 };
 
@@ -25,7 +25,7 @@ std::vector<RangeValue> range_values(int emitters);
 /// Whether it is the name of a range value of some sensor.
 bool is_range_value(std::string_view name);
 
-/// What a sensor adds to one range, m, see RangeErrors.
+/// Error that a sensor adds to one range, m, see RangeErrors.
 /// @param range            true, m
 /// @param footprint_depth  see footprint_depth(), m
 /// @param intensity        as reported
@@ -35,7 +35,7 @@ double range_error(const Sensor& sensor, double range, double footprint_depth, d
 
 /// @throws InvalidArgument for a name that the sensor does not have
 double get_range_value(const Sensor& sensor, std::string_view name);
-/// @throws InvalidArgument for such a name and for a value out of bounds
+/// @throws InvalidArgument for an unknown name and for a value out of bounds
 void set_range_value(Sensor& sensor, std::string_view name, double value);
 
 }  // namespace risley::sensors

@@ -9,7 +9,7 @@
 
 namespace risley::simulation {
 
-/// What a sensor adds to the true numbers before it reports them.
+/// Errors that a sensor adds to the true numbers before it reports them.
 struct NoiseSettings {
   double angle = 0;             ///< 1 sigma, white, of azimuth and of zenith, rad     [B21 3.2]
   double range = 0;             ///< 1 sigma, white, m                                 [B21 3.3]
@@ -19,7 +19,7 @@ struct NoiseSettings {
 
 /// Noise and rounding of a recording. As in the paper the angular noise is added to the two angles
 /// themselves, so near the pole it shrinks across the beam by the sine of the zenith angle. The
-/// noise of a shot depends on the seed and the shot's number alone.
+/// noise of a shot depends only on the seed and the shot's number.
 class ObservationNoise {
  public:
   /// @throws InvalidArgument for a negative or infinite setting

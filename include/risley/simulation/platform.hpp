@@ -16,8 +16,8 @@
 
 namespace risley::simulation {
 
-/// What carries a moving sensor, as it truly is. A shot that the recording's clock gives the time c
-/// is fired at the trajectory's time
+/// The true carrier of a moving sensor. A shot with time c on the recording's clock is fired at the
+/// trajectory's time
 ///
 ///     t = c + clock_offset + clock_drift (c - c_0)
 ///
@@ -27,7 +27,7 @@ namespace risley::simulation {
 struct Platform {
   std::shared_ptr<const trajectories::Trajectory> trajectory;  ///< not null
   trajectories::Mount mount;
-  double clock_drift = 0;  ///< what the trajectory's time gains on the recording's clock, s/s
+  double clock_drift = 0;  ///< gain of the trajectory's time on the recording's clock, s/s
   /// Time of the trajectory at which the recording begins; empty: at its first record. The clock
   /// begins with the next whole millisecond, and not before 0.
   std::optional<std::int64_t> begin_ns;
@@ -35,17 +35,17 @@ struct Platform {
   /// where its terrain says. A local trajectory has the scene's axes.
   std::optional<trajectories::Geodetic> map_origin;
 
-  // What is written of it beside the recording; shots do not depend on it.
+  // The part of it written beside the recording; shots do not depend on it.
   std::optional<trajectories::ErrorModel> errors;  ///< of the trajectory that the user gets
-  std::string trajectory_ending = ".csv";          ///< of its file, which chooses the format
+  std::string trajectory_ending = ".csv";          ///< of its file, which selects the format
   std::vector<trajectories::StripTimes> strips;    ///< of the flight; may be empty
 };
 
-/// What the recording's clock reads at its first shot, ns.
+/// Reading of the recording's clock at its first shot, ns.
 /// @throws InvalidArgument for a platform without trajectory or mount, or a drift beyond 1e-3
 std::int64_t first_clock_reading_ns(const Platform& platform);
 
-/// The longest recording, s, that the trajectory has poses for, gaps aside. 0: none.
+/// The longest recording, s, covered by poses of the trajectory, ignoring gaps. 0: none.
 /// @throws InvalidArgument as first_clock_reading_ns
 double longest_duration(const Platform& platform);
 

@@ -16,8 +16,8 @@ namespace risley::simulation {
 enum class RotorKind {
   constant,     ///< at their nominal speed                                      [B21 Eq. (1-2)]
   sinusoidal,   ///< speed oscillates slowly, as the paper saw it                [B21 Fig. 9]
-  hunting,      ///< a controller that hunts: fast small oscillation, speed that wanders off
-  random_walk,  ///< white acceleration alone: the motion model of the estimators, exactly
+  hunting,      ///< a hunting controller: fast small oscillation, speed that wanders off
+  random_walk,  ///< only white acceleration: exactly the motion model of the estimators
 };
 
 /// As rotor_kind_names() lists it.
@@ -40,7 +40,7 @@ struct RotorSettings {
   double swing_frequency = 0;              ///< rad/s
 };
 
-/// The settings that a kind stands for. Every prism has its own period.
+/// The settings of a kind. Every prism has its own period.
 /// constant:    nothing is added.
 /// sinusoidal:  2.2 deg/s standard deviation of the speed [B21 Table 3], periods 3, 4.3, 5.9 and
 ///              7.7 s, random walk 0.05 deg/s/sqrt(s).
@@ -50,29 +50,27 @@ struct RotorSettings {
 /// @throws InvalidArgument for a number of prisms that no train has
 RotorSettings rotor_settings(RotorKind kind, int prisms);
 
-/// One rotor's angle and speed at any time of a recording. They depend on the arguments of the
-/// constructor and the time alone; the speed is the derivative of the angle.
+/// One rotor's angle and speed at any time of a recording. They depend only on the arguments of the
+/// constructor and the time; the speed is the derivative of the angle.
 class RotorMotion {
  public:
-  /// @param prism             0 for the first in beam order; chooses period and random numbers
+  /// @param prism  0 for the first in beam order; selects period and random numbers
   /// @param start_angle       at time zero, rad
   /// @param angular_velocity  nominal, rad/s
-  /// @param last_time_ns      largest time that will be asked for
+  /// @param last_time_ns  largest time to be requested
   /// @throws InvalidArgument for a prism that no train has, a last time below 0, settings that are
-  ///         negative, not finite or lack a period or swing, and an angle or speed that is not
-  ///         finite
+  /// negative, not finite or lack a period or swing, and an angle or speed that is not finite
   RotorMotion(const RotorSettings& settings, int prism, double start_angle, double angular_velocity,
               std::int64_t last_time_ns, std::uint64_t seed);
 
-  /// Angle, rad, not wrapped, and speed, rad/s, at times in ascending order. Safe to call from
-  /// several threads.
+  /// Angle, rad, not wrapped, and speed, rad/s, at times in ascending order. Thread-safe.
   /// @throws InvalidArgument for times that descend or lie outside [0, last_time_ns], or for spans
   ///         of different lengths
   void evaluate(std::span<const std::int64_t> time_ns, std::span<double> angle,
                 std::span<double> speed) const;
 
  private:
-  /// What the random walk adds at a knot.
+  /// Contribution of the random walk at a knot.
   struct Knot {
     double angle = 0, speed = 0;
   };

@@ -18,16 +18,15 @@
 #include "risley/io/output_file.hpp"
 
 /// @file
-/// NetCDF-4 files. The library behind them, HDF5 included, is not thread-safe: what is written here
-/// holds one lock of the whole process, and every file that is read has a process of its own, so
-/// that any number of threads may each have files open. A single file belongs to one thread at a
-/// time.
+/// NetCDF-4 files. The library behind them, HDF5 included, is not thread-safe: writing holds one
+/// lock of the whole process, and every file that is read has a separate process, so that any
+/// number of threads may each have files open. A single file belongs to one thread at a time.
 namespace risley::tables {
 
-/// Types of values that are written and read; text is one of characters.
+/// Types of values in files; text is an array of characters.
 enum class NetcdfType { text, uint8, int32, uint32, int64, uint64, float32, float64 };
 
-/// The type in the file of a C++ type; char stands for text.
+/// The type in the file for a C++ type; char represents text.
 template <class T>
 constexpr NetcdfType netcdf_type_of() {
   if constexpr (std::is_same_v<T, char>) return NetcdfType::text;
@@ -43,7 +42,7 @@ constexpr NetcdfType netcdf_type_of() {
 /// A dimension of an open file.
 struct NetcdfDimension {
   std::string name;
-  std::size_t length = 0;  ///< entries; 0 in a file that is written: it grows
+  std::size_t length = 0;  ///< entries; 0 in an output: it grows
   int id = 0;
 };
 
@@ -55,34 +54,34 @@ struct NetcdfVariable {
   int id = 0;
 };
 
-/// How the values of a variable lie in a file.
+/// Layout of a variable's values in a file.
 struct NetcdfStorage {
-  std::size_t block = 0;    ///< entries of the first dimension per block; 0: as the library likes
+  std::size_t block = 0;    ///< entries of the first dimension per block; 0: the library's choice
   bool compressed = false;  ///< blocks are shuffled and deflated
-  bool checksum = false;    ///< damage of a block is found when it is read
+  bool checksum = false;    ///< damage of a block is detected on reading
 };
 
-/// A NetCDF-4 file that is written. It appears under its name with close(), whole; without it
-/// nothing is left. First everything is defined, then end_definitions(), then values.
-/// Everything throws FileError where the disk or the library refuses, and InvalidArgument for
-/// dimensions, values and texts that do not fit each other.
+/// A NetCDF-4 file that is written. It appears under its name, complete, at close(); otherwise
+/// nothing remains. First everything is defined, then end_definitions(), then values. Everything
+/// throws FileError if writing or the library fails, and InvalidArgument for dimensions, values and
+/// texts that do not match each other.
 class NetcdfOutput {
  public:
   explicit NetcdfOutput(const std::string& path);
-  /// Writes into an output that is left for the caller to commit. @param output  must outlive this
+  /// Writes to an output that the caller commits. @param output  must outlive this
   explicit NetcdfOutput(const io::OutputFile& output);
   ~NetcdfOutput();
   NetcdfOutput(const NetcdfOutput&) = delete;
   NetcdfOutput& operator=(const NetcdfOutput&) = delete;
 
-  const std::string& path() const;  ///< that the file gets with close()
+  const std::string& path() const;  ///< final name after close()
 
   /// @param length  at least 1
   NetcdfDimension define_dimension(const std::string& name, std::size_t length);
-  /// A dimension that grows with what is written.
+  /// A dimension that grows with the written data.
   NetcdfDimension define_growing_dimension(const std::string& name);
 
-  /// @param dimensions  one or two, of which only the first may grow
+  /// @param dimensions  one or two; only the first may grow
   template <class T>
   NetcdfVariable define(const std::string& name,
                         std::initializer_list<const NetcdfDimension*> dimensions,
@@ -92,7 +91,7 @@ class NetcdfOutput {
   /// A variable of texts along one dimension, with its values.
   void define_texts(const std::string& name, const NetcdfDimension& along,
                     std::string_view long_name, std::vector<std::string> texts);
-  /// What readers get for values that were not written, and may take for "missing".
+  /// Value of unwritten entries, which readers may treat as "missing".
   void set_fill(const NetcdfVariable& variable, float value);
 
   /// A text attribute of the file.
@@ -106,11 +105,11 @@ class NetcdfOutput {
   /// Bytes as an attribute of a variable.
   void put_numbers(const NetcdfVariable& variable, const std::string& name,
                    std::span<const std::uint8_t> values);
-  /// Makes a group with nothing but text attributes, name and value each.
+  /// Creates a group with only text attributes, name and value each.
   void put_text_group(const std::string& group,
                       const std::vector<std::pair<std::string, std::string>>& attributes);
 
-  /// After this there are only values to write.
+  /// Afterwards only values are written.
   void end_definitions();
 
   /// Writes entries [first, first + values.size() / width) of a variable.
@@ -124,7 +123,7 @@ class NetcdfOutput {
     put(variable, first, std::span<const T>(values));
   }
 
-  /// Completes the file and gives it its name, where that is not left to the caller.
+  /// Completes the file and renames it, unless the caller does.
   void close();
 
  private:
@@ -139,13 +138,12 @@ class NetcdfOutput {
   std::unique_ptr<File> file_;
 };
 
-/// A NetCDF file that is read. What it says of itself is believed only as far as the bytes that
-/// it has: everything throws FileError, naming variable, dimension or attribute, where something
-/// is missing, of another kind, larger than the file can hold, or in another file. The library runs
-/// in a child process: a file on which it crashes, runs for ever or asks for too much memory is a
-/// FileError, too. Calls that ask for no or for more than two dimensions, or for values of another
-/// type than their variable's, throw InvalidArgument.
-/// docs/decisions/0008-netcdf-in-a-child-process.md
+/// A NetCDF file that is read. Its statements are believed only as far as its bytes allow:
+/// everything throws FileError, naming variable, dimension or attribute, if something is missing,
+/// of another kind, larger than the file can hold, or in another file. The library runs in a child
+/// process: a file on which it crashes, never finishes or needs too much memory is a FileError,
+/// too. Calls with no or more than two dimensions, or with values of another type than their
+/// variable's, throw InvalidArgument. docs/decisions/0008-netcdf-in-a-child-process.md
 class NetcdfInput {
  public:
   /// @param progress  stops waiting for the library; its flag must outlive the file
@@ -158,7 +156,7 @@ class NetcdfInput {
 
   /// Whether the file has an attribute of that name.
   bool has_attribute(const std::string& name) const;
-  /// A text attribute of the file. @throws FileError where it is missing or no text
+  /// A text attribute of the file. @throws FileError if it is missing or not a text
   std::string text(const std::string& name) const;
   /// Any whole number that fits.
   std::uint32_t number(const std::string& name) const;
@@ -177,8 +175,8 @@ class NetcdfInput {
   std::vector<std::string> texts(const std::string& name, const NetcdfDimension& along) const;
 
   /// A variable of values of type T along exactly these dimensions.
-  /// @param block  entries of the first dimension that are going to be read together, for the
-  ///               cache; 0: as the library likes
+  /// @param block  entries of the first dimension to be read together, for the cache; 0: the
+  /// library's choice
   template <class T>
   NetcdfVariable variable(const std::string& name,
                           std::initializer_list<const NetcdfDimension*> dimensions,

@@ -19,16 +19,17 @@ class SqliteInput;
 /// The answer to a query, row by row. It must not outlive its database.
 class SqliteQuery {
  public:
-  /// Goes to the next row, first to the first one. @param what  that the database is asked for, for
-  /// messages: "give its topics". @return false at the end
+  /// Moves to the next row, initially to the first one.
+  /// @param what  the action, for messages: "give its topics"
+  /// @return false at the end
   /// @throws FileError; Cancelled
   bool next(const char* what);
-  /// Goes back in front of the first row.
+  /// Moves back before the first row.
   void rewind();
 
   // Values of the row, by place from 0; SQLite converts those of another kind.
   std::int64_t integer(int column) const;                 ///< whole number
-  std::string text(int column) const;                     ///< as it is stored, UTF-8 or not
+  std::string text(int column) const;                     ///< as stored, UTF-8 or not
   std::span<const std::uint8_t> bytes(int column) const;  ///< valid until next() or rewind()
 
  private:
@@ -43,12 +44,12 @@ class SqliteQuery {
   std::unique_ptr<sqlite3_stmt, Finish> statement_;
 };
 
-/// A database of SQLite that is read. It may come from anywhere: nothing that it brings along is
-/// run, only stored tables are read, and no step may take longer than a table of the file's size
-/// can need. Nothing is written beside it, unless SQLite's own files there hold a part of it.
+/// An SQLite database for reading. It may come from anywhere: no code in it is run, only stored
+/// tables are read, and no step may take longer than a table of the file's size can need. Nothing
+/// is written beside it, unless SQLite's own files there hold a part of it.
 class SqliteInput {
  public:
-  /// @param kind  what it is taken for, for messages: "a ROS 2 bag"
+  /// @param kind  expected kind, for messages: "a ROS 2 bag"
   /// @throws FileError, also for a file that is cut off
   SqliteInput(const std::string& path, std::string kind, const Progress& progress = {});
   ~SqliteInput();
@@ -57,8 +58,8 @@ class SqliteInput {
 
   std::uint64_t file_bytes() const;  ///< of the database, its journal included
 
-  /// Refuses views, virtual tables and computed columns, which could make more of the file than it
-  /// holds. A table that is not there is left to the query. @throws FileError; Cancelled
+  /// Rejects views, virtual tables and computed columns, which could expand the file's contents. A
+  /// missing table is left to the query. @throws FileError; Cancelled
   void require_plain_table(const std::string& name) const;
   /// @param sql  of one statement. @throws FileError; Cancelled
   SqliteQuery query(const std::string& sql) const;

@@ -11,7 +11,7 @@
 
 namespace risley::tables {
 
-/// What the values of a column are.
+/// Kind of a column's values.
 enum class CellKind { text, integer, real };
 
 /// A column of a table.
@@ -25,25 +25,24 @@ struct TableColumn {
 /// A value, or none.
 using TableCell = std::variant<std::monostate, std::int64_t, double, std::string>;
 
-/// A table that is written row by row and appears under its name, whole, with close(). The ending
-/// of the name chooses what it becomes:
+/// A table that is written row by row and appears under its name, complete, at close(). The ending
+/// of the name selects the format:
 ///
 /// - .csv: a line of names, then one line per row; a cell without a value is empty, texts with
 ///   commas, quotes or line feeds stand in quotes;
 /// - .nc: NetCDF-4, one variable per column along the dimension `row`; a missing number is NaN, a
 ///   missing whole number kMissingInteger, a missing text empty.
 ///
-/// CSV has no place for units, descriptions and `about`. Numbers that are not finite count as
-/// missing.
+/// CSV cannot hold units, descriptions and `about`. Non-finite numbers count as missing.
 class TableFile {
  public:
-  /// What NetCDF files have for a whole number that is missing; the library's own fill value.
+  /// NetCDF's value for a missing whole number; the library's own fill value.
   static constexpr std::int64_t kMissingInteger = -9223372036854775806LL;
 
-  /// @throws InvalidArgument for a name with another ending, naming those that there are
+  /// @throws InvalidArgument for a name with another ending, naming the supported ones
   static void check_name(const std::string& path);
 
-  /// @param about  of the table as a whole, name and value each
+  /// @param about  the table as a whole, name and value each
   /// @throws InvalidArgument as check_name(), and without columns; FileError
   TableFile(const std::string& path, std::vector<TableColumn> columns,
             std::vector<std::pair<std::string, std::string>> about);
@@ -51,8 +50,8 @@ class TableFile {
   TableFile(const TableFile&) = delete;
   TableFile& operator=(const TableFile&) = delete;
 
-  /// @param cells  one per column, of its kind or without a value; whole numbers may stand for real
-  ///               ones. @throws InvalidArgument for others; FileError
+  /// @param cells  one per column, of its kind or without a value; whole numbers are accepted for
+  /// real ones. @throws InvalidArgument for others; FileError
   void add(const std::vector<TableCell>& cells);
   /// @throws FileError
   void close();

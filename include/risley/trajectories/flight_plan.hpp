@@ -14,7 +14,7 @@
 
 namespace risley::trajectories {
 
-/// A straight line that is flown at constant speed, on a map: x east, y north, z up.
+/// A straight line flown at constant speed, on a map: x east, y north, z up.
 struct Strip {
   std::string name;
   std::array<double, 2> center{0.0, 0.0};  ///< of the line, m
@@ -24,29 +24,29 @@ struct Strip {
   double speed = 0;                        ///< m/s
 };
 
-/// Sums of sinusoids: of each axis as many, of equal amplitude, one in each equal part of a band of
-/// frequencies, at a frequency and a phase that the seed decides.
+/// Sums of sinusoids: the same number for each axis, of equal amplitude, one in each equal part of
+/// a band of frequencies, with frequency and phase determined by the seed.
 struct SinusoidMotion {
   std::array<double, 3> rms{0.0, 0.0, 0.0};            ///< of an axis, all sinusoids together
   double lowest_frequency = 1, highest_frequency = 1;  ///< Hz
   int sinusoids = 1;                                   ///< per axis
 };
 
-/// A flight as it is planned: strips one after the other, with turns of a stated duration between
-/// them. In a turn the platform moves as a multirotor does: without bank, along a polynomial of the
-/// fifth degree that takes up position and velocity of both strips, while its heading turns the
-/// shorter way, by 180 degrees to the right. Before the first strip and after the last one it flies
-/// straight on. Motion of attitude and velocity is added to all of it.
+/// A planned flight: strips one after the other, with turns of a stated duration between them. In a
+/// turn the platform moves as a multirotor does: without bank, along a polynomial of the fifth
+/// degree that joins position and velocity of both strips, while its heading turns the shorter way,
+/// by 180 degrees to the right. Before the first strip and after the last one it flies straight on.
+/// Motion of attitude and velocity is added throughout.
 struct FlightPlan {
   std::string name;
-  /// Where the map's x = y = z = 0 is on the Earth, its axes east, north and up there; with it the
-  /// trajectory is geocentric, otherwise local.
+  /// Location of the map's x = y = z = 0 on the Earth, its axes east, north and up there; with it
+  /// the trajectory is geocentric, otherwise local.
   std::optional<Geodetic> origin;
   TimeScale time_scale = TimeScale::unknown;
   std::optional<int> gps_week;
   double start = 0;           ///< time of the first record in that scale, s
   double rate = 200;          ///< records per second
-  std::vector<Strip> strips;  ///< in the order in which they are flown
+  std::vector<Strip> strips;  ///< in the order flown
   double turn_duration = 20;  ///< from the end of a strip to the begin of the next, s
   double lead = 2;            ///< before the first strip and after the last one, s
   SinusoidMotion attitude;    ///< roll, pitch, heading, rad
@@ -54,7 +54,7 @@ struct FlightPlan {
   std::uint64_t seed = 0;     ///< of the motion
 };
 
-/// When a strip is flown, in the time of the trajectory.
+/// Time of a strip, on the trajectory's time scale.
 struct StripTimes {
   std::string name;
   std::int64_t begin_ns = 0, end_ns = 0;
@@ -75,11 +75,11 @@ struct Flight {
 /// @throws InvalidArgument as require_flight_plan
 Flight fly(const FlightPlan& plan);
 
-/// @throws InvalidArgument for a plan without strips, values that are not finite or make no sense,
-///         and more than kMostFlightRecords records
+/// @throws InvalidArgument for a plan without strips, values that are not finite or invalid, and
+/// more than kMostFlightRecords records
 void require_flight_plan(const FlightPlan& plan);
 
-/// Most records that a planned flight may have.
+/// Most records of a planned flight.
 inline constexpr std::size_t kMostFlightRecords = 10'000'000;
 
 /// Reads
@@ -104,7 +104,7 @@ inline constexpr std::size_t kMostFlightRecords = 10'000'000;
 ///                  highest_hz: 0.4, sinusoids: 6}
 ///
 /// A group of strips may have its own name, center_m, height_m and speed_m_per_s. Parallel strips
-/// lie from left to right of the heading and are flown to and fro.
+/// are flown from left to right of the heading, back and forth.
 /// @param path  for messages only
 /// @throws FileError with the line for anything else
 FlightPlan parse_flight_plan(const std::string& text, const std::string& path);

@@ -18,16 +18,15 @@ struct FlownStrip {
 
 /// What counts as a strip.
 struct FlownStripOptions {
-  /// Courses of a strip differ by no more, and headings, rad: 20 degrees.
+  /// Largest difference of courses, and of headings, within a strip, rad: 20 degrees.
   double widest_course = 0.349065850398866;
   double slowest_share = 0.5;  ///< of the median speed
   double shortest_s = 10;      ///< s
 };
 
-/// The strips of a flight in the order of time: where the platform moves on without turning,
-/// neither its way nor its body. Course and speed are taken over a second, so that shaking does not
-/// count.
-/// @throws InvalidArgument for options that are not above 0
+/// The strips of a flight in the order of time: stretches in which neither the path nor the body of
+/// the platform turns. Course and speed are taken over a second, so that vibration does not matter.
+/// @throws InvalidArgument for options not above 0
 std::vector<FlownStrip> flown_strips(const Interpolation& interpolation,
                                      const FlownStripOptions& options = {});
 

@@ -6,7 +6,7 @@
 
 /// @file
 /// Places on the WGS84 ellipsoid. GRS80, the ellipsoid of ITRF and ETRS89, differs from it by 0.1
-/// mm in its polar radius and by nothing at the equator.
+/// mm in its polar radius and not at all at the equator.
 namespace risley::trajectories {
 
 inline constexpr double kSemiMajorAxis = 6378137.0;       ///< m
@@ -17,7 +17,7 @@ struct Geodetic {
   double latitude = 0, longitude = 0, height = 0;
 };
 
-/// The places that are understood, m above the ellipsoid.
+/// Range of supported places, m above the ellipsoid.
 inline constexpr double kLowestHeight = -1e5,  ///< the lowest
     kHighestHeight = 1e8;                      ///< the highest
 
@@ -28,13 +28,13 @@ inline constexpr double kLowestHeight = -1e5,  ///< the lowest
 Eigen::Vector3d geocentric_from_geodetic(const Geodetic& place);
 
 /// The inverse, with a longitude in [-pi, pi], exact to the rounding of its results everywhere, the
-/// poles included: 0.8 nm, and 1.5 nm where the longitude is beyond 90 degrees. On the axis itself
-/// the longitude is 0.
+/// poles included: 0.8 nm, and 1.5 nm if the longitude is beyond 90 degrees. On the axis itself the
+/// longitude is 0.
 /// @param position  m  @throws InvalidArgument as geocentric_from_geodetic
 Geodetic geodetic_from_geocentric(const Eigen::Vector3d& position);
 
 /// Unit vectors to the north, to the east and down, the columns of a matrix [3, 3], geocentric. On
-/// the axis of rotation north is where the longitude says.
+/// the axis of rotation north follows from the given longitude.
 /// @throws InvalidArgument as geocentric_from_geodetic
 Eigen::Matrix3d geocentric_from_ned(const Geodetic& place);
 

@@ -16,7 +16,7 @@
 
 namespace risley::trajectories {
 
-/// Where a platform is at a time, and how it moves.
+/// Pose and motion of a platform at a time.
 struct Pose {
   Eigen::Vector3d position{0, 0, 0};                             ///< in the trajectory's frame, m
   Eigen::Quaterniond attitude = Eigen::Quaterniond::Identity();  ///< frame from body
@@ -32,14 +32,14 @@ struct TrajectoryGap {
 
 /// Where a trajectory is not interpolated.
 struct InterpolationOptions {
-  /// A step longer than so many median steps is a gap, over which there are no poses, > 1. The
-  /// default lets two records in a row be missing.
+  /// A step longer than this many median steps is a gap, which has no poses, > 1. The default
+  /// allows two consecutive missing records.
   double gap_steps = 3.5;
 };
 
 /// Poses between the records of a trajectory: polynomials of the fifth degree through the three
 /// records before and the three after a time, for the position and for the rotation vector from the
-/// record before. Towards a gap and the ends six records of this side are taken, or all where there
+/// record before. Next to a gap and at the ends six records of this side are used, or all if there
 /// are fewer. There is no pose before the first record, after the last one and within a gap, and a
 /// single record between two gaps has none. Of records closer together than a quarter of the median
 /// step only those around the time itself are used. Error of a sinusoid of amplitude A and angular
@@ -50,16 +50,16 @@ class Interpolation {
   static constexpr std::size_t kPoints = 6;  ///< records that a polynomial goes through
 
   /// @param trajectory  must outlive this
-  /// @throws InvalidArgument as require_trajectory, and for gap_steps that are not above 1
+  /// @throws InvalidArgument as require_trajectory, and for gap_steps not above 1
   explicit Interpolation(const Trajectory& trajectory, const InterpolationOptions& options = {});
 
-  /// Looks up poses one after the other, each thread with one of its own; times close to the one
-  /// before are cheap. Any order is allowed.
+  /// Looks up poses in sequence; each thread has its own, and times close to the previous one are
+  /// cheap. Any order is allowed.
   class Cursor {
    public:
     /// @param interpolation  must outlive this
     explicit Cursor(const Interpolation& interpolation) : interpolation_(&interpolation) {}
-    /// The pose, or nothing where there is none. @param time_ns  in the trajectory's time
+    /// The pose, or nothing without one. @param time_ns in the trajectory's time
     std::optional<Pose> at(std::int64_t time_ns);
 
    private:
@@ -76,14 +76,14 @@ class Interpolation {
     std::array<Eigen::Matrix<double, 6, 1>, kPoints> coefficients_;
   };
 
-  /// A cursor of its own for every thread that asks for poses. @note This must outlive it.
+  /// A separate cursor for every thread that needs poses. @note This must outlive it.
   Cursor cursor() const { return Cursor(*this); }
   /// As Cursor::at, for single times.
   std::optional<Pose> at(std::int64_t time_ns) const { return cursor().at(time_ns); }
 
   /// The records between which it interpolates.
   const Trajectory& trajectory() const { return *trajectory_; }
-  /// The gaps between records, over which there are no poses.
+  /// The gaps between records, which have no poses.
   const std::vector<TrajectoryGap>& gaps() const { return gaps_; }
   std::int64_t median_step_ns() const { return median_step_ns_; }  ///< 0 for a single record
 

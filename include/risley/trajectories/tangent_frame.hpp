@@ -8,8 +8,8 @@
 
 namespace risley::trajectories {
 
-/// Axes of a map at one place: x east, y north, z up. Small coordinates and a level plane to adjust
-/// in, without the scale and the turn of a projection.
+/// Axes of a map at one place: x east, y north, z up. Small coordinates and a level plane for
+/// adjustments, without the scale and the rotation of a projection.
 struct TangentFrame {
   Frame frame = Frame::local;                          ///< of the trajectory it belongs to
   Eigen::Vector3d origin{0, 0, 0};                     ///< in that frame, m

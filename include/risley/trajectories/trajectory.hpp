@@ -16,13 +16,13 @@
 
 namespace risley::trajectories {
 
-/// What the times of a trajectory count from.
+/// Origin of the times of a trajectory.
 enum class TimeScale : std::uint8_t {
-  unknown,             ///< an origin that is stated nowhere
+  unknown,             ///< the origin is not stated
   gps_second_of_week,  ///< GPS time since Sunday midnight; the week may be known
   utc_second_of_day,   ///< UTC since midnight
   gps,                 ///< GPS time since 6 January 1980
-  adjusted_gps,        ///< the same less 1e9 s, as LAS files count
+  adjusted_gps,        ///< the same less 1e9 s, as in LAS files
   utc_unix,            ///< UTC since 1 January 1970, without leap seconds
 };
 
@@ -32,10 +32,10 @@ std::string to_string(TimeScale scale);
 /// "GPS second of week", for messages
 std::string words_of(TimeScale scale);
 
-/// What positions and attitudes refer to.
+/// Reference of positions and attitudes.
 enum class Frame : std::uint8_t {
   geocentric,  ///< Earth-centred, Earth-fixed, WGS84-like ellipsoid (geodesy.hpp)
-  local,       ///< axes of a map of its own: x east, y north where that is known, z up
+  local,       ///< axes of a local map: x east, y north if that is known, z up
 };
 
 /// "geocentric"
@@ -50,25 +50,24 @@ struct RollPitchHeading {
   double heading = 0;  ///< [0, 2 pi)
 };
 
-/// @throws InvalidArgument for angles that are not finite
+/// @throws InvalidArgument for non-finite angles
 Eigen::Quaterniond ned_from_body(const RollPitchHeading& angles);
 
-/// The inverse. Where the nose points straight up or down only heading -+ roll is known: the roll
-/// is 0 there. @throws InvalidArgument for a quaternion that is not of length 1
+/// The inverse. If the nose points straight up or down only heading -+ roll is known: the roll is 0
+/// there. @throws InvalidArgument for a quaternion that is not of length 1
 RollPitchHeading roll_pitch_heading(const Eigen::Quaterniond& ned_from_body);
 
-/// Standard deviations of one record, as the program that made the trajectory states them.
+/// Standard deviations of one record, as stated by the program that made the trajectory.
 struct PoseAccuracy {
   Eigen::Vector3d position{0, 0, 0};        ///< north, east, down, m
   double roll = 0, pitch = 0, heading = 0;  ///< rad
 };
 
-/// Along which axes a file's velocities stand, found by comparing them with differences of its
-/// positions.
+/// Axes of a file's velocities, found by comparing them with differences of its positions.
 struct VelocityFrame {
-  std::string name;    ///< "north-east-down"; "undecided" or "none" where the trajectory has none
-  std::string reason;  ///< in words: what was compared, or why nothing was decided
-  /// Velocity less differenced position, RMS along north, east, down, m/s; of the best frame where
+  std::string name;    ///< "north-east-down"; "undecided" or "none" if the trajectory has none
+  std::string reason;  ///< in words: the comparison made, or the reason why nothing was decided
+  /// Velocity less differenced position, RMS along north, east, down, m/s; of the best frame if
   /// nothing is decided.
   std::optional<Eigen::Vector3d> residual;
 };
@@ -78,21 +77,21 @@ struct AngleSpread {
   double least = 0, median = 0, greatest = 0;
 };
 
-/// What had to be done to put rows into the order of their times.
+/// Changes needed to put rows into time order.
 struct TimeOrder {
-  std::size_t moved = 0;        ///< rows that stood behind a later one
-  std::size_t repeated = 0;     ///< rows left out because an earlier one had the same time
+  std::size_t moved = 0;        ///< rows after a later one
+  std::size_t repeated = 0;     ///< rows dropped because an earlier one had the same time
   std::size_t repeated_at = 0;  ///< the first of these, from 0
-  /// Row, from 0, in front of which the largest step back was, and that step.
+  /// Row, from 0, before which the largest step back was, and that step.
   std::size_t largest_back_at = 0;
   std::int64_t largest_back_ns = 0;
 };
 
 /// The poses of a moving platform as columns, one row per record, ordered by time. Velocities and
-/// accuracies may be missing as a whole, all other columns have one length.
+/// accuracies may be missing as a whole; all other columns have one length.
 struct Trajectory {
-  std::string format;  ///< short name, e.g. "sbet"; empty when it comes from no file
-  std::string source;  ///< within a file that holds several: topic and frames, in words
+  std::string format;  ///< short name, e.g. "sbet"; empty when it does not come from a file
+  std::string source;  ///< within a file of several: topic and frames, in words
   TimeScale time_scale = TimeScale::unknown;
   std::optional<int> gps_week;  ///< of the first record's second of week, since 6 January 1980
   Frame frame = Frame::local;
@@ -106,16 +105,15 @@ struct Trajectory {
   /// Of a file that has one: angle from the platform's heading to the true one, which is less.
   std::optional<AngleSpread> wander;
   std::optional<VelocityFrame> velocity_frame;  ///< of a file's velocities
-  int week_crossings = 0;                       ///< or midnights at which times were made to run on
+  int week_crossings = 0;                       ///< or midnights beyond which times were continued
   TimeOrder time_order;                         ///< of a file's records
 
   std::size_t size() const { return time_ns.size(); }
 };
 
 /// @throws InvalidArgument for no record, columns of different lengths, times that do not ascend or
-///         are more than 146 years apart, and values that are not finite, attitudes that are no
-///         unit quaternions, geocentric places as geodetic_from_geocentric; the message names
-///         column and row
+/// are more than 146 years apart, and values that are not finite, attitudes that are not unit
+/// quaternions, geocentric places as geodetic_from_geocentric; the message names column and row
 void require_trajectory(const Trajectory& trajectory);
 
 /// Unit vectors to the north, to the east and down at a place, the columns of a matrix [3, 3] in
@@ -129,7 +127,7 @@ Eigen::Matrix3d ned_axes(Frame frame, const Eigen::Vector3d& position);
 RollPitchHeading roll_pitch_heading(Frame frame, const Eigen::Vector3d& position,
                                     const Eigen::Quaterniond& frame_from_body);
 
-/// Puts the rows of all columns into the order of their times; of rows of one time the first stays.
+/// Sorts the rows of all columns by time; of rows with the same time the first stays.
 /// @throws InvalidArgument for columns of different lengths
 TimeOrder order_by_time(Trajectory& trajectory);
 

@@ -21,7 +21,7 @@ struct Extent {
   double min = 0, max = 0;
 };
 
-/// Times of records, of whatever they hold.
+/// Times of records of any kind.
 struct RecordTimes {
   std::size_t records = 0;
   std::int64_t first_ns = 0, last_ns = 0;
@@ -31,16 +31,16 @@ struct RecordTimes {
   double gaps_total_s = 0;  ///< missing time: the steps without the median step
 };
 
-/// What a trajectory holds and how sound it is.
+/// Contents of a trajectory and their quality.
 struct TrajectoryAudit {
   RecordTimes times;
   std::optional<Extent> latitude, longitude;  ///< geocentric frames, rad
   Extent height;                              ///< above the ellipsoid, or z of a local frame, m
   Extent roll, pitch;                         ///< rad
-  double fastest = 0;          ///< largest speed between records that are no gap apart, m/s
+  double fastest = 0;          ///< largest speed between records without a gap between them, m/s
   double fastest_turning = 0;  ///< largest angular rate between them, rad/s
   std::optional<PoseAccuracy> accuracy;  ///< median of each accuracy
-  std::vector<Warning> warnings;         ///< of reading, and of what was found here
+  std::vector<Warning> warnings;         ///< of reading, and from this audit
 };
 
 /// @throws InvalidArgument as require_trajectory and for gap_steps as Interpolation; Cancelled

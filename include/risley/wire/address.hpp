@@ -18,7 +18,7 @@ inline constexpr std::uint16_t kBroadcastPort = 55000;
 
 /// An IPv4 address.
 struct Address {
-  std::array<std::uint8_t, 4> bytes{};  ///< in the order in which they are written
+  std::array<std::uint8_t, 4> bytes{};  ///< in written order
   friend bool operator==(const Address&, const Address&) = default;
   friend bool operator<(const Address& a, const Address& b) {
     return std::lexicographical_compare(a.bytes.begin(), a.bytes.end(), b.bytes.begin(),
@@ -28,13 +28,13 @@ struct Address {
 
 /// "192.168.1.2"
 std::string to_string(const Address& address);
-/// The inverse of to_string(); empty where the text is no address.
+/// The inverse of to_string(); empty if the text is not an address.
 std::optional<Address> address_from(std::string_view text);
 
 /// 255.255.255.255: everybody on the interface.
 inline constexpr Address kEverybody{{255, 255, 255, 255}};
 
-/// Where a datagram comes from or goes to.
+/// Source or destination of a datagram.
 struct Endpoint {
   Address address;
   std::uint16_t port = 0;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// What the data of command frames mean, as typed values. A result of 0 is success, 1 a failure.
+// Contents of command frames, as typed values. A result of 0 is success, 1 a failure.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ struct Broadcast {
   friend bool operator==(const Broadcast&, const Broadcast&) = default;
 };
 
-/// Something is wrong with the sensor.
+/// A fault of the sensor.
 struct AbnormalStatus {
   static constexpr CommandId kId{0, 0x07};  ///< of its frames
   std::uint32_t status = 0;                 ///< as recordings::Packet::status
@@ -60,7 +60,7 @@ using QueryFan = PlainCommand<1, 0x05>;         ///< answered by ValueReply
 using QueryReturnMode = PlainCommand<1, 0x07>;  ///< answered by ValueReply
 using QueryImuRate = PlainCommand<1, 0x09>;     ///< answered by ValueReply
 
-/// A command whose data are one byte. @tparam kMost, kLeast  allowed values
+/// A command with one byte of data. @tparam kMost, kLeast allowed values
 template <std::uint8_t kSet, std::uint8_t kCommand, std::uint8_t kMost, std::uint8_t kLeast = 0>
 struct ByteCommand {
   static constexpr CommandId kId{kSet, kCommand};      ///< of its frames
@@ -80,7 +80,7 @@ using SetImuRate = ByteCommand<1, 0x08, 1>;      ///< 0 off, 1 200 Hz
 /// Values of SetReturnMode.
 enum class ReturnMode : std::uint8_t { first = 0, strongest = 1, dual = 2, triple = 3 };
 
-/// Gives the sensor its address from the next start on.
+/// Sets the sensor's address from the next start on.
 struct SetAddress {
   static constexpr CommandId kId{0, 0x08};  ///< of its frames
   bool is_static = false;
@@ -101,12 +101,12 @@ enum class ParameterKey : std::uint16_t { high_sensitivity = 1, scan_pattern = 2
 
 /// A parameter of the sensor with its value.
 struct Parameter {
-  std::uint16_t key = 0;  ///< a ParameterKey, or one that is not known here
+  std::uint16_t key = 0;  ///< a ParameterKey, or an unknown one
   std::vector<std::uint8_t> value;
   friend bool operator==(const Parameter&, const Parameter&) = default;
 };
 
-/// Sets parameters. The length of each is that of its value, as in the maker's SDK.
+/// Sets parameters. Each has the length of its value, as in the manufacturer's SDK.
 struct WriteParameters {
   static constexpr CommandId kId{0, 0x0B};  ///< of its frames
   std::vector<Parameter> parameters;
@@ -123,12 +123,12 @@ struct ReadParameters {
 /// Sets parameters back.
 struct ResetParameters {
   static constexpr CommandId kId{0, 0x0D};  ///< of its frames
-  bool listed = false;                      ///< only those of keys; otherwise all
+  bool listed = false;                      ///< only for keys; otherwise all
   std::vector<std::uint16_t> keys;          ///< at most 255
   friend bool operator==(const ResetParameters&, const ResetParameters&) = default;
 };
 
-/// Pose of the sensor that it keeps for others: deg and mm.
+/// Pose of the sensor, stored for other programs: deg and mm.
 struct Extrinsics {
   std::array<float, 3> roll_pitch_yaw_deg{};
   std::array<std::int32_t, 3> translation_mm{};
@@ -142,7 +142,7 @@ struct WriteExtrinsics {
   friend bool operator==(const WriteExtrinsics&, const WriteExtrinsics&) = default;
 };
 
-/// Tells the hour that the last PPS edge lies in.
+/// Sets the hour of the last PPS edge.
 struct SetUtc {
   static constexpr CommandId kId{1, 0x0A};  ///< of its frames
   std::uint8_t year = 0;                    ///< since 2000
@@ -153,7 +153,7 @@ struct SetUtc {
 
 // Replies of a sensor.
 
-/// The reply to commands that ask for nothing.
+/// The reply to commands that request nothing.
 struct ResultReply {
   CommandId command;        ///< that is answered
   std::uint8_t result = 0;  ///< 2: SetMode is being carried out
@@ -228,7 +228,7 @@ struct ValueReply {
   friend bool operator==(const ValueReply&, const ValueReply&) = default;
 };
 
-/// What a sensor sends on its own.
+/// Unsolicited messages of a sensor.
 using Message = std::variant<Broadcast, AbnormalStatus>;
 /// What a host asks of a sensor.
 using Command =
@@ -242,9 +242,9 @@ using Reply = std::variant<ResultReply, DeviceInfo, HeartbeatReply, AddressReply
 
 /// The id of a command.
 CommandId command_id(const Command& command);
-/// The id of the command that is answered.
+/// The id of the answered command.
 CommandId command_id(const Reply& reply);
-/// "handshake", "set 1 command 77": how messages call a command.
+/// "handshake", "set 1 command 77": name of a command in messages.
 std::string to_string(CommandId command);
 
 /// The bytes of a datagram. @throws InvalidArgument for texts and lists that are too long
@@ -254,7 +254,7 @@ std::vector<std::uint8_t> encode(const Command& command, std::uint16_t sequence)
 /// As above. @param sequence  of the command
 std::vector<std::uint8_t> encode(const Reply& reply, std::uint16_t sequence);
 
-/// Why the data of a frame mean nothing.
+/// Reason why the data of a frame are invalid.
 enum class DataFault : std::uint8_t {
   unknown_command,  ///< or one that does not go in this direction
   length,           ///< too few or too many data
@@ -263,8 +263,8 @@ enum class DataFault : std::uint8_t {
 /// "unknown command", "wrong length of the data", "a value that the command does not have"
 std::string to_string(DataFault fault);
 
-// What frames mean. Replies go by the command that they answer; the frame's type is the caller's
-// to look at, because real clients send commands as replies.
+// What frames mean. Replies are matched by the command that they answer; the caller checks the
+// frame's type, because real clients send commands as replies.
 std::variant<Message, DataFault> decode_message(const Frame& frame);  ///< of a sensor
 std::variant<Command, DataFault> decode_command(const Frame& frame);  ///< of a host
 std::variant<Reply, DataFault> decode_reply(const Frame& frame);      ///< of a sensor

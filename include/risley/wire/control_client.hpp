@@ -12,10 +12,10 @@
 
 namespace risley::wire {
 
-/// A session with a sensor of the second generation. There is no handshake: the client sets where
-/// and what the sensor sends, starts it, and polls its state; the answers are its signs of life. A
-/// sensor that restarted, and so no longer samples, is set up again. Points are set to coordinates
-/// in mm, which LVX 2 holds; settings that were changed are restored at the end.
+/// A session with a sensor of the second generation. There is no handshake: the client sets the
+/// destination and contents of the sensor's data, starts it, and polls its state; the answers are
+/// its signs of life. A sensor that restarted, and so no longer samples, is set up again. Points
+/// are set to coordinates in mm, as LVX 2 requires; changed settings are restored at the end.
 class ControlClient final : public ClientSession {
  public:
   /// @param device_type  as recordings::Device::type
@@ -28,7 +28,7 @@ class ControlClient final : public ClientSession {
     Purpose purpose = Purpose::identify;
     ControlCommand command = ControlCommand::get;
     std::vector<std::uint8_t> data;
-    const char* name = "";  ///< for the message if it is refused
+    const char* name = "";  ///< for the message if it is rejected
   };
 
   void ask_next(std::int64_t now_ns) override;
@@ -43,7 +43,7 @@ class ControlClient final : public ClientSession {
   Asked set_byte(Purpose purpose, std::uint16_t key, std::uint8_t value, const char* name) const;
 
   std::uint8_t device_type_;
-  bool all_keys_ = true;  ///< the sensor has answered for all that a report can hold
+  bool all_keys_ = true;  ///< the sensor has answered for all contents of a report
   std::deque<Asked> to_ask_;
   Asked asked_;
   bool identified_ = false, is_application_ = false, told_firmware_ = false;

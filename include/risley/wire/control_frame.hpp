@@ -18,7 +18,7 @@
 
 namespace risley::wire {
 
-/// Bytes in front of the data of a control frame.
+/// Bytes before the data of a control frame.
 inline constexpr std::size_t kControlHeaderBytes = 24;
 
 /// Commands of the second generation.
@@ -36,20 +36,21 @@ enum class ControlCommand : std::uint16_t {
   raw_data = 0x0303,       ///< other data on and off
 };
 
-/// A control frame without what only carries it.
+/// A control frame without its transport fields.
 struct ControlFrame {
   ControlCommand command = ControlCommand::search;
   bool reply = false;
   bool from_sensor = false;
-  std::uint32_t sequence = 0;          ///< a reply repeats that of its request
+  std::uint32_t sequence = 0;          ///< a reply repeats the number of its request
   std::span<const std::uint8_t> data;  ///< of the bytes that were decoded, or are to be encoded
 };
 
 /// The bytes of a frame. @throws InvalidArgument for more data than a frame can carry
 std::vector<std::uint8_t> encode_control_frame(const ControlFrame& frame);
 
-/// The frame of a datagram, behind which bytes may stand. Needs no memory, whatever the bytes are.
-/// @return the frame, whose data are a part of the bytes, or why they are none
+/// The frame at the beginning of a datagram; bytes may follow. Allocates no memory, whatever the
+/// bytes are.
+/// @return the frame, with its data a part of the bytes, or the reason why they are not a frame
 std::variant<ControlFrame, FrameRefusal> decode_control_frame(std::span<const std::uint8_t> bytes);
 
 /// Keys of a sensor's settings and state. Those from kSerialKey on can only be read.
@@ -61,7 +62,7 @@ inline constexpr std::uint16_t kDataTypeKey = 0x0000,  ///< of points, 1 byte
     kAttitudeKey = 0x0012,                             ///< of installation, 24 bytes
     kViewKey = 0x0015,                                 ///< FieldOfView; that of the second follows
     kViewSwitchKey = 0x0017,                           ///< bits 0 and 1: which views count
-    kTargetStateKey = 0x001A,                          ///< work state that is wanted, 1 byte
+    kTargetStateKey = 0x001A,                          ///< requested work state, 1 byte
     kImuSwitchKey = 0x001C,                            ///< inertial samples on, 1 byte
     kSerialKey = 0x8000,                               ///< 16 characters
     kFirmwareKey = 0x8002,                             ///< version, 4 bytes
@@ -73,13 +74,13 @@ inline constexpr std::uint16_t kDataTypeKey = 0x0000,  ///< of points, 1 byte
     kFirmwareTypeKey = 0x8010,                         ///< 0 loader, 1 application
     kFaultsKey = 0x8011;                               ///< 8 of SensorReport::faults
 
-/// Work states, as kStateKey and kTargetStateKey have them.
+/// Work states, as values of kStateKey and kTargetStateKey.
 inline constexpr std::uint8_t kSamplingState = 1,  ///< it sends data
     kIdleState = 2,                                ///< nothing runs
     kStartingState = 6,                            ///< the motors start
     kReadyState = 9;                               ///< the motors run, the laser is off
 
-/// Where a sensor listens, and from where it sends. Several may be the same.
+/// Addresses on which a sensor listens and from which it sends. Several may be the same.
 struct ControlPorts {
   std::uint16_t search = 56000, command = 56100, push = 56200, points = 56300, imu = 56400,
                 log = 56500;
@@ -95,8 +96,8 @@ struct KeyValue {
   std::span<const std::uint8_t> value;
 };
 
-/// The list that a frame carries: those of set and push, and of the reply to get. Unknown keys are
-/// entries like others; a list that is cut off ends with its last whole entry. Empty for others.
+/// The list in a frame: those of set and push, and of the reply to get. Unknown keys are entries
+/// like others; a truncated list ends with its last complete entry. Empty for others.
 std::vector<KeyValue> list_of(const ControlFrame& frame);
 /// Data of a set or push with such a list.
 std::vector<std::uint8_t> encode_list(std::span<const KeyValue> list);
@@ -119,7 +120,7 @@ std::optional<SearchReply> search_reply_of(const ControlFrame& frame);
 /// Data of it.
 std::vector<std::uint8_t> encode_search_reply(const SearchReply& reply);
 
-/// Where a sensor is to send something.
+/// Destination of a sensor's data.
 struct HostTarget {
   Address address;
   std::uint16_t host_port = 0, sensor_port = 0;
@@ -152,10 +153,9 @@ struct SensorReport {
       {};  ///< number << 16 | level: 1 info, 2 warning, 3 error, 4 fatal
   friend bool operator==(const SensorReport&, const SensorReport&) = default;
 };
-/// Takes what a list says; the rest stays as it was.
+/// Applies the entries of a list; the rest stays unchanged.
 void update_report(SensorReport& report, std::span<const KeyValue> list);
-/// What is not well, each in words: "scanner: warning", "fault 0104: error". Empty for a sensor
-/// that is well.
+/// Problems, each in words: "scanner: warning", "fault 0104: error". Empty for a healthy sensor.
 std::vector<std::string> trouble_words(const SensorReport& report);
 
 /// "13.18.2.44" of the value of kFirmwareKey; empty for another length.

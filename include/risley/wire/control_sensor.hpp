@@ -21,7 +21,7 @@ class ControlSensor final : public SensorSession {
  public:
   /// Time between two pushes of its settings and state, ns.
   static constexpr std::int64_t kPushPeriod = 1'000'000'000;
-  /// From a request to its reply, ns: the maker's SDK misses what comes at once.
+  /// From a request to its reply, ns: the maker's SDK misses immediate replies.
   static constexpr std::int64_t kReplyDelay = 2'000'000;
   /// Until its motors run, ns.
   static constexpr std::int64_t kMotorStart = 1'000'000'000;
@@ -34,11 +34,10 @@ class ControlSensor final : public SensorSession {
   std::uint16_t broadcast_port() const override { return kSearchPort; }
   std::uint16_t data_port() const override { return ports_.points; }
   std::uint16_t imu_port() const override { return ports_.imu; }
-  /// Pushes, and the work state on its way to that which is wanted.
+  /// Pushes, and the work state on its way to the requested one.
   void advance(std::int64_t now_ns) override;
-  /// Requests with right checksums are answered, unknown ones too, to whom they come from. A target
-  /// has to be the address that it comes from or a multicast one, so that nobody is sent what
-  /// somebody else asked for.
+  /// Requests with right checksums are answered, unknown ones too, to their sender. A target must
+  /// be the sender's address or a multicast one, so that no third party is flooded with replies.
   void receive(const Endpoint& from, std::uint16_t port, std::span<const std::uint8_t> datagram,
                std::int64_t now_ns) override;
   std::uint8_t data_type() const override { return values_.at(kDataTypeKey)[0]; }

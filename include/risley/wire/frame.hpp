@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// The command frame of Livox's first generation: what host and sensor say to each other by UDP
-// besides the data packets of risley/recordings/livox/packet.hpp. All numbers are little-endian.
+// The command frame of Livox's first generation: UDP traffic between host and sensor in addition to
+// the data packets of risley/recordings/livox/packet.hpp. All numbers are little-endian.
 #pragma once
 
 #include <cstddef>
@@ -15,10 +15,10 @@ namespace risley::wire {
 
 /// Bytes of a frame around its data.
 inline constexpr std::size_t kFrameOverhead = 15;
-/// Longest frame that the protocol knows, bytes.
+/// Longest frame that the protocol allows, bytes.
 inline constexpr std::size_t kMostFrameBytes = 1400;
 
-/// What a frame is to its receiver.
+/// Type of a frame for its receiver.
 enum class FrameType : std::uint8_t { command = 0, reply = 1, message = 2 };
 
 /// Which command a frame is about.
@@ -27,10 +27,10 @@ struct CommandId {
   friend bool operator==(const CommandId&, const CommandId&) = default;
 };
 
-/// A frame without what only carries it.
+/// A frame without its transport fields.
 struct Frame {
   FrameType type = FrameType::command;
-  std::uint16_t sequence = 0;  ///< a reply repeats that of its command
+  std::uint16_t sequence = 0;  ///< a reply repeats the number of its command
   CommandId command;
   std::span<const std::uint8_t> data;  ///< of the bytes that were decoded, or are to be encoded
 };
@@ -40,7 +40,7 @@ enum class FrameFault : std::uint8_t {
   too_short,        ///< fewer bytes than a frame without data
   start,            ///< of another byte than 0xAA
   version,          ///< other than 1
-  length,           ///< the frame names another number of bytes than there are, or too many
+  length,           ///< the frame's length differs from the number of bytes, or is too large
   header_checksum,  ///< CRC-16
   type,             ///< neither command, reply nor message
   checksum,         ///< CRC-32
@@ -64,8 +64,8 @@ std::uint32_t frame_crc32(std::span<const std::uint8_t> bytes);
 /// The bytes of a frame. @throws InvalidArgument for more data than a frame can carry
 std::vector<std::uint8_t> encode_frame(const Frame& frame);
 
-/// The frame of a whole datagram. Needs no memory, whatever the bytes are.
-/// @return the frame, whose data are a part of the bytes, or why they are none
+/// The frame of a whole datagram. Allocates no memory, whatever the bytes are.
+/// @return the frame, whose data are a part of the bytes, or the reason why they are not a frame
 std::variant<Frame, FrameRefusal> decode_frame(std::span<const std::uint8_t> bytes);
 
 }  // namespace risley::wire

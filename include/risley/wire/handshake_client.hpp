@@ -13,7 +13,7 @@
 namespace risley::wire {
 
 /// A session with a sensor of the first generation: a handshake binds it to this host, and
-/// heartbeats keep it so.
+/// heartbeats maintain the binding.
 class HandshakeClient final : public ClientSession {
  public:
   HandshakeClient(const ClientSettings& settings, std::int64_t now_ns);

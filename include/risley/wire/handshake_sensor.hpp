@@ -13,7 +13,7 @@
 
 namespace risley::wire {
 
-/// What only some types of sensors can do.
+/// Features of only some types of sensors.
 struct SensorAbilities {
   bool return_modes = false;      ///< the host may choose returns: first, strongest, dual
   bool triple = false;            ///< three returns among them
@@ -23,13 +23,13 @@ struct SensorAbilities {
   std::uint16_t reserved = 0;     ///< Broadcast::reserved
 };
 
-/// A sensor of the first generation: it broadcasts until a host shakes hands, then obeys that host
-/// alone until it disconnects or its heartbeats stay away.
+/// A sensor of the first generation: it broadcasts until a host shakes hands, then obeys only that
+/// host until it disconnects or its heartbeats stop.
 class HandshakeSensor final : public SensorSession {
  public:
   /// Time between two broadcasts, ns.
   static constexpr std::int64_t kBroadcastPeriod = 1'000'000'000;
-  /// Time without a heartbeat after which the host is forgotten, ns.
+  /// Time without a heartbeat after which the host is dropped, ns.
   static constexpr std::int64_t kHeartbeatTimeout = 5'000'000'000;
   /// Shortest time between two messages of an abnormal status, ns.
   static constexpr std::int64_t kStatusPeriod = 100'000'000;
@@ -41,17 +41,17 @@ class HandshakeSensor final : public SensorSession {
   std::uint16_t broadcast_port() const override { return kBroadcastPort; }
   std::uint16_t data_port() const override { return kSensorPort; }
   std::uint16_t imu_port() const override { return kSensorPort; }
-  /// Broadcasts, heartbeats that stay away, messages of an abnormal status.
+  /// Broadcasts, missing heartbeats, messages of an abnormal status.
   void advance(std::int64_t now_ns) override;
-  /// Only commands with right checksums and lengths act, only those of the host, and only a
-  /// handshake where there is none: whose payload names the address that it comes from, so that
-  /// nobody is sent what somebody else asked for.
+  /// Only commands with right checksums and lengths act, only those of the host, and without a host
+  /// only a handshake: its payload must name the sender's address, so that no third party is
+  /// flooded with data.
   void receive(const Endpoint& from, std::uint16_t port, std::span<const std::uint8_t> datagram,
                std::int64_t now_ns) override;
   std::uint8_t data_type() const override;
   std::int64_t next_ns() const override;
 
-  /// As the sensor knows itself from now on, see recordings::Packet::status.
+  /// The sensor's own status from now on, see recordings::Packet::status.
   void set_status(std::uint32_t status) { status_ = status; }
   bool spherical() const { return spherical_; }            ///< as commands have set it
   ReturnMode return_mode() const { return return_mode_; }  ///< as commands have set it

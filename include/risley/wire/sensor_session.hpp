@@ -15,15 +15,15 @@
 
 namespace risley::wire {
 
-/// Who a virtual sensor is.
+/// Identity of a virtual sensor.
 struct SensorIdentity {
   std::string code;              ///< serial number (broadcast code), at most 15 characters
   std::uint8_t device_type = 1;  ///< as recordings::Device::type
   std::array<std::uint8_t, 4> firmware{};
-  Address address;  ///< what it says that its address is
+  Address address;  ///< its reported address
 };
 
-/// A sensor as hosts see it through commands. All times are ns of any clock that never goes back.
+/// A sensor as seen by hosts through commands. All times are ns of any clock that never goes back.
 class SensorSession {
  public:
   virtual ~SensorSession() = default;
@@ -39,32 +39,32 @@ class SensorSession {
 
   /// Ports at which the sensor listens.
   virtual std::vector<std::uint16_t> ports() const = 0;
-  /// That of them at which it hears what is sent to everybody; 0: none.
+  /// The one of them for broadcasts; 0: none.
   virtual std::uint16_t public_port() const { return 0; }
   /// Port of hosts to which it broadcasts.
   virtual std::uint16_t broadcast_port() const = 0;
   /// Lets time pass.
   virtual void advance(std::int64_t now_ns) = 0;
-  /// A datagram that arrived at a port. What is not for this sensor in its state is counted and
-  /// does nothing else.
+  /// A datagram that arrived at a port. Datagrams not meant for this sensor in its state are
+  /// counted and have no other effect.
   virtual void receive(const Endpoint& from, std::uint16_t port,
                        std::span<const std::uint8_t> datagram, std::int64_t now_ns) = 0;
-  /// Data type of the packets that are to be sent.
+  /// Data type of the packets to send.
   virtual std::uint8_t data_type() const = 0;
   virtual std::uint16_t data_port() const = 0;  ///< from which points are sent
   virtual std::uint16_t imu_port() const = 0;   ///< from which inertial samples are sent
-  /// What the sensor's clock follows from now on, as SensorReport::sync, and by how much it is
-  /// ahead of that of the session, ns.
+  /// Time source of the sensor's clock from now on, as SensorReport::sync, and its lead over the
+  /// session's clock, ns.
   virtual void set_clock(std::uint8_t /*sync*/, std::int64_t /*ahead_ns*/) {}
-  /// When advance() or take_datagrams() has something to do next.
+  /// Time at which advance() or take_datagrams() has something to do next.
   virtual std::int64_t next_ns() const = 0;
   /// Datagrams that are due since the last call.
   virtual std::vector<Outgoing> take_datagrams(std::int64_t now_ns);
 
-  bool connected() const { return connected_; }  ///< a host has said where data go
+  bool connected() const { return connected_; }  ///< a host has named the destination of the data
   bool sampling() const { return sampling_; }    ///< data are to be sent
   bool imu() const { return imu_; }              ///< inertial samples are to be sent
-  /// Where data go; of use while connected.
+  /// Destination of the data; valid while connected.
   const Endpoint& data_target() const { return data_target_; }
   /// Where inertial samples go; of use while connected.
   const Endpoint& imu_target() const { return imu_target_; }

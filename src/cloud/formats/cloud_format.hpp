@@ -21,15 +21,17 @@ struct CloudWriterFormat {
                                          const CloudWriterOptions& options);
 };
 
-extern const CloudWriterFormat kLasFormat;     // las.cpp
-extern const CloudWriterFormat kLazFormat;     // laz.cpp, where there is LASzip
-extern const CloudWriterFormat kPlyFormat;     // ply.cpp
-extern const CloudWriterFormat kPcdFormat;     // pcd.cpp
-extern const CloudWriterFormat kNpyFormat;     // npy.cpp
-extern const CloudWriterFormat kCsvFormat;     // csv.cpp
-extern const CloudWriterFormat kXyzFormat;     // csv.cpp
-extern const CloudWriterFormat kNetcdfFormat;  // netcdf.cpp
-extern const CloudWriterFormat kRosbagFormat;  // rosbag.cpp
+extern const CloudWriterFormat kLasFormat;      // las.cpp
+extern const CloudWriterFormat kLazFormat;      // laz.cpp, where there is LASzip
+extern const CloudWriterFormat kPlyFormat;      // ply.cpp
+extern const CloudWriterFormat kPcdFormat;      // pcd.cpp
+extern const CloudWriterFormat kNpyFormat;      // npy.cpp
+extern const CloudWriterFormat kCsvFormat;      // csv.cpp
+extern const CloudWriterFormat kXyzFormat;      // csv.cpp
+extern const CloudWriterFormat kNetcdfFormat;   // netcdf.cpp
+extern const CloudWriterFormat kRos1BagFormat;  // bags.cpp
+extern const CloudWriterFormat kRos2BagFormat;  // bags.cpp
+extern const CloudWriterFormat kMcapFormat;     // bags.cpp
 
 /// All formats of this build, in the order of the help.
 const std::vector<const CloudWriterFormat*>& all_cloud_formats();

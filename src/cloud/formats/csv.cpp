@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Points as text, one line each. Numbers have the fewest digits that give the same number of their
-// type again (of 32 bits but for time and coordinates); what is not known is nan.
+// type again (of 32 bits except for time and coordinates); unknown values are nan.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -82,8 +82,8 @@ std::unique_ptr<CloudWriter> create_csv(const std::string& path, const CloudHead
   return std::make_unique<TextWriter>(path, std::move(fields), head + '\n', ',');
 }
 
-/// The intensity follows the coordinates, which is where most readers of .xyz look for it, and the
-/// names stand in a comment by which CloudCompare names its scalar fields.
+/// The intensity follows the coordinates, as most readers of .xyz expect, and the names are in a
+/// comment from which CloudCompare names its scalar fields.
 std::unique_ptr<CloudWriter> create_xyz(const std::string& path, const CloudHeader& header,
                                         const CloudWriterOptions&) {
   std::vector<PointField> fields = all_fields(header);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// What stands before the first point: public header and variable length records.
+// The part before the first point: public header and variable length records.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -30,14 +30,14 @@ using recordings::las::kSpecificationUser;
 /// The 16 bits of a variable length record's length.
 constexpr std::size_t kMaxRecordBytes = std::numeric_limits<std::uint16_t>::max();
 
-/// Text in a field of fixed length, filled up with zeros.
+/// Text in a field of fixed length, padded with zeros.
 std::uint8_t* put_text(std::uint8_t* out, std::string_view text, std::size_t length) {
   std::memset(out, 0, length);
   std::memcpy(out, text.data(), std::min(text.size(), length));
   return out + length;
 }
 
-/// What header fields may hold: printable ASCII.
+/// Allowed characters of header fields: printable ASCII.
 std::string plain(std::string text) {
   std::ranges::replace_if(
       text, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
@@ -78,10 +78,11 @@ std::vector<PointField> extra_fields(const CloudHeader& header) {
 /// The coordinate system of the points: a map, or the sensor's own or another frame in metres.
 VariableLengthRecord coordinate_system(const CloudHeader& header) {
   std::string text = header.frame.wkt;
-  if (text.empty() && header.trajectory) {
-    text =
-        "LOCAL_CS[\"frame of the trajectory\",LOCAL_DATUM[\"trajectory origin\",32767],"
-        "UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH],AXIS[\"Z\",UP]]";
+  if (text.empty() && header.frame.name != PointFrame{}.name) {
+    text = fmt::format(
+        "LOCAL_CS[\"frame of the {0}\",LOCAL_DATUM[\"{0} origin\",32767],"
+        "UNIT[\"metre\",1],AXIS[\"X\",EAST],AXIS[\"Y\",NORTH],AXIS[\"Z\",UP]]",
+        header.frame.name);
   } else if (text.empty()) {
     std::string name = plain(header.sensor.empty() ? "sensor" : header.sensor + " sensor");
     std::ranges::replace(name, '"', '\'');
@@ -94,8 +95,17 @@ VariableLengthRecord coordinate_system(const CloudHeader& header) {
   return {"LASF_Projection", 2112, "OGC WKT coordinate system", std::move(text)};
 }
 
-/// The trajectory's errors: what they are as text in record 100, where the sensor was as packed
-/// numbers in the records from 101 on. docs/files.md
+/// Names of the loadings' factors, as text in record 99. docs/files/clouds.md
+void append_factors(const CloudHeader& header, std::vector<VariableLengthRecord>& records) {
+  std::string text =
+      fmt::format("common_factors: 1\nof_one_source: {}\n", header.factors_of_source);
+  for (const std::string& name : header.factors) text += fmt::format("factor: {}\n", name);
+  text.push_back('\0');
+  records.push_back({"risley", 99, "Common factors", std::move(text)});
+}
+
+/// The trajectory's errors: their description as text in record 100, the sensor's positions as
+/// packed numbers in the records from 101 on. docs/files.md
 void append_trajectory(const TrajectoryErrors& errors, std::vector<VariableLengthRecord>& records) {
   std::string text = "trajectory_errors: 1\n";
   const auto list = [&text](std::string_view name, std::span<const double> values) {
@@ -155,6 +165,7 @@ Layout::Layout(const CloudHeader& header, const CloudWriterOptions& options)
   records_.push_back(
       {kSpecificationUser, kExtraBytesNumber, "Extra bytes", std::move(descriptors)});
   records_.push_back(coordinate_system(header));
+  if (!header.factors.empty()) append_factors(header, records_);
   if (header.trajectory) append_trajectory(*header.trajectory, records_);
   std::string text;
   for (const auto& [name, value] : header.provenance) text += fmt::format("{} = {}\n", name, value);
@@ -215,7 +226,7 @@ std::vector<std::uint8_t> Layout::head(const Summary& summary) const {
   out = put<std::uint32_t>(out, static_cast<std::uint32_t>(records_.size()));
   out = put<std::uint8_t>(out, point_format());
   out = put<std::uint16_t>(out, static_cast<std::uint16_t>(record_bytes()));
-  out += 6 * 4;  // the counters of old, which point formats from 6 on leave 0
+  out += 6 * 4;  // the legacy counters, which point formats from 6 on leave 0
   for (int axis = 0; axis < 3; ++axis) out = put<double>(out, scale_);
   for (const double offset : offset_) out = put<double>(out, offset);
   for (std::size_t axis = 0; axis < 3; ++axis) {

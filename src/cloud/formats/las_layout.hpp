@@ -18,7 +18,7 @@
 
 namespace risley::cloud::las {
 
-/// What the public header states about the points, gathered while they are packed.
+/// Statistics of the points for the public header, gathered while they are packed.
 struct Summary {
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -38,7 +38,7 @@ struct VariableLengthRecord {
   std::string data;          ///< at most 65535 bytes
 };
 
-/// The public header's numbers that depend on the points, as they stand in the file.
+/// The public header's numbers that depend on the points, as stored in the file.
 struct HeaderNumbers {
   std::uint16_t creation_day = 0, creation_year = 0;  ///< 0 where unknown
   std::array<double, 3> low{}, high{};                ///< m; 0 without points
@@ -58,8 +58,8 @@ struct HeaderNumbers {
 ///   1; point source the strip of a flight, otherwise 1: the points are of this file.
 /// - The trajectory's errors of a moving sensor: records of the user "risley", docs/files.md.
 /// - Extra bytes: the other fields, first those of float32.
-/// - File creation date: that of the first point in UTC, otherwise that of the options. It is
-///   never today: the same points give the same bytes.
+/// - File creation date: that of the first point in UTC, otherwise that of the options. It is never
+/// today: the same points give the same bytes.
 class Layout {
  public:
   /// @throws InvalidArgument for a scale that is not positive, and for more common factors or
@@ -78,16 +78,16 @@ class Layout {
   const std::vector<VariableLengthRecord>& records() const { return records_; }
 
   HeaderNumbers numbers(const Summary& summary) const;
-  /// All that stands before the first point; its length does not depend on the points.
+  /// Everything before the first point; its length does not depend on the points.
   std::vector<std::uint8_t> head(const Summary& summary) const;
 
-  /// Points per call of pack: what it writes stays in the cache, and so do its columns.
+  /// Points per call of pack: its output stays in the cache, and so do its columns.
   static constexpr std::size_t kBlock = 256;
 
-  /// Packs the rows [first, first + rows), at most kBlock, into records one after another. Points
-  /// are counted from 1 over the whole file in what it throws.
+  /// Packs the rows [first, first + rows), at most kBlock, into records one after another.
+  /// Exceptions count points from 1 over the whole file.
   /// @throws InvalidArgument for a coordinate or a return that the format cannot hold; the summary
-  /// is then of no use
+  /// is then invalid
   void pack(const Points& points, std::size_t first, std::size_t rows, std::uint8_t* out,
             Summary& summary);
 

@@ -127,7 +127,7 @@ class LazWriter final : public CloudWriter {
     point.extended_point_type = 1;
     point.extended_return_number = number & 15U;
     point.extended_number_of_returns = returns & 15U;
-    // LASzip wants the fields of old to agree.
+    // LASzip requires consistent legacy fields.
     point.return_number = std::min(number, 7U) & 7U;
     point.number_of_returns = std::min(returns, 7U) & 7U;
     point.point_source_ID = load<laszip_U16>(record + 20);
@@ -137,8 +137,8 @@ class LazWriter final : public CloudWriter {
     check(laszip_write_point(laszip_));
   }
 
-  /// Fills in what the header states about the points, LAS 1.4. LASzip's own inventory counts with
-  /// 32 bits.
+  /// Fills in the header's statistics of the points, LAS 1.4. LASzip's own inventory counts with 32
+  /// bits.
   void write_summary() {
     const las::HeaderNumbers numbers = layout_.numbers(summary_);
     put_at(90, numbers.creation_day);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // NetCDF-4 after the CF conventions: one variable per field along the dimension "point", loadings
-// along "point" and "factor". Equal points give equal bytes, in whatever pieces they are written:
+// along "point" and "factor". Equal points give equal bytes, however they are split into calls:
 // only whole blocks go to the file.
 #include "risley/tables/netcdf.hpp"
 
@@ -54,7 +54,7 @@ class NetcdfWriter final : public CloudWriter {
   }
 
  private:
-  /// One variable with its rows that are not in the file yet.
+  /// One variable with its rows not yet in the file.
   struct Variable {
     RecordPacker packer;  ///< of a record with one number per entry of the inner dimension
     std::uint8_t* block;  ///< [kChunkRows] records
@@ -72,10 +72,13 @@ class NetcdfWriter final : public CloudWriter {
     file_.put_text("frame", header.frame.text);
     if (!header.frame.wkt.empty()) file_.put_text("crs_wkt", header.frame.wkt);
     file_.put_text("time_reference", recordings::to_string(header.time_reference));
+    if (header.factors_of_source > 0) {
+      file_.put_text("factors_of_one_source", std::to_string(header.factors_of_source));
+    }
   }
 
-  /// The variables of one column. Those of several alike follow each other by their names; columns
-  /// of one name, those of the common factors, make one variable of two dimensions.
+  /// The variables of one column. Similar variables follow each other by their names; columns of
+  /// one name, those of the common factors, make one variable of two dimensions.
   void define(const PointColumn& column, const CloudHeader& header) {
     std::map<std::string, std::vector<PointField>> variables;
     for (PointField& field : fields_of(column, header)) {
@@ -147,7 +150,7 @@ class NetcdfWriter final : public CloudWriter {
     const tables::NetcdfStorage storage{0, true, false};
     trajectory_.push_back(file_.define<std::int64_t>("trajectory_time_ns", {&record}, storage));
     file_.put_text(trajectory_.back(), "units", "ns");
-    file_.put_text(trajectory_.back(), "long_name", "time of a place of the trajectory");
+    file_.put_text(trajectory_.back(), "long_name", "time of a pose of the trajectory");
     for (const char axis : {'x', 'y', 'z'}) {
       trajectory_.push_back(
           file_.define<double>(fmt::format("trajectory_{}_m", axis), {&record}, storage));

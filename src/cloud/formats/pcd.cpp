@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// PCD 0.7, binary, of the Point Cloud Library: coordinates in single precision, because that is
-// what its point types are made of.
+// PCD 0.7, binary, of the Point Cloud Library: coordinates in single precision, as in its point
+// types.
 #include <fmt/format.h>
 
 #include "cloud/formats/cloud_format.hpp"
@@ -24,7 +24,7 @@ std::unique_ptr<CloudWriter> create_pcd(const std::string& path, const CloudHead
     counts += " 1";
   }
   const auto text = [notes, names, sizes, types, counts](std::uint64_t points) {
-    // The number of points stands there twice.
+    // The header states the number of points twice.
     const std::string padding = header_padding(points, '.');
     return fmt::format(
         "# .PCD v0.7 - Point Cloud Data file format\n{}# padding {}{}\nVERSION 0.7\nFIELDS{}\n"

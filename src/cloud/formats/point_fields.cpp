@@ -17,7 +17,7 @@
 namespace risley::cloud {
 namespace {
 
-/// Rows that are worked on together: what is read and written stays in the cache.
+/// Rows processed together: data read and written stay in the cache.
 constexpr std::size_t kPackedRows = 256;
 
 /// Square roots of up to kPackedRows numbers. std::sqrt sets errno below zero, which keeps

@@ -11,7 +11,7 @@
 
 namespace risley::cloud {
 
-/// What formats call a type, as far as they have it.
+/// Name of a type in formats, if they support it.
 struct TypeNames {
   std::size_t bytes;
   const char *npy, *ply;
@@ -38,8 +38,7 @@ void with_number_type(PointType type, const Function& function) {
   if (type == PointType::int64) function.template operator()<std::int64_t>();
 }
 
-/// A number of every point as files hold it: one of those that an entry of kPointColumns stands
-/// for.
+/// A number of every point in files: one of those that an entry of kPointColumns represents.
 struct PointField {
   const PointColumn* column;
   std::string name, note;         ///< in records; no name: not in records
@@ -60,7 +59,7 @@ std::vector<PointField> fields_of(const PointColumn& column, const CloudHeader& 
 /// All of records: X, Y and Z, then the others in the order of kPointColumns.
 std::vector<PointField> all_fields(const CloudHeader& header);
 
-/// Points as packed records, little-endian: what several binary formats share.
+/// Points as packed records, little-endian, shared by several binary formats.
 class RecordPacker {
  public:
   explicit RecordPacker(std::vector<PointField> fields);
@@ -71,7 +70,7 @@ class RecordPacker {
   std::size_t offset(std::size_t field) const { return offsets_[field]; }
 
   /// Packs the rows [first, first + rows) into records that begin `stride` bytes apart, the first
-  /// at `out`, which may be null where there are no rows.
+  /// at `out`, which may be null if there are no rows.
   void pack(const Points& points, std::size_t first, std::size_t rows, std::uint8_t* out,
             std::size_t stride) const;
 

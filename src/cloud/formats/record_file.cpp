@@ -18,7 +18,8 @@ namespace {
 /// Longest line of comment: the common PLY reader rply takes 1024 bytes.
 constexpr std::size_t kNoteBytes = 900;
 
-/// Where a line may end at or before `end`: not within a character of several bytes (UTF-8).
+/// Largest possible end of a line at or before `end`: not within a character of several bytes
+/// (UTF-8).
 std::size_t character_end(std::string_view text, std::size_t end) {
   const auto continues = [&](std::size_t i) { return (text[i] & 0xC0) == 0x80; };
   std::size_t i = end;
@@ -104,7 +105,9 @@ std::vector<std::string> header_notes(const CloudHeader& header,
              unit.empty() ? field.note : fmt::format("[{}] {}", unit, field.note));
   }
   for (std::size_t i = 0; i < header.factors.size(); ++i) {
-    add_note(notes, fmt::format("factor {}", i + 1), header.factors[i]);
+    const bool of_source = i + header.factors_of_source >= header.factors.size();
+    add_note(notes, fmt::format("factor {}", i + 1),
+             header.factors[i] + (of_source ? " (of one station's points)" : ""));
   }
   for (const auto& [name, value] : header.provenance) add_note(notes, name, value);
   return notes;

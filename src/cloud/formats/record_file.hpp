@@ -17,16 +17,16 @@
 
 namespace risley::cloud {
 
-/// A file written in order; the calls throw FileError with the system's words.
+/// A file written in order; the calls throw FileError with the system's message.
 class SequentialFile {
  public:
   explicit SequentialFile(const std::string& path);
 
   void append(const void* bytes, std::size_t count);
   void append(std::string_view text) { append(text.data(), text.size()); }
-  /// Writes over the beginning of the file; nothing may follow but close().
+  /// Overwrites the beginning of the file; only close() may follow.
   void overwrite_beginning(std::string_view text);
-  /// Completes the file and gives it its name.
+  /// Completes the file and renames it to its final name.
   void close();
 
  private:
@@ -36,8 +36,8 @@ class SequentialFile {
   std::ofstream stream_;  // after output_: closed before the temporary is removed
 };
 
-/// Packed records behind a text header with their number. The header is written again
-/// by close(), so its length must not depend on the number of points.
+/// Packed records behind a text header with their number. The header is rewritten by close(), so
+/// its length must not depend on the number of points.
 class RecordFile final : public CloudWriter {
  public:
   using HeaderText = std::function<std::string(std::uint64_t points)>;
@@ -55,12 +55,12 @@ class RecordFile final : public CloudWriter {
   std::vector<std::uint8_t> records_;
 };
 
-/// As many of one character as a header needs for its length not to depend on the number of points
-/// that stands in it: at least one.
+/// Padding that keeps a header's length independent of the number of points in it: at least one
+/// character.
 std::string header_padding(std::uint64_t points, char fill);
 
-/// What a reader of a header's comments wants to know: the sensor, the frame, the fields with their
-/// units and the provenance. Lines without line feeds and short enough for every reader.
+/// Contents of a header's comments: the sensor, the frame, the fields with their units and the
+/// provenance. Lines without line feeds and short enough for every reader.
 std::vector<std::string> header_notes(const CloudHeader& header,
                                       const std::vector<PointField>& fields);
 

@@ -10,8 +10,8 @@ const std::vector<const CloudWriterFormat*>& all_cloud_formats() {
 #ifdef RISLEY_HAS_LASZIP
       &kLazFormat,
 #endif
-      &kPlyFormat, &kPcdFormat,    &kNpyFormat,    &kCsvFormat,
-      &kXyzFormat, &kNetcdfFormat, &kRosbagFormat,
+      &kPlyFormat,    &kPcdFormat,     &kNpyFormat,     &kCsvFormat,  &kXyzFormat,
+      &kNetcdfFormat, &kRos1BagFormat, &kRos2BagFormat, &kMcapFormat,
   };
   return formats;
 }

@@ -5,6 +5,7 @@
 
 #include "risley/bags/bag.hpp"
 
+#include "recordings/formats/bag_writer.hpp"
 #include "recordings/formats/format.hpp"
 #include "recordings/formats/livox_messages.hpp"
 
@@ -16,6 +17,12 @@ bool is_bag(std::string_view head) {
   return bags::bag_kind(head) == Kind;
 }
 
+template <bags::BagKind Kind>
+std::unique_ptr<Writer> create_bag(const std::string& path, const RecordingHeader& header,
+                                   const WriteOptions& options) {
+  return create_bag_recording(path, Kind, header, options);
+}
+
 template <const Format& Its, bags::BagKind Kind>
 std::unique_ptr<Reader> open_bag(const io::InputFile& file, const Progress& progress) {
   return std::make_unique<MessageReader>(bags::open_bag(file, Kind, progress), Its.name);
@@ -25,26 +32,29 @@ std::unique_ptr<Reader> open_bag(const io::InputFile& file, const Progress& prog
 
 const Format kRos1BagFormat = {
     "ros1-bag",
-    "",
-    "ROS 1 bag: messages of Livox drivers, point clouds (read only)",
+    ".bag",
+    "ROS 1 bag: messages of Livox drivers, point clouds",
     is_bag<bags::BagKind::ros1>,
     open_bag<kRos1BagFormat, bags::BagKind::ros1>,
+    create_bag<bags::BagKind::ros1>,
 };
 
 const Format kRos2BagFormat = {
     "ros2-bag",
-    "",
-    "ROS 2 bag in SQLite (.db3): messages of Livox drivers, point clouds (read only)",
+    ".db3",
+    "ROS 2 bag, a folder with a SQLite database: messages of Livox drivers, point clouds",
     is_bag<bags::BagKind::ros2>,
     open_bag<kRos2BagFormat, bags::BagKind::ros2>,
+    create_bag<bags::BagKind::ros2>,
 };
 
 const Format kMcapFormat = {
     "mcap",
-    "",
-    "ROS 2 or ROS 1 bag in MCAP: messages of Livox drivers, point clouds (read only)",
+    ".mcap",
+    "ROS 2 or ROS 1 bag in MCAP: messages of Livox drivers, point clouds",
     is_bag<bags::BagKind::mcap>,
     open_bag<kMcapFormat, bags::BagKind::mcap>,
+    create_bag<bags::BagKind::mcap>,
 };
 
 }  // namespace risley::recordings

@@ -180,7 +180,7 @@ bool BinaryTableReader::fill_block() {
   }
   rows_taken_ += block_rows_;
   if (!damage_ && rows_taken_ == table_.rows) {
-    // What packs the bytes may find only behind the last one that they are wrong.
+    // A decompressor may detect damage only after the last byte.
     for (const std::size_t i : used_lanes_) {
       std::uint8_t byte = 0;
       const bool more = lanes_[i].source->read(&byte, 1) > 0;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Tables of binary numbers with named columns, however they lie in a file: point by point, column
-// by column, packed or not.
+// Tables of binary numbers with named columns, in any layout in a file: point by point, column by
+// column, packed or not.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@
 
 namespace risley::recordings {
 
-/// A type of numbers: its bytes and how they become a cell.
+/// A type of numbers: its bytes and their conversion to a cell.
 struct NumberType {
   enum class Kind : std::uint8_t { signed_integer, unsigned_integer, floating } kind;
   std::size_t bytes = 0;  ///< 1, 2, 4 or 8; 4 or 8 of floating
@@ -33,8 +33,7 @@ struct NumberType {
 /// A type by its kind ('i', 'u', 'f' in any case) and bytes; empty when there is none of these.
 std::optional<NumberType> number_type(char kind, std::uint64_t bytes, bool big_endian = false);
 
-/// Records of one size that follow each other; of a table with one column after the other, each
-/// column is a lane.
+/// Consecutive records of one size; in a table stored column by column, each column is a lane.
 struct TableLane {
   std::function<std::unique_ptr<ByteSource>()> open;  ///< at its first record
   std::size_t record_bytes = 0;
@@ -50,18 +49,18 @@ struct BinaryTable {
   std::uint64_t rows = 0;
   std::vector<TableLane> lanes;
   std::vector<TableColumn> columns;
-  std::vector<Warning> warnings;     ///< of what stands before the rows
-  std::uint64_t columns_offset = 0;  ///< where the file names its columns
+  std::vector<Warning> warnings;     ///< of the part before the rows
+  std::uint64_t columns_offset = 0;  ///< if the file names its columns
 };
 
 /// Longest record of a lane.
 inline constexpr std::size_t kMostRecordBytes = std::size_t{1} << 16;
 
-/// Reads the rows of a binary table. Where the file has fewer than it says, FileError follows the
-/// last one.
+/// Reads the rows of a binary table. If the file has fewer than stated, FileError follows the last
+/// one.
 class BinaryTableReader final : public Reader {
  public:
-  /// @throws FileError when no rows can be made of the columns
+  /// @throws FileError when the columns cannot form rows
   BinaryTableReader(std::string path, std::string_view format, BinaryTable table);
 
   bool read(Chunk& chunk, std::size_t max_rows) override;
@@ -93,7 +92,7 @@ class BinaryTableReader final : public Reader {
   std::vector<Decimal> cells_;
   std::size_t block_rows_ = 0, next_ = 0, rows_per_block_ = kMostBlockRows;
   std::uint64_t rows_taken_ = 0;               ///< into blocks
-  std::optional<FileError> damage_, pending_;  ///< behind the block; behind the last chunk
+  std::optional<FileError> damage_, pending_;  ///< after the block; after the last chunk
 };
 
 }  // namespace risley::recordings

@@ -53,7 +53,7 @@ bool LzfSource::packed_byte(std::uint8_t& byte) {
   return true;
 }
 
-/// Reads what the next run of bytes is. @return false at the end or at damage
+/// Reads the type of the next run of bytes. @return false at the end or at damage
 bool LzfSource::next_run() {
   constexpr std::uint8_t kFewestCopied = 2, kLongRun = 7, kLiteralRuns = 32;
   std::uint8_t control = 0;

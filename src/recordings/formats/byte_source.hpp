@@ -12,7 +12,7 @@
 
 namespace risley::recordings {
 
-/// Bytes that are read in their order, of a file or of something packed into one.
+/// Bytes read sequentially, from a file or from data packed into one.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
@@ -22,18 +22,18 @@ class ByteSource {
   virtual std::size_t read(std::uint8_t* bytes, std::size_t count) = 0;
   /// Steps over bytes. @return how many there were
   virtual std::uint64_t skip(std::uint64_t count);
-  /// Where in the file the next byte comes from.
+  /// Position in the file of the next byte.
   virtual std::uint64_t file_offset() const = 0;
-  /// Whether the bytes are those of the file, one by one.
+  /// Whether the bytes equal those of the file, one by one.
   virtual bool is_plain() const { return false; }
-  /// Why there are no more bytes; empty when this is just the end.
+  /// Reason why there are no more bytes; empty at the normal end.
   const std::string& problem() const { return problem_; }
 
  protected:
   std::string problem_;
 };
 
-/// The bytes [begin, end) of a file, as far as it has them.
+/// The bytes [begin, end) of a file, or as many of them as it has.
 class FileSource final : public ByteSource {
  public:
   /// @throws FileError

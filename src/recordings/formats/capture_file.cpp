@@ -26,12 +26,13 @@ constexpr std::array<std::uint16_t, 3> kVlanTags = {0x8100, 0x88A8, 0x9100};
 constexpr std::size_t kUdpHeaderBytes = 8;
 constexpr std::uint8_t kUdp = 17;
 
-/// A number in the order of networks.
+/// A number in network byte order.
 std::uint16_t network16(Bytes bytes, std::size_t at) {
   return static_cast<std::uint16_t>(bytes[at] << 8U | bytes[at + 1]);
 }
 
-/// What follows a protocol number, behind the tags of virtual networks; empty unless it is IPv4.
+/// The data after a protocol number, and after the tags of virtual networks; empty unless it is
+/// IPv4.
 Bytes behind_tags(Bytes bytes, std::size_t protocol_at, std::size_t header_bytes) {
   if (bytes.size() < header_bytes) return {};
   std::uint16_t protocol = network16(bytes, protocol_at);
@@ -58,7 +59,7 @@ Bytes ip_of(int link_type, Bytes record) {
     case DLT_NULL:
     case DLT_LOOP: {
       if (record.size() < kFamilyBytes) return {};
-      // In the order of the machine that captured, which need not be this one.
+      // In the byte order of the capturing machine, which may differ from this one's.
       constexpr std::uint32_t kInet = 2, kInetSwapped = 0x02000000;
       const auto family = io::load<std::uint32_t>(record.data());
       return family == kInet || family == kInetSwapped ? record.subspan(kFamilyBytes) : Bytes{};
@@ -81,7 +82,7 @@ bool is_capture(std::string_view head) {
   constexpr std::uint32_t kSectionHeader = 0x0A0D0D0A, kByteOrder = 0x1A2B3C4D,
                           kByteOrderSwapped = 0x4D3C2B1A;
   if (words[0] == kSectionHeader) return words[2] == kByteOrder || words[2] == kByteOrderSwapped;
-  // Microseconds, nanoseconds, and records with fields of their own, each in both byte orders.
+  // Microseconds, nanoseconds, and records with other fields, each in both byte orders.
   constexpr std::array<std::uint32_t, 6> kMagics = {0xA1B2C3D4, 0xD4C3B2A1, 0xA1B23C4D,
                                                     0x4D3CB2A1, 0xA1B2CD34, 0x34CDB2A1};
   return std::find(kMagics.begin(), kMagics.end(), words[0]) != kMagics.end();
@@ -126,7 +127,7 @@ std::optional<CapturedDatagram> CaptureFile::next() {
     }
     if (result != 1) {
       const std::string_view reason = ::pcap_geterr(capture_.get());
-      // libpcap reads captures of several interfaces where all have one type of link.
+      // libpcap reads captures of several interfaces if all have one type of link.
       const bool mixed = reason.find("different from") != reason.npos;
       throw FileError(
           path_, {datagram.offset, {}},
@@ -134,13 +135,13 @@ std::optional<CapturedDatagram> CaptureFile::next() {
                       mixed ? "the capture holds interfaces that cannot be read together"
                             : "the capture is cut off or damaged in the record that begins here",
                       reason,
-                      mixed ? "; write those of the sensor into a file of their own, as `tshark -r "
-                              "IN -Y \"frame.interface_id == 0\" -w OUT` does"
+                      mixed ? "; extract those of the sensor to a separate file, for example with "
+                              "`tshark -r IN -Y \"frame.interface_id == 0\" -w OUT`"
                             : ""));
     }
     position_ = static_cast<std::uint64_t>(::ftello(::pcap_file(capture_.get())));
     constexpr std::int64_t kSecond = 1'000'000'000;
-    // Damaged times stay within what 64 bits hold.
+    // Damaged times stay within 64 bits.
     const std::int64_t seconds = std::clamp<std::int64_t>(record->ts.tv_sec, 0, 4 * kSecond);
     datagram.time_ns = seconds * kSecond + std::clamp<std::int64_t>(record->ts.tv_usec, 0, kSecond);
 
@@ -155,14 +156,14 @@ std::optional<CapturedDatagram> CaptureFile::next() {
       continue;
     }
     if (ip_header_bytes < kLeastIpBytes || ip.size() < ip_header_bytes + kUdpHeaderBytes) continue;
-    // A length of 0 stands where the network card was to fill it in.
+    // A length of 0 is left for the network card to fill in.
     constexpr std::size_t kAnyLength = 0xFFFF;
-    const std::size_t told =
+    const std::size_t stated =
         network16(ip, kLengthAt) == 0 ? kAnyLength : std::size_t{network16(ip, kLengthAt)};
-    if (told < ip_header_bytes + kUdpHeaderBytes) continue;
-    const Bytes udp = ip.first(std::min(ip.size(), told)).subspan(ip_header_bytes);
+    if (stated < ip_header_bytes + kUdpHeaderBytes) continue;
+    const Bytes udp = ip.first(std::min(ip.size(), stated)).subspan(ip_header_bytes);
     const std::size_t udp_bytes = network16(udp, 4);
-    if (udp_bytes < kUdpHeaderBytes || ip_header_bytes + udp_bytes > told) continue;
+    if (udp_bytes < kUdpHeaderBytes || ip_header_bytes + udp_bytes > stated) continue;
     datagram.from = {address_at(ip, kFromAt), network16(udp, 0)};
     datagram.length = udp_bytes - kUdpHeaderBytes;
     datagram.bytes = udp.first(std::min(udp.size(), udp_bytes)).subspan(kUdpHeaderBytes);

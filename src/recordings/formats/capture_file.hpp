@@ -18,34 +18,35 @@ struct pcap;
 
 namespace risley::recordings {
 
-/// Whether a file that begins so is a capture: pcap in any byte order, or pcapng.
+/// Whether a file with this beginning is a capture: pcap in any byte order, or pcapng.
 bool is_capture(std::string_view head);
 
-/// A UDP datagram that somebody's program saw on a network.
+/// A captured UDP datagram.
 struct CapturedDatagram {
   wire::Endpoint from;
   std::span<const std::uint8_t> bytes;  ///< its data, until the next call
-  std::size_t length = 0;               ///< of the data as they were sent; more than bytes are cut
+  std::size_t length = 0;               ///< of the data as sent; if larger than bytes, they are
+                                        ///< truncated
   std::int64_t time_ns = 0;             ///< when it was captured, ns since 1970
-  std::uint64_t offset = 0;             ///< in the file, of the record that holds it
+  std::uint64_t offset = 0;             ///< in the file, of its record
 };
 
-/// Reads the UDP datagrams of a capture, as libpcap gives its records. Everything else is stepped
-/// over.
+/// Reads the UDP datagrams of a capture, from libpcap's records. Everything else is stepped over.
 class CaptureFile {
  public:
-  /// @throws FileError when it is no capture, cut off in its header, or of a link type that is not
-  ///         Ethernet, Linux cooked (SLL, SLL2), raw IP or loopback
+  /// @throws FileError when it is not a capture, truncated in its header, or of a link type that is
+  /// not Ethernet, Linux cooked (SLL, SLL2), raw IP or loopback
   explicit CaptureFile(const io::InputFile& file);
 
   const std::string& path() const { return path_; }  ///< as it was given
-  /// @return the next datagram; empty at the end of a whole file
-  /// @throws FileError at a record that is cut off or damaged, with its place; then nothing follows
+  /// @return the next datagram; empty at the end of a complete file
+  /// @throws FileError at a record that is truncated or damaged, with its place; then nothing
+  /// follows
   std::optional<CapturedDatagram> next();
 
-  /// Pieces of UDP datagrams that IP had split, which are left out.
+  /// Fragments of UDP datagrams split by IP, which are ignored.
   std::uint64_t fragments() const { return fragments_; }
-  std::uint32_t snap_length() const { return snap_length_; }  ///< bytes kept of a packet at most
+  std::uint32_t snap_length() const { return snap_length_; }  ///< most bytes kept of a packet
   double fraction_read() const;                               ///< of the file, [0, 1]
 
  private:

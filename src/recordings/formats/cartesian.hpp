@@ -19,9 +19,9 @@ inline constexpr double kMillimetre = 1e-3;
 inline constexpr double kCentimetre = 1e-2;  ///< in short records of the second generation
 inline constexpr double kCentidegree = 0.01 * kRadiansPerDegree;
 
-/// Azimuth of a file, deg in [-180, 360], as an azimuth in (-pi, pi], rad. The two values that
-/// lie on the wrong side of the cut, -180 and 360, become the nearest number on their own side
-/// (4e-16 rad away), so that a writer that rounds finds the same digits again.
+/// Azimuth of a file, deg in [-180, 360], as an azimuth in (-pi, pi], rad. The two values on the
+/// wrong side of the cut, -180 and 360, become the nearest number on the other side (4e-16 rad
+/// away), so that a writer that rounds finds the same digits again.
 inline double azimuth_from_degrees(double azimuth_deg) {
   if (azimuth_deg == 360.0) return -0x1p-60;
   if (azimuth_deg == -180.0) return std::nextafter(-kPi, 0.0);
@@ -35,9 +35,9 @@ inline double degrees_0_to_360(double azimuth) {
   return azimuth_deg < 0.0 ? azimuth_deg + 360.0 : azimuth_deg;
 }
 
-/// Sets direction, range, resolutions and validity of a row from polar values: azimuth as
-/// azimuth_from_degrees() gives it, rad, zenith, rad, range, m. Range 0 is a shot without return,
-/// whose angles are kept and not trusted.
+/// Sets direction, range, resolutions and validity of a row from polar values: azimuth as returned
+/// by azimuth_from_degrees(), rad, zenith, rad, range, m. Range 0 is a shot without return, whose
+/// angles are kept but not trusted.
 inline void set_spherical(Observations& rows, std::size_t row, double azimuth, double zenith,
                           double range) {
   rows.azimuth[row] = azimuth;
@@ -73,12 +73,12 @@ inline void set_cartesian(Observations& rows, std::size_t row, const Vector3<dou
   rows.valid[row] = 1;
 }
 
-/// The same of many points, whose rows follow each other from one on; angles may differ from those
-/// by 4e-16 rad. @param x, y, z  [points], m
+/// The same for many points, whose rows are consecutive from a given one on; angles may differ from
+/// those by 4e-16 rad. @param x, y, z  [points], m
 void set_cartesian(Observations& rows, std::size_t row, std::size_t points, const double* x,
                    const double* y, const double* z, double step);
 
-/// The point of a row, m; the origin where the shot had no return.
+/// The point of a row, m; the origin if the shot had no return.
 inline Vector3<double> cartesian_point(const Observations& rows, std::size_t row) {
   if (!(rows.range[row] > 0.0)) return {};
   return rows.range[row] *

@@ -24,7 +24,8 @@ using bags::BadMessage;
 
 constexpr std::array<std::string_view, 4> kTimeNames{"time", "t", "timestamp", "offset_time"};
 constexpr std::int64_t kFarthest_ns = 10'000'000'000;
-constexpr std::uint8_t kInt32 = 5, kUint32 = 6, kFloat32 = 7, kFloat64 = 8;
+constexpr std::uint8_t kInt32 = 5, kUint32 = bags::kUint32Field, kFloat32 = bags::kFloat32Field,
+                       kFloat64 = bags::kFloat64Field;
 
 template <class T>
 double value_at(const std::uint8_t* bytes) {
@@ -72,7 +73,7 @@ Datatype datatype_of(std::uint8_t code, bool big_endian) {
   }
 }
 
-/// What numbers of a datatype may be as times.
+/// Possible meanings of a datatype's numbers as times.
 std::vector<TimeReading> readings_of(std::uint8_t datatype) {
   switch (datatype) {
     case kInt32:
@@ -104,21 +105,6 @@ double step_of(const CloudTime& time, double largest) {
 
 }  // namespace
 
-std::size_t count_points(const CloudLayout& layout, std::span<const std::uint8_t> data) {
-  if (layout.width == 0 || layout.height == 0) return 0;
-  const std::uint64_t row_bytes = std::uint64_t{layout.width} * layout.point_step;
-  if (layout.height > 1 && layout.row_step < row_bytes) {
-    throw BadMessage{fmt::format("expected rows of at least {} bytes in the point cloud, found {}",
-                                 row_bytes, layout.row_step)};
-  }
-  const std::uint64_t rows_before_last = std::uint64_t{layout.height - 1} * layout.row_step;
-  if (row_bytes > data.size() || rows_before_last > data.size() - row_bytes) {
-    throw BadMessage{fmt::format("expected {} x {} points of {} bytes, found {} bytes",
-                                 layout.height, layout.width, layout.point_step, data.size())};
-  }
-  return std::size_t{layout.height} * layout.width;
-}
-
 std::uint8_t CloudField::byte(const std::uint8_t* point) const {
   if (value == nullptr) return 0;
   const double number = (*this)(point);
@@ -126,30 +112,30 @@ std::uint8_t CloudField::byte(const std::uint8_t* point) const {
   return static_cast<std::uint8_t>(std::lround(std::min(number, 255.0)));
 }
 
-CloudField find_field(const CloudLayout& layout, std::initializer_list<std::string_view> names) {
-  const auto is_meant = [&](const CloudLayout::Field& field) {
+CloudField find_field(const PointCloud2& cloud, std::initializer_list<std::string_view> names) {
+  const auto is_meant = [&](const bags::PointFieldEntry& field) {
     return std::find(names.begin(), names.end(), lower_case(field.name)) != names.end();
   };
-  const auto field = std::find_if(layout.fields.begin(), layout.fields.end(), is_meant);
-  if (field == layout.fields.end()) return {};
-  const Datatype type = datatype_of(field->datatype, layout.big_endian);
+  const auto field = std::find_if(cloud.fields.begin(), cloud.fields.end(), is_meant);
+  if (field == cloud.fields.end()) return {};
+  const Datatype type = datatype_of(field->datatype, cloud.big_endian);
   if (type.bytes == 0) {
     throw BadMessage{fmt::format("expected a datatype in [1, 8] for the field {}, found {}",
                                  field->name, field->datatype)};
   }
-  if (std::uint64_t{field->offset} + type.bytes > layout.point_step) {
+  if (std::uint64_t{field->offset} + type.bytes > cloud.point_step) {
     throw BadMessage{fmt::format("the field {} takes bytes {} to {}, but a point has only {} bytes",
                                  field->name, field->offset,
-                                 std::uint64_t{field->offset} + type.bytes - 1, layout.point_step)};
+                                 std::uint64_t{field->offset} + type.bytes - 1, cloud.point_step)};
   }
   return {field->offset, field->datatype, type.value};
 }
 
-CloudField required_field(const CloudLayout& layout, std::string_view name) {
-  const CloudField field = find_field(layout, {name});
+CloudField required_field(const PointCloud2& cloud, std::string_view name) {
+  const CloudField field = find_field(cloud, {name});
   if (field) return field;
   std::string names;
-  for (const CloudLayout::Field& other : layout.fields) {
+  for (const bags::PointFieldEntry& other : cloud.fields) {
     names += (names.empty() ? "" : ", ") + other.name;
   }
   throw BadMessage{fmt::format("expected the fields x, y and z in the point cloud, found {}",
@@ -177,8 +163,8 @@ std::optional<std::int64_t> offset_of(TimeReading reading, double value, std::in
   return offset_ns;
 }
 
-CloudField time_field(const CloudTime& time, const CloudLayout& layout) {
-  const CloudField field = find_field(layout, {time.field});
+CloudField time_field(const CloudTime& time, const PointCloud2& cloud) {
+  const CloudField field = find_field(cloud, {time.field});
   if (field && field.datatype == time.datatype) return field;
   throw BadMessage{fmt::format(
       "expected the times of the points in the field {} of datatype {}, as in earlier messages, "
@@ -193,14 +179,13 @@ void fail_time(const CloudTime& time, std::size_t point, double value) {
                   point + 1, time.field, value, kFarthest_ns / 1'000'000'000)};
 }
 
-void CloudTimeSearch::add(const CloudLayout& layout, std::span<const std::uint8_t> data,
-                          std::int64_t stamp_ns) {
-  if (layout.width == 0 || layout.height == 0) return;
+void CloudTimeSearch::add(const PointCloud2& cloud, std::int64_t stamp_ns) {
+  if (cloud.width == 0 || cloud.height == 0) return;
   ++messages_;
   for (const std::string_view name : kTimeNames) {
     CloudField field;
     try {
-      field = find_field(layout, {name});
+      field = find_field(cloud, {name});
     } catch (const BadMessage& bad) {  // of a field that is not needed
       other_type_ = bad.what();
     }
@@ -221,17 +206,16 @@ void CloudTimeSearch::add(const CloudLayout& layout, std::span<const std::uint8_
         candidates_.push_back({{std::string(name), field.datatype, reading}});
         known = candidates_.end() - 1;
       }
-      add(field, layout, data, stamp_ns, *known);
+      add(field, cloud, stamp_ns, *known);
     }
   }
 }
 
-void CloudTimeSearch::add(const CloudField& field, const CloudLayout& layout,
-                          std::span<const std::uint8_t> data, std::int64_t stamp_ns,
+void CloudTimeSearch::add(const CloudField& field, const PointCloud2& cloud, std::int64_t stamp_ns,
                           Candidate& candidate) const {
   ++candidate.messages;
   std::optional<double> last;
-  for_each_point(layout, data, [&](const std::uint8_t* bytes) {
+  for_each_point(cloud, [&](const std::uint8_t* bytes) {
     const double value = field(bytes);
     ++candidate.points;
     if (last != value) ++candidate.times;

@@ -15,33 +15,33 @@
 
 namespace risley::recordings {
 
-/// So much of a file's beginning tells its format.
+/// Bytes at the beginning of a file from which its format is recognised.
 inline constexpr std::size_t kHeadBytes = 4096;
 
 /// One recording format. Adding a format means one pair of files in this folder that defines one
 /// of these, and one line in formats/registry.cpp.
 struct Format {
   std::string_view name;         ///< RecordingHeader::format
-  std::string_view ending;       ///< file name ending for writing; empty when it is only read
+  std::string_view ending;       ///< file name ending for writing; empty when it is read-only
   std::string_view description;  ///< one line for the help
   /// Whether a file that starts with these bytes (up to kHeadBytes) is of this format.
   bool (*recognises)(std::string_view head);
-  /// @param progress  cancels where much may have to be looked through before there is a row, or
-  ///                  nothing is heard of a library for long
+  /// @param progress  cancels long scans before the first row, and waiting for a library
   std::unique_ptr<Reader> (*open)(const io::InputFile& file, const Progress& progress);
-  /// nullptr when the format is only read.
-  std::unique_ptr<Writer> (*create)(const std::string& path,
-                                    const RecordingHeader& header) = nullptr;
+  /// nullptr when the format is read-only.
+  std::unique_ptr<Writer> (*create)(const std::string& path, const RecordingHeader& header,
+                                    const WriteOptions& options) = nullptr;
   bool holds_shot_numbers = false;  ///< recordings without times can be written, too
 };
 
-/// Format::open and Format::create of classes that need nothing but their arguments.
+/// Format::open and Format::create for classes that need only their arguments.
 template <class Opened>
 std::unique_ptr<Reader> open_with(const io::InputFile& file, const Progress&) {
   return std::make_unique<Opened>(file);
 }
 template <class Created>
-std::unique_ptr<Writer> create_with(const std::string& path, const RecordingHeader& header) {
+std::unique_ptr<Writer> create_with(const std::string& path, const RecordingHeader& header,
+                                    const WriteOptions&) {
   return std::make_unique<Created>(path, header);
 }
 
@@ -65,11 +65,11 @@ extern const Format kNpyFormat;              // numpy.cpp
 extern const Format kNpzFormat;              // numpy.cpp
 extern const Format kNamedCsvFormat;         // named_csv.cpp
 
-/// Shots that share a time on average where it is that of their packet or frame: packets hold 96
+/// Mean number of shots that share a time if it is that of their packet or frame: packets hold 96
 /// points and more.
 inline constexpr std::size_t kShotsOfOneTime = 32;
 
-/// Detail by which a NetCDF file remembers the format its rows first came from.
+/// Detail in which a NetCDF file stores the format from which its rows originally came.
 inline constexpr const char* kSourceFormat = "source_format";
 
 /// The format whose details the header has: its own, or the one it had before NetCDF.

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// LAS and LAZ files as recordings: clouds whose points stand in the frame of the sensor. What a
-// file leaves open is told by its first points: how coarse its coordinates are, whether GPS times
-// are those of single shots, and what intensities are multiplied by.
+// LAS and LAZ files as recordings: clouds whose points are in the frame of the sensor. Properties
+// that a file does not state follow from its first points: how coarse its coordinates are, whether
+// GPS times are those of single shots, and the factor of intensities.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -59,7 +59,7 @@ class LasReader final : public Reader {
       for (; done < rows.size() && fill(); ++done) set_row(rows, done, ahead_[taken_++]);
     } catch (const FileError& error) {
       pending_.emplace(error);
-      // Points behind one that makes no sense are not looked at.
+      // Points after an invalid one are not used.
       ahead_.clear();
       taken_ = 0;
     }
@@ -71,7 +71,7 @@ class LasReader final : public Reader {
   double fraction_read() const override { return source_->fraction_read(); }
 
  private:
-  /// As our own clouds tell it: manufacturer and model, then the serial number.
+  /// As in risley's own clouds: manufacturer and model, then the serial number.
   Device device() const {
     Device device;
     device.type = kUnknownDeviceType;
@@ -123,7 +123,7 @@ class LasReader final : public Reader {
       return point.steps[axis] * file_.scale[axis] + file_.offset[axis];
     };
     const Vector3<double> position{coordinate(0), coordinate(1), coordinate(2)};
-    // An offset that is no multiple of the scale must not turn a null point into a direction.
+    // An offset that is not a multiple of the scale must not turn a null point into a direction.
     const bool null = std::abs(position.x) < 0.5 * file_.scale[0] &&
                       std::abs(position.y) < 0.5 * file_.scale[1] &&
                       std::abs(position.z) < 0.5 * file_.scale[2];
@@ -140,7 +140,7 @@ class LasReader final : public Reader {
     }
     const auto [least, most] = std::minmax_element(steps.begin(), steps.end());
     step_ = *most;
-    // Equal but for the rounding of decimal fractions is equal.
+    // Equal except for the rounding of decimal fractions.
     if (*most <= *least * (1 + 1e-9)) return;
     warn(kWarning.values_changed,
          "coordinates are multiples of {:g}, {:g} and {:g} m in x, y and z; {:g} m is used for all "
@@ -181,8 +181,8 @@ class LasReader final : public Reader {
     if (times_fit(adjusted) && adjusted) header_.time_reference = TimeReference::utc;
   }
 
-  /// Whether the times of the first points can be what the header says they are; says what they may
-  /// be instead. Times that cannot are kept as they are, without an origin.
+  /// Whether the times of the first points can be as stated in the header; suggests what they may
+  /// be instead. Invalid times are kept unchanged, without an origin.
   bool times_fit(bool adjusted) {
     constexpr double kWeek = 604'800, kOther = 1e9;  // s
     const auto [first, last] =
@@ -190,7 +190,7 @@ class LasReader final : public Reader {
                             [](const Point& a, const Point& b) { return a.gps_time < b.gps_time; });
     if (first == ahead_.end()) return true;
     const double low = first->gps_time, high = last->gps_time;
-    constexpr double kUnix = 1.55e9;  // GPS time comes so far in 2029
+    constexpr double kUnix = 1.55e9;  // GPS time reaches this in 2029
     const char* const counted_since = low >= kUnix ? "Unix time" : "GPS time that is not adjusted";
     std::string found;
     if (adjusted && low >= 0 && high <= kWeek) {
@@ -213,7 +213,7 @@ class LasReader final : public Reader {
     }
     if (found.empty()) return true;
     warn(kWarning.clock_unknown,
-         "GPS times of {:.3f} to {:.3f} s do not fit the header: {}. They are read as they are, "
+         "GPS times of {:.3f} to {:.3f} s do not fit the header: {}. They are read unchanged, "
          "without an origin",
          low, high, found);
     return false;
@@ -273,7 +273,7 @@ class LasReader final : public Reader {
   std::string path_;
   PublicHeader file_;
   std::unique_ptr<PointSource> source_;
-  std::vector<Point> ahead_;  ///< read and not all given yet
+  std::vector<Point> ahead_;  ///< read but not all returned yet
   std::size_t taken_ = 0;     ///< of these
   std::optional<FileError> pending_;
   double step_ = 0;  ///< m

@@ -35,7 +35,7 @@ std::string text_at(const std::uint8_t* bytes, std::size_t length) {
 
 constexpr std::size_t kUnknownLength = std::size_t{1} << 32;  // longer than any record
 
-/// Bytes of the extra bytes that one description describes.
+/// Bytes of the extra bytes covered by one description.
 std::size_t bytes_described(const std::uint8_t* descriptor) {
   constexpr std::array<std::uint8_t, 10> kScalar{1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
   const std::uint8_t type = descriptor[2];
@@ -144,7 +144,7 @@ class HeaderReader {
     header_.points = old_count;
     if (header_.minor_version < 4) return;
     const auto count = number<std::uint64_t>(kLargeCountAt);
-    if (count == 0 && !is_modern(header_.point_format)) return;  // some fill in the old one alone
+    if (count == 0 && !is_modern(header_.point_format)) return;  // some fill in only the old one
     header_.points = count;
     if (old_count == 0 || old_count == count) return;
     warn(warnings_, kWarning.header_contradicted,
@@ -170,8 +170,8 @@ class HeaderReader {
     }
   }
 
-  /// Finds where the points end and descriptions of extra bytes behind them. Points do not need
-  /// these records: what is wrong with them is a warning.
+  /// Finds the end of the points and descriptions of extra bytes after them. Points do not need
+  /// these records: their defects are warnings.
   void step_over_extended_records() {
     if (header_.minor_version >= 3 && (header_.global_encoding & kInternalWaveforms) != 0) {
       end_points_at(number<std::uint64_t>(kWaveformsAt));
@@ -189,7 +189,7 @@ class HeaderReader {
       if (left < kExtendedRecordHeaderBytes || left - kExtendedRecordHeaderBytes < length) {
         warn(warnings_, kWarning.content_left_out,
              "extended record {} of {}, at byte {}, does not lie between the points and the end of "
-             "the file; it and those after it were left out",
+             "the file; it and those after it were ignored",
              i + 1, count, at)
             .place.byte_offset = kExtendedAt;
         return;
@@ -217,7 +217,7 @@ class HeaderReader {
       if (place + bytes > header_.record_bytes) {
         warn(warnings_, kWarning.columns_unused,
              "the extra bytes described from here on lie beyond the end of the point records, "
-             "which have {} bytes; they were left out",
+             "which have {} bytes; they were ignored",
              header_.record_bytes)
             .place.byte_offset = at;
         return;
@@ -243,7 +243,7 @@ std::optional<std::int64_t> utc_of_adjusted_gps(double seconds) {
   constexpr double kFarthest = 7e9;  // with the origin's 1.3e9 s well within 64 bits of ns
   if (!(std::abs(seconds) < kFarthest)) return std::nullopt;
   const std::int64_t gps_ns = *io::nanoseconds_from_seconds(seconds) + kGpsOrigin * kSecond;
-  // The leap seconds of a UTC that is too late by them are one too many for some seconds at most.
+  // The leap seconds of a UTC that is late by them are one too many for at most a few seconds.
   std::int64_t utc_ns = gps_ns - leap_seconds(gps_ns) * kSecond;
   utc_ns = gps_ns - leap_seconds(utc_ns) * kSecond;
   return utc_ns;

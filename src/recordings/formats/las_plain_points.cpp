@@ -34,7 +34,7 @@ class PlainPoints final : public PointSource {
     if (header_.points < room) {
       warnings.push_back(
           {kWarning.content_left_out,
-           fmt::format("the header says that there are {} points; those after them were left out",
+           fmt::format("the header says that there are {} points; those after them were ignored",
                        header_.points),
            {place_of(header_.points), {}},
            room - header_.points});
@@ -57,7 +57,7 @@ class PlainPoints final : public PointSource {
         record = input_.at(place_of(next_), header_.record_bytes);
       } catch (const FileError&) {
         if (done == 0) throw;
-        break;  // the next call meets it again
+        break;  // the next call encounters it again
       }
       points[done] = decode(record);
     }

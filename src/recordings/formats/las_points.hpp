@@ -18,7 +18,7 @@
 
 namespace risley::recordings::las {
 
-/// What recordings take of a point record, as it stands there.
+/// Fields of a point record used by recordings, as stored.
 struct Point {
   std::array<std::int32_t, 3> steps{};  ///< of the scale
   std::uint16_t intensity = 0;
@@ -27,28 +27,28 @@ struct Point {
   double gps_time = 0;  ///< 0 in formats without one
 };
 
-/// The points of one file in their order.
+/// The points of one file in order.
 class PointSource {
  public:
   virtual ~PointSource() = default;
 
-  /// Fills in the next points, as many as there are sound ones.
+  /// Fills in the next points, as many as are valid.
   /// @return their number, 0 at the end
-  /// @throws FileError at damage, once every point before it was given
+  /// @throws FileError at damage, after all points before it were returned
   virtual std::size_t read(std::span<Point> points) = 0;
 
-  /// Where the GPS time of a point, counted from 0, stands.
+  /// Position of the GPS time of a point, counted from 0.
   virtual FilePlace gps_time_place(std::uint64_t point) const = 0;
 
   virtual double fraction_read() const = 0;
 };
 
-/// Points that stand one after another. @param warnings  gets points that the header does not count
+/// Points stored one after another. @param warnings  receives points not counted in the header
 std::unique_ptr<PointSource> open_points(io::BlockInput input, const PublicHeader& header,
                                          std::vector<Warning>& warnings);
 
 /// Points that LASzip compressed.
-/// @throws FileError also when this build has no LASzip, with what to do then
+/// @throws FileError also when this build has no LASzip, with the remedy
 std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& header,
                                                     std::vector<Warning>& warnings);

@@ -27,7 +27,7 @@ class LazPoints final : public PointSource {
       : path_(input.path()), header_(header), size_(input.size()) {
     if (header_.points == 0 && size_ > header_.points_at + sizeof(std::int64_t)) {
       warnings.push_back({kWarning.content_left_out,
-                          "the header says that there are 0 points; what follows it was left out",
+                          "the header says that there are 0 points; the data after it were ignored",
                           {header_.points_at, {}}});
     }
     if (header_.points > 0) check_chunk_table(input);
@@ -69,7 +69,8 @@ class LazPoints final : public PointSource {
   }
 
  private:
-  /// LASzip takes memory for as many chunks as the table counts: each begins with a whole point.
+  /// LASzip allocates memory for as many chunks as the table states: each begins with a whole
+  /// point.
   void check_chunk_table(io::BlockInput& input) const {
     constexpr std::uint64_t kTableHeaderBytes = 8;
     if (size_ - header_.points_at < sizeof(std::int64_t)) {
@@ -79,7 +80,7 @@ class LazPoints final : public PointSource {
                       header_.points_at));
     }
     const auto place = load<std::int64_t>(input.at(header_.points_at, sizeof(std::int64_t)));
-    if (place == -1) return;  // at the end of the file, and LASzip finds it there
+    if (place == -1) return;  // at the end of the file, where LASzip finds it
     const auto table = static_cast<std::uint64_t>(place);
     if (place < 0 || table < header_.points_at || table > size_ ||
         size_ - table < kTableHeaderBytes) {
@@ -140,7 +141,7 @@ class LazPoints final : public PointSource {
     return point;
   }
 
-  /// About where LASzip stands in the file.
+  /// Approximate position of LASzip in the file.
   FilePlace place() {
     stream_.clear();
     const auto at = static_cast<std::streamoff>(stream_.tellg());
@@ -186,10 +187,11 @@ std::unique_ptr<PointSource> open_compressed_points(io::BlockInput input,
                                                     const PublicHeader& /*header*/,
                                                     std::vector<Warning>& /*warnings*/) {
   const io::BlockInput own = std::move(input);
-  throw FileError(own.path(), {kPointFormatAt, {}},
-                  "is compressed by LASzip, and this build has no LASzip, because Debian 12 has no "
-                  "package of it. Build with liblaszip-dev (Debian 13), or convert the file to LAS "
-                  "with another program (laszip, PDAL, laspy)");
+  throw FileError(
+      own.path(), {kPointFormatAt, {}},
+      "is compressed by LASzip, and this build has no LASzip, because Debian 12 does not package "
+      "it. Build with liblaszip-dev (Debian 13), or convert the file to LAS "
+      "with another program (laszip, PDAL, laspy)");
 }
 
 }  // namespace risley::recordings::las

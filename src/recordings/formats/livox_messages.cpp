@@ -18,8 +18,6 @@
 
 #include "recordings/formats/cartesian.hpp"
 #include "recordings/formats/format.hpp"
-#include "recordings/formats/ros1_message.hpp"
-#include "recordings/formats/ros2_message.hpp"
 
 namespace risley::recordings {
 namespace {
@@ -27,14 +25,14 @@ namespace {
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kYear2000 = 946'684'800 * kSecond;
 constexpr std::size_t kMostReturns = 3;
-/// How much describe() looks at, of all topics together.
+/// Amount of data that describe() reads, of all topics together.
 constexpr std::size_t kPointsLookedAt = 1'000'000, kMessagesLookedAt = 4096;
 constexpr std::size_t kPointMessagesLookedAt = 24;
 constexpr double kStandardGravity = 9.80665;  // m/s^2
 /// Longer means of acceleration are m/s^2, shorter ones g: half way between 1 and 9.8 in ratio.
 constexpr double kLongestInG = 3.13;
 
-/// The broadcast code with which a topic of the driver's multi-topic mode ends, or nothing: 14
+/// The broadcast code at the end of a topic in the driver's multi-topic mode, or nothing: 14
 /// capital letters and digits, and the digit of the head.
 std::string serial_of(std::string_view topic) {
   constexpr std::size_t kCodeLength = 15;
@@ -49,7 +47,7 @@ std::string serial_of(std::string_view topic) {
   return fits ? std::string(code) : std::string();
 }
 
-/// The address with which a topic of the second generation's driver ends, or nothing:
+/// The address at the end of a topic of the second generation's driver, or nothing:
 /// "/livox/lidar_192_168_1_112".
 std::string address_of(std::string_view topic) {
   constexpr int kBytes = 4;
@@ -64,14 +62,14 @@ std::string address_of(std::string_view topic) {
   return wire::address_from(address) ? address : std::string();
 }
 
-/// What a topic says of its sensor.
+/// Properties of a sensor in its topic name.
 std::string identity_of(std::string_view topic) {
   const std::string serial = serial_of(topic);
   return serial.empty() ? address_of(topic) : serial;
 }
 
-/// A coordinate that a driver made of whole millimetres, m: what the millimetres are, and not the
-/// nearest number that 32 bits hold.
+/// A coordinate that a driver converted from whole millimetres, m: the exact millimetres, not the
+/// nearest 32-bit number.
 double of_millimetres(double coordinate) {
   const double exact = std::round(coordinate / kMillimetre) * kMillimetre;
   return static_cast<float>(exact) == static_cast<float>(coordinate) ? exact : coordinate;
@@ -85,8 +83,8 @@ bool is_close(double value, double expected) {
   return std::fabs(value - expected) < 0.05 * expected;
 }
 
-/// Whether two points may be returns of one shot: they lie in one direction, as far as coordinates
-/// in whole millimetres tell.
+/// Whether two points may be returns of one shot: they have the same direction, within the accuracy
+/// of whole millimetres.
 bool in_one_direction(const MessagePoint& a, const MessagePoint& b) {
   const Vector3<double> one{a.x, a.y, a.z}, other{b.x, b.y, b.z};
   return norm(cross(one, other)) <= 2 * kMillimetre * (norm(one) + norm(other));
@@ -113,41 +111,6 @@ bool is_one_shot(const std::vector<MessagePoint>& points, std::size_t first, std
 
 }  // namespace
 
-void append_point(LidarMessage& message, const MessagePoint& point) {
-  if (!std::isfinite(point.x + point.y + point.z)) {
-    throw BadMessage{
-        fmt::format("point {} has a coordinate that is not a number", message.points.size() + 1)};
-  }
-  message.points.push_back(point);
-}
-
-void decode_cloud(const CloudLayout& layout, std::span<const std::uint8_t> data,
-                  LidarMessage& message) {
-  message.points.clear();
-  message.layout = layout;
-  message.data = data;
-  const CloudField x = required_field(layout, "x"), y = required_field(layout, "y"),
-                   z = required_field(layout, "z");
-  const CloudField intensity = find_field(layout, {"intensity"}), tag = find_field(layout, {"tag"}),
-                   line = find_field(layout, {"line", "beam"});
-  message.has_intensity = static_cast<bool>(intensity);
-  message.points.reserve(count_points(layout, data));
-  for_each_point(layout, data, [&](const std::uint8_t* bytes) {
-    MessagePoint point;
-    point.x = x(bytes);
-    point.y = y(bytes);
-    point.z = z(bytes);
-    // Also numbers whose squares are none.
-    if (!std::isfinite(point.x * point.x + point.y * point.y + point.z * point.z)) {
-      point.x = point.y = point.z = 0.0;
-    }
-    point.intensity = intensity.byte(bytes);
-    point.tag = tag.byte(bytes);
-    point.line = line.byte(bytes);
-    message.points.push_back(point);
-  });
-}
-
 MessageReader::MessageReader(std::unique_ptr<bags::Bag> bag, std::string_view format)
     : bag_(std::move(bag)) {
   header_.format = format;
@@ -169,11 +132,7 @@ bool MessageReader::next(LidarMessage& message) {
   message.topic = serialised.topic;
   const MessageKind kind = *topics()[serialised.topic].kind;
   try {
-    if (topics()[serialised.topic].serialisation == bags::Serialisation::ros1) {
-      decode_ros1_message(kind, serialised.bytes, message);
-    } else {
-      decode_ros2_message(kind, serialised.bytes, message);
-    }
+    decode_lidar_message(kind, topics()[serialised.topic].serialisation, serialised.bytes, message);
     if (kind == MessageKind::cloud && cloud_times_[message.topic]) set_times(message);
   } catch (const BadMessage& bad) {
     bag_->fail(serialised, bad.what());
@@ -183,7 +142,7 @@ bool MessageReader::next(LidarMessage& message) {
 
 void MessageReader::set_times(LidarMessage& message) const {
   auto point = message.points.begin();
-  for_each_time(*cloud_times_[message.topic], message.layout, message.data, message.time_ns,
+  for_each_time(*cloud_times_[message.topic], message.cloud, message.time_ns,
                 [&point](std::int64_t offset_ns) { point++->offset_ns = offset_ns; });
 }
 
@@ -197,7 +156,7 @@ void MessageReader::choose_topics() {
     return std::any_of(topics().begin(), topics().end(),
                        [kind](const bags::Topic& topic) { return topic.kind == kind; });
   };
-  // Beside the driver's own messages, clouds are the same points again or of other origin.
+  // Clouds beside the driver's own messages are the same points again or of another source.
   const MessageKind wanted =
       has_kind(MessageKind::points) ? MessageKind::points : MessageKind::cloud;
   if (!has_kind(wanted)) {
@@ -211,8 +170,8 @@ void MessageReader::choose_topics() {
     const bags::Topic& topic = topics()[i];
     if (topic.kind == MessageKind::cloud && wanted == MessageKind::points) {
       warn(kWarning.content_left_out,
-           "the point clouds of topic {} were left out: the Livox driver's own messages have "
-           "better times",
+           "the point clouds of topic {} were ignored: the Livox driver's own messages have better "
+           "times",
            topic.name);
     }
     if (topic.kind != wanted) continue;
@@ -245,7 +204,7 @@ void MessageReader::look_at_first(std::size_t point_sources, const See& see) {
       points += message.points.size();
     }
   } catch (const FileError&) {
-    // Reported when the caller comes to it, behind the sound messages.
+    // Reported when the caller reaches it, after the undamaged messages.
   }
 }
 
@@ -267,9 +226,8 @@ void MessageReader::find_lidars() {
     if (sharing > 1) {
       lidars_[i].assign(seen[i].begin(), seen[i].end());
       warn(kWarning.devices_unclear,
-           "{} lidars share the topic {}: they are told apart by the numbers that the driver gave "
-           "them",
-           sharing, topics()[i].name);
+           "{} lidars share the topic {}: the driver's numbers distinguish them", sharing,
+           topics()[i].name);
       device.serial.clear();
       device.address.clear();
     }
@@ -291,8 +249,8 @@ std::optional<std::uint8_t> MessageReader::device_of(const LidarMessage& message
   return static_cast<std::uint8_t>(*devices_[message.topic] + (found - lidars.begin()));
 }
 
-/// An IMU belongs to the lidar of its serial or name space, or to the only lidar when it is itself
-/// the only one.
+/// An IMU belongs to the lidar with its serial number or namespace, or to the only lidar if it is
+/// itself the only one.
 void MessageReader::choose_imu_topics() {
   const auto imu_topics =
       std::count_if(topics().begin(), topics().end(),
@@ -313,15 +271,15 @@ void MessageReader::choose_imu_topics() {
     } else if (imu_topics == 1 && header_.devices.size() == 1) {
       devices_[i] = std::uint8_t{0};
     } else {
-      warn(
-          kWarning.content_left_out,
-          "the inertial samples of topic {} were left out: nothing says to which lidar they belong",
-          topics()[i].name);
+      warn(kWarning.content_left_out,
+           "the inertial samples of topic {} were ignored: nothing states to which lidar they "
+           "belong",
+           topics()[i].name);
     }
   }
 }
 
-/// What the first messages of one topic say.
+/// Findings from the first messages of one topic.
 struct MessageReader::FirstMessages {
   std::optional<std::int64_t> last_time_ns;
   std::size_t last_points = 0;
@@ -372,7 +330,7 @@ void MessageReader::find_cloud_times() {
   std::vector<CloudTimeSearch> searches(topics().size());
   look_at_first(clouds, [&](const LidarMessage& message) {
     if (!is_cloud(message.topic)) return false;
-    searches[message.topic].add(message.layout, message.data, message.time_ns);
+    searches[message.topic].add(message.cloud, message.time_ns);
     return true;
   });
   for (std::size_t i = 0; i < topics().size(); ++i) {
@@ -437,7 +395,7 @@ void MessageReader::describe() {
   rewind();
 }
 
-/// Tells the model where only one is left: three returns have only the Avia, 100 kHz only the
+/// Determines the model if only one remains: only the Avia has three returns; 100 kHz have only the
 /// Mid-40, which has no tags, and the Mid-70, which has.
 void MessageReader::describe_device(std::size_t topic, std::uint8_t number, FirstMessages& first) {
   const bool is_cloud = !has_times(topic);
@@ -449,13 +407,14 @@ void MessageReader::describe_device(std::size_t topic, std::uint8_t number, Firs
     device.type = kAvia;
   } else if (!is_cloud && !first.intervals.empty() && is_close(median(first.intervals), 1e4) &&
              first.last_line == 0) {
-    // Drivers and tools that know no tags write 0, too.
+    // Drivers and tools without tag support write 0, too.
     device.type = first.tagged || returns > 1 ? kMid70 : kMid40;
   }
   describe_numbered_device(topic, number, first);
 }
 
-/// The second generation, by the steps between its shots, which the driver writes too short.
+/// The second generation, recognised by the steps between its shots, which the driver writes too
+/// short.
 void MessageReader::describe_numbered_device(std::size_t topic, std::uint8_t number,
                                              const FirstMessages& first) {
   if (!has_times(topic)) {
@@ -498,7 +457,7 @@ void MessageReader::describe_numbered_device(std::size_t topic, std::uint8_t num
            "were put back to when a {} fires them, every {:.6g} us{}",
            topics()[topic].name, device_type_name(type),
            1e-3 * grid.interval_numerator_ns / grid.interval_denominator,
-           names_lines ? "" : "; it names no lines, and their order says which emitter it was");
+           names_lines ? "" : "; it names no lines, so the order of points gives the emitter");
     }
   }
 }
@@ -522,7 +481,7 @@ void MessageReader::mend_packets(std::uint8_t device, LidarMessage& message) con
     const std::int64_t since = point.offset_ns - begin_ns;
     std::optional<std::int64_t> place = place_after(since, tolerance);
     if (!place) {
-      // Another packet. Where its first points are missing, the one before says when it began.
+      // Another packet. If its first points are missing, the previous one gives its start.
       const std::int64_t later = since > 0 ? (since + kJitter + tolerance) / period * period : 0;
       place = later > 0 ? place_after(since - later, kJitter + tolerance) : std::nullopt;
       if (!place) place = packets.names_lines ? point.line : 0;
@@ -556,8 +515,8 @@ void MessageReader::compare_clocks(std::uint8_t device, const FirstMessages& fir
   if (!grow) return;
   growth_from_ns_[device] = first.times_ns[0];
   warn(kWarning.times_corrected,
-       "times are at fault: the offset times of topic {} do not begin anew with each message but "
-       "grow as the time of the messages does; they were taken as counted from the first message",
+       "times are wrong: the offset times of topic {} do not restart with each message but grow as "
+       "the time of the messages does; they were taken as counted from the first message",
        header_.devices[device].topic);
 }
 
@@ -582,7 +541,7 @@ void MessageReader::settle_cloud_grid(std::size_t topic, FirstMessages& first) {
   }};
   const bool is_known = !first.rates.empty();
   const double rate = is_known ? median(first.rates) : first.last_line > 0 ? 240'000 : 100'000;
-  // Lines of a cloud tell how many emitters there are; 240 kHz have six of them, too.
+  // Lines of a cloud show the number of emitters; 240 kHz implies six of them, too.
   const auto is_second = [&](const Candidate& candidate) {
     return first.last_line + 1 == candidate.grid.beams && is_close(rate, candidate.rate_hz);
   };
@@ -639,7 +598,7 @@ void MessageReader::take_bag_warnings() {
   risley::append(warnings_, bag_->warnings());
   if (unknown_lidar_points_ == 0) return;
   warn(kWarning.content_left_out,
-       "points of lidars that are not among the first messages of their topic were left out")
+       "points of lidars that are not among the first messages of their topic were ignored")
       .lost_records = unknown_lidar_points_;
 }
 
@@ -680,7 +639,7 @@ void set_row(Observations& rows, std::size_t row, const MessagePoint& point, std
   rows.device[row] = device;
 }
 
-/// Directions and ranges of a message's points, in rows from one on.
+/// Directions and ranges of a message's points, in rows from a given one on.
 void set_points(Observations& rows, std::size_t first_row, const std::vector<MessagePoint>& points,
                 bool whole_millimetres) {
   constexpr std::size_t kBlock = 256;
@@ -705,7 +664,7 @@ void MessageReader::append_points(const LidarMessage& message, std::uint8_t devi
   std::size_t row = rows.size();
   rows.resize(row + points.size());
   set_points(rows, row, points, is_second_generation(header_.devices[device].type));
-  // Offsets that grow are 32-bit numbers and begin again after 4.3 s.
+  // Growing offsets are 32-bit numbers and wrap after 4.3 s.
   const std::int64_t grown =
       growth_from_ns_[device] ? message.time_ns - *growth_from_ns_[device] : 0;
   const auto time_of = [&](const MessagePoint& point) {
@@ -757,8 +716,7 @@ void MessageReader::append_imu(const LidarMessage& message, std::uint8_t device,
     if (std::isfinite(sample.angular_velocity[axis] + sample.acceleration_g[axis])) continue;
     if (!std::exchange(imu_without_numbers_reported_, true)) {
       warn(kWarning.content_left_out,
-           "inertial samples of topic {} whose rates or accelerations are not finite numbers were "
-           "left out",
+           "inertial samples of topic {} with non-finite rates or accelerations were ignored",
            topics()[message.topic].name);
     }
     return;

@@ -1,25 +1,25 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// What bags of all kinds share: the messages of lidar drivers and how they become rows.
+// Common part of bags of all kinds: the messages of lidar drivers and their conversion to rows.
 //
-// Times. A CustomMsg gives each point its own time, a PointCloud2 where it has a field of times
+// Times. A CustomMsg gives each point a time, and so does a PointCloud2 with a field of times
 // (cloud_times.hpp). Otherwise it gives only the time of its first point: a point's own time is
 // counted from there on the grid of the sensor's shots (100 or 240 kHz, one to three returns per
 // shot), which is found from the number of points and the stamps of the first messages. Times from
-// the year 2000 on are taken as UTC (PTP may serve TAI, which no message tells), earlier ones as
-// counted from power-on.
+// the year 2000 on are taken as UTC (PTP may serve TAI, which messages do not show), earlier ones
+// as counted from power-on.
 //
-// Offset times that grow from message to message as the time of the messages does are counted from
-// the first message, and are taken so.
+// Offset times that grow from message to message as the time of the messages does are taken as
+// counted from the first message.
 //
-// The driver of the second generation divides the time of a packet by its number of points, not by
-// that of their steps, and cuts the rest: the points of a Mid-360 stand 4947 ns apart, until the
-// next packet begins, and those of a HAP 2189 ns. They are put back where they were fired. Versions
-// that name no lines keep the order of the points, which says their emitters.
+// The driver of the second generation divides the time of a packet by its number of points, not of
+// steps, and truncates: the points of a Mid-360 are 4947 ns apart, until the next packet begins,
+// and those of a HAP 2189 ns. They are restored to their firing times. Versions that name no lines
+// keep the order of the points, which gives their emitters.
 //
-// Sensors. Every topic of points is one device, or one for each lidar number that its CustomMsg
-// have where drivers publish several sensors together; its serial is the broadcast code with which
-// the topic ends, if it does. Messages do not name the model: it is told only where the shot
+// Sensors. Every topic of points is one device, or one for each lidar number in its CustomMsg if
+// drivers publish several sensors together; its serial is the broadcast code at the end of the
+// topic, if there is one. Messages do not name the model: it is determined only if the shot
 // interval, the tags and the returns leave a single one.
 #pragma once
 
@@ -57,33 +57,19 @@ struct LidarMessage {
   std::size_t topic = 0;      ///< index of the topic
   std::int64_t time_ns = 0;   ///< of the first point, or of the inertial sample
   std::int64_t stamp_ns = 0;  ///< of the header
-  std::uint8_t lidar = 0;     ///< number that the driver gave the sensor
+  std::uint8_t lidar = 0;     ///< the driver's number for the sensor
   std::vector<MessagePoint> points;
   bool has_intensity = true;
   std::array<double, 3> angular_velocity{};  ///< rad/s
   std::array<double, 3> acceleration{};      ///< g from Livox drivers, m/s^2 from others
-  CloudLayout layout;                        ///< of a cloud
-  std::span<const std::uint8_t> data;        ///< of a cloud, valid as long as the message's bytes
+  PointCloud2 cloud;                         ///< valid as long as the message's bytes
 };
 
-/// Bytes of one point of a CustomMsg, without padding.
-inline constexpr std::size_t kCustomPointBytes = 19;
+/// Decodes a message and replaces all of `message` but its topic. @throws BadMessage
+void decode_lidar_message(MessageKind kind, bags::Serialisation serialisation,
+                          std::span<const std::uint8_t> bytes, LidarMessage& message);
 
-/// The stamp of a header that is not needed, whatever it says, ns.
-inline std::int64_t unchecked_stamp(const bags::Header& header) {
-  return header.seconds * 1'000'000'000 + std::int64_t{header.nanoseconds};
-}
-
-/// Adds a point of a CustomMsg. @throws BadMessage when a coordinate is no number
-void append_point(LidarMessage& message, const MessagePoint& point);
-
-/// Turns the data of a PointCloud2 into points. Points whose coordinates are no numbers are shots
-/// without return.
-/// @throws BadMessage when the layout does not fit itself or the data
-void decode_cloud(const CloudLayout& layout, std::span<const std::uint8_t> data,
-                  LidarMessage& message);
-
-/// Turns the messages of a bag into chunks.
+/// Converts the messages of a bag to chunks.
 class MessageReader final : public Reader {
  public:
   /// Chooses the topics to read and fills in the header, devices included.
@@ -95,15 +81,15 @@ class MessageReader final : public Reader {
   double fraction_read() const override { return bag_->fraction_read(); }
 
  private:
-  /// How the points of a cloud topic without times lie in time.
+  /// Timing of the points in a cloud topic without times.
   struct CloudGrid {
     livox::ShotGrid grid = livox::kGrid100kHz;
     int returns = 1;
   };
   struct FirstMessages;
-  /// How the second generation's driver writes the packets of a device.
+  /// Layout of a device's packets in the second generation's driver.
   struct DriverPackets {
-    std::int64_t step_ns = 0;       ///< that it writes between points; 0: nothing to mend
+    std::int64_t step_ns = 0;       ///< written interval between points; 0: nothing to correct
     std::int64_t tolerance_ns = 0;  ///< of the times of a cloud
     livox::ShotGrid grid;
     bool names_lines = true;
@@ -112,35 +98,35 @@ class MessageReader final : public Reader {
   const std::vector<bags::Topic>& topics() const { return bag_->topics(); }
   /// Chooses the topics of points and those of inertial samples.
   void choose_topics();
-  /// Makes devices of the lidars that share a topic.
+  /// Creates devices for the lidars that share a topic.
   void find_lidars();
   /// Completes the header from the first messages.
   void describe();
-  /// Finds the fields by which clouds tell times, from the first messages.
+  /// Finds the fields of times in clouds, from the first messages.
   void find_cloud_times();
-  /// Shows the first messages to a function, which returns its number of points where it took
-  /// points: so many messages of each of `point_sources` and no more than all together.
+  /// Passes the first messages to a function, which returns its number of points if it used points:
+  /// so many messages of each of `point_sources` and no more than all together.
   template <class See>
   void look_at_first(std::size_t point_sources, const See& see);
   void rewind();
   /// The next message of a wanted topic, replacing all of `message`. @return false at the end
   bool next(LidarMessage& message);
-  /// The times that a cloud's points tell. @throws BadMessage
+  /// The times of a cloud's points. @throws BadMessage
   void set_times(LidarMessage& message) const;
   void take_bag_warnings();
   void choose_imu_topics();
   void describe_device(std::size_t topic, std::uint8_t device, FirstMessages& first);
   void describe_numbered_device(std::size_t topic, std::uint8_t device, const FirstMessages& first);
-  /// Device of a message of points; empty where it is none of those known.
+  /// Device of a message of points; empty if it is unknown.
   std::optional<std::uint8_t> device_of(const LidarMessage& message) const;
-  /// Clocks of the times and of the stamps, and offset times that grow.
+  /// Clocks of the times and of the stamps, and growing offset times.
   void compare_clocks(std::uint8_t device, const FirstMessages& first);
   /// Whether the points of a topic have times of their own.
   bool has_times(std::size_t topic) const {
     return topics()[topic].kind == MessageKind::points || cloud_times_[topic];
   }
   void settle_cloud_grid(std::size_t topic, FirstMessages& first);
-  /// Puts the points of the second generation's driver back to when they were fired.
+  /// Restores the firing times of points of the second generation's driver.
   void mend_packets(std::uint8_t device, LidarMessage& message) const;
   void append(LidarMessage& message, Chunk& chunk);
   void append_points(const LidarMessage& message, std::uint8_t device, Observations& rows);
@@ -155,7 +141,8 @@ class MessageReader final : public Reader {
   std::vector<CloudGrid> clouds_;                            ///< by topic
   std::vector<DriverPackets> driver_packets_;                ///< by device
   std::vector<std::optional<CloudTime>> cloud_times_;        ///< by topic
-  std::vector<std::string> unused_times_;                    ///< by topic: why a field is not used
+  std::vector<std::string> unused_times_;                    ///< by topic: reason why a field is
+                                                             ///< not used
   std::vector<double> acceleration_units_;  ///< by topic: g per unit of the message
   LidarMessage message_;
   std::optional<FileError> failure_;

@@ -21,8 +21,8 @@ bool recognises_lvx10(std::string_view head) {
          head.substr(kLvxName.size(), 4) == std::string_view("\1\0\0\0", 4);
 }
 
-/// Bytes of a frame header: files with 24 and with 32 are described, and the header itself does
-/// not tell. The one behind which whole packages stand is right.
+/// Bytes of a frame header: files with 24 and with 32 are known, and the header does not say
+/// which. The size after which complete packages follow is right.
 std::size_t probe_frame_header(io::BlockInput& file, std::uint64_t first_frame,
                                const std::vector<Device>& devices) {
   constexpr std::size_t kShort = 24, kLong = 32;

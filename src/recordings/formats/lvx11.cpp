@@ -82,7 +82,7 @@ std::vector<std::uint8_t> lvx11_head(const std::vector<Device>& devices,
   for (const Device& device : devices) {
     if (taken[device.index]) {
       throw InvalidArgument(fmt::format(
-          "device index {} is used twice; LVX tells devices apart by their index", device.index));
+          "device index {} is used twice; LVX distinguishes devices by their index", device.index));
     }
     taken[device.index] = true;
     const auto put_text = [](const std::string& text, std::uint8_t* field) {
@@ -108,13 +108,13 @@ std::vector<std::uint8_t> lvx11_head(const std::vector<Device>& devices,
 
 namespace {
 
-/// A packet that is being formed from rows that came without packets.
+/// A packet being formed from rows that came without packets.
 struct OpenPacket {
   const RecordLayout* layout = nullptr;  ///< nullptr while there is none
   Packet header;
   ShotGrid grid;
   std::int64_t time_ns = 0;
-  Observations rows;                       ///< all slots; null records where no shot came
+  Observations rows;                       ///< all slots; null records for missing shots
   std::vector<std::uint64_t> row_numbers;  ///< by slot, for messages
   std::uint32_t last_slot = 0;
   std::uint8_t last_return = 0;
@@ -202,7 +202,7 @@ void Lvx11Writer::start_frame() {
   store<std::uint64_t>(bytes + kLvxFrameIndexAt, frames_++);
 }
 
-/// Starts a frame when a formed packet of this time does not belong to the present one.
+/// Starts a frame when a formed packet of this time does not belong to the current one.
 void Lvx11Writer::start_frame_at(std::int64_t time_ns) {
   const std::uint32_t duration_ms =
       header_.frame_duration_ms > 0 ? header_.frame_duration_ms : kUsualFrameDurationMs;
@@ -234,7 +234,7 @@ std::size_t Lvx11Writer::device_row(std::uint8_t device, std::uint64_t row_numbe
 }
 
 void Lvx11Writer::append(const Chunk& chunk) {
-  // Packets of the second generation are none of this format's.
+  // Packets of the second generation do not fit this format.
   const auto is_of_first = [](const Packet& packet) { return packet.version != kNumberedVersion; };
   if (!std::all_of(chunk.packets.begin(), chunk.packets.end(), is_of_first) ||
       chunk.packets.empty()) {
@@ -277,7 +277,7 @@ void Lvx11Writer::write_packets(const Chunk& chunk) {
       encode_imu(chunk.imu[imu++], package(packet));
       continue;
     }
-    // A row time that was changed, or a packet that belongs to other rows, is not to be lost.
+    // Changed row times, or packets that belong to other rows, must not be lost silently.
     const std::int64_t stamped = PacketClock().time_ns(packet).value_or(o.time_ns[row]);
     constexpr std::uint8_t kPps = 4;
     if (packet.timestamp_type != kPps && std::abs(stamped - o.time_ns[row]) > 1000) {
@@ -311,7 +311,7 @@ void Lvx11Writer::write_rows(const Chunk& chunk) {
   while (imu < chunk.imu.size()) write_imu(chunk.imu[imu++]);
 }
 
-/// Puts one row into its slot of the open packet, or into a new packet where it fits none.
+/// Puts one row into its slot of the open packet, or into a new packet if it does not fit.
 void Lvx11Writer::place(const Observations& o, std::size_t row) {
   const std::uint64_t row_number = rows_written_ + row;
   const std::size_t device = device_row(o.device[row], row_number);
@@ -397,8 +397,8 @@ void Lvx11Writer::start_packet(std::size_t device, std::int64_t time_ns, std::ui
   packet.row_numbers.assign(packet.layout->records, row_number);
 }
 
-/// PPS times hold no whole seconds: what a reader will make of them must be what was meant, up to
-/// the seconds before the first packet.
+/// PPS times hold no whole seconds: a reader must restore the intended times, up to the seconds
+/// before the first packet.
 void Lvx11Writer::check_pps(std::size_t device, const Packet& packet, std::int64_t time_ns,
                             std::uint64_t row_number) {
   if (header_.time_reference != TimeReference::pps) return;
@@ -406,21 +406,22 @@ void Lvx11Writer::check_pps(std::size_t device, const Packet& packet, std::int64
   const std::int64_t read_again = state.clock.time_ns(packet).value_or(0);
   if (!state.first_second_ns) state.first_second_ns = time_ns - read_again;
   if (time_ns - read_again != *state.first_second_ns) {
-    throw InvalidArgument(fmt::format(
-        "row {}: time = {} ns cannot be told from {} ns by a PPS clock, which starts again every "
-        "second; gaps must be shorter than 0.99 s",
-        row_number, time_ns, read_again + *state.first_second_ns));
+    throw InvalidArgument(
+        fmt::format("row {}: time = {} ns cannot be distinguished from {} ns by a PPS clock, which "
+                    "starts again every "
+                    "second; gaps must be shorter than 0.99 s",
+                    row_number, time_ns, read_again + *state.first_second_ns));
   }
 }
 
-/// Makes the device's packets hold tags and so many returns from the last shot on.
+/// Makes the device's packets hold tags and this many returns from the last shot on.
 void Lvx11Writer::widen(std::size_t device, bool tagged, int returns) {
   DeviceState& state = devices_[device];
   state.tagged = tagged;
   state.returns = returns;
   OpenPacket& packet = state.packet;
   if (!packet.layout) return;
-  // The last shot may get another return that the old packet has no room for: it moves.
+  // The last shot may get another return that does not fit the old packet: it moves.
   Observations shot;
   const std::size_t old_returns = packet.layout->returns;
   const std::size_t first = packet.last_slot * old_returns;
@@ -473,7 +474,7 @@ void Lvx11Writer::flush_all() {
 
 void Lvx11Writer::write_imu(const ImuSample& sample) {
   const std::size_t device = device_row(sample.device, rows_written_);
-  // A packet whose time is over goes first, so that the device's times do not run backwards.
+  // A packet whose time is over is written first, so that the device's times do not run backwards.
   const OpenPacket& open_packet = devices_[device].packet;
   if (open_packet.layout &&
       sample.time_ns >=

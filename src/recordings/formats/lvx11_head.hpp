@@ -12,9 +12,9 @@ namespace risley::recordings {
 /// Bytes of a frame's header.
 inline constexpr std::size_t kLvx11FrameHeaderBytes = 24;
 
-/// What stands in front of the first frame of LVX 1.1: headers and device table.
-/// @throws InvalidArgument for more than 255 devices, an index that is used twice, and serial
-///         numbers that are too long
+/// The part of LVX 1.1 before the first frame: headers and device table.
+/// @throws InvalidArgument for more than 255 devices, a duplicate index, and serial numbers that
+/// are too long
 std::vector<std::uint8_t> lvx11_head(const std::vector<Device>& devices,
                                      std::uint32_t frame_duration_ms);
 

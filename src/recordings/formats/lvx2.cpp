@@ -1,12 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// LVX 2, of Livox Viewer 2: the frames of LVX 1.1, in which packages with the records of the second
-// generation's packets stand. A package does not say how far its shots are apart, so that its
-// sensor's type does. It names its sensor by four bytes, which are its IP address.
+// LVX 2, of Livox Viewer 2: the frames of LVX 1.1, with packages that contain the records of the
+// second generation's packets. A package does not state the interval of its shots, which follows
+// from its sensor's type. It names its sensor by four bytes, its IP address.
 //
-// The specification knows the data types 1 and 2 only. Others are read, too, and inertial samples
-// and two returns written in packages of their data types: a package has its length, by which
-// readers that do not know them step over it.
+// The specification has only the data types 1 and 2. Others are read, too, and inertial samples and
+// two returns are written in packages of their data types: a package states its length, so that
+// readers can skip unknown ones.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,6 +20,7 @@
 #include <fmt/format.h>
 
 #include "risley/core/error.hpp"
+#include "risley/core/saturating.hpp"
 #include "risley/io/block_file.hpp"
 #include "risley/io/little_endian.hpp"
 #include "risley/recordings/livox/numbered_packet.hpp"
@@ -74,7 +75,7 @@ std::vector<Device> read_lvx2_devices(io::BlockInput& file, std::size_t count) {
   return devices;
 }
 
-/// What stands in front of the points of a package.
+/// The header of a package before its points.
 struct Package {
   LidarId id{};
   NumberedHeader header;
@@ -128,7 +129,7 @@ class Lvx2Reader final : public LvxFrameReader {
   std::optional<std::size_t> device_row(const LidarId& id);
 
   std::map<LidarId, std::size_t> rows_of_ids_;
-  bool one_for_all_ = false;     // the only device, whose packages bear another id
+  bool one_for_all_ = false;     // the only device, whose packages have another id
   std::vector<ShotGrid> grids_;  // by device row
   std::vector<Numbers> numbers_;
   std::map<std::uint8_t, std::uint64_t> unknown_types_;  // packages of each
@@ -142,7 +143,7 @@ std::optional<std::size_t> Lvx2Reader::device_row(const LidarId& id) {
   return one_for_all_ ? std::optional<std::size_t>(0) : std::nullopt;
 }
 
-/// By the times and numbers of neighbouring packets; empty where there are none.
+/// By the times and numbers of neighbouring packets; empty if there are none.
 std::optional<ShotGrid> Lvx2Reader::measured_grid(const std::vector<Packet>& packets,
                                                   std::size_t device) {
   double least = std::numeric_limits<double>::infinity();
@@ -165,13 +166,13 @@ std::optional<ShotGrid> Lvx2Reader::measured_grid(const std::vector<Packet>& pac
                   static_cast<std::uint32_t>(kPart), 1, 1};
 }
 
-/// Completes the header from the first packages: what they hold, from when their times count, and
-/// how far the shots of devices are apart whose type does not tell it.
+/// Completes the header from the first packages: their contents, the origin of their times, and the
+/// shot interval of devices whose type does not determine it.
 void Lvx2Reader::describe() {
   constexpr std::size_t kEnoughRows = 20'000;
   Chunk chunk;
   const auto look = [&] {
-    // Damage behind the first sound packages is reported when the caller comes to it.
+    // Damage after the first undamaged packages is reported when the caller reaches it.
     try {
       read(chunk, kEnoughRows);
     } catch (const FileError&) {
@@ -279,7 +280,7 @@ bool Lvx2Reader::read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t 
     fail(position() + kPackageTimeAt, fmt::format("{} ns is not a time", header.time_ns));
     return true;
   }
-  // Packages stay whole; one is delivered even if the chunk should be smaller.
+  // Packages stay complete; one is delivered even if the chunk should be smaller.
   const RecordLayout layout = *numbered_layout(header.data_type, header.records);
   if (has_to_wait(chunk, max_rows, layout.rows())) return false;
   if (package.length % size != 0) ++leftovers_;
@@ -292,8 +293,9 @@ bool Lvx2Reader::read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t 
     pass_package(whole, 0);
     return true;
   }
-  numbers.lost +=
-      place.kind == PacketNumbers::Kind::late ? -1 : static_cast<std::int64_t>(place.lost);
+  numbers.lost = saturating_sum(numbers.lost, place.kind == PacketNumbers::Kind::late
+                                                  ? -1
+                                                  : static_cast<std::int64_t>(place.lost));
   const std::span records(file().at(position() + kLvx2PackageBytes, package.length),
                           layout.bytes());
   const std::size_t packets = chunk.packets.size();
@@ -321,23 +323,22 @@ void Lvx2Reader::at_end() {
     }
     if (numbers_[row].duplicates > 0) {
       warn(kWarning.content_left_out,
-           "{}: {} packets stand there twice; the second ones were left "
-           "out",
-           name, numbers_[row].duplicates);
+           "{}: {} packets are duplicated there; the second ones were ignored", name,
+           numbers_[row].duplicates);
     }
   }
   for (const auto& [type, packages] : unknown_types_) {
-    warn(kWarning.content_left_out, "{} packages of the unknown data type {} were left out",
+    warn(kWarning.content_left_out, "{} packages of the unknown data type {} were ignored",
          packages, type);
   }
   if (strangers_ > 0) {
     warn(kWarning.content_left_out,
-         "{} packages were left out: they name sensors that are not in the device table",
+         "{} packages were ignored: they name sensors that are not in the device table",
          strangers_);
   }
   if (leftovers_ > 0) {
     warn(kWarning.content_left_out,
-         "{} packages end within a record; their whole records were read", leftovers_);
+         "{} packages end within a record; their complete records were read", leftovers_);
   }
 }
 
@@ -374,11 +375,11 @@ class Lvx2Writer final : public Writer {
   void close() override;
 
  private:
-  /// A package that is being formed from rows that came without packets.
+  /// A package being formed from rows that came without packets.
   struct OpenPackage {
     std::uint16_t records = 0;  ///< 0 while there is none
     std::int64_t time_ns = 0;
-    Observations rows;                       ///< all slots; null records where no shot came
+    Observations rows;                       ///< all slots; null records for missing shots
     std::vector<std::uint64_t> row_numbers;  ///< by slot, for messages
     std::uint32_t last_slot = 0;
     std::uint8_t last_return = 0;
@@ -388,7 +389,7 @@ class Lvx2Writer final : public Writer {
     LidarId id{};
     ShotGrid grid;
     OpenPackage open;
-    std::optional<std::int64_t> last_ns, last_imu_ns;  ///< of the packages that were formed
+    std::optional<std::int64_t> last_ns, last_imu_ns;  ///< of the packages formed
     std::uint16_t number = 0, imu_number = 0;          ///< of the next of them
   };
 
@@ -434,10 +435,10 @@ Lvx2Writer::Lvx2Writer(const std::string& path, const RecordingHeader& header)
     const Device& device = header_.devices[row];
     const auto grid = numbered_grid(device.type);
     if (!grid && !is_second_generation(device.type) && device.address.empty()) {
-      throw InvalidArgument(fmt::format(
-          "device {} has the type {} ({}), which LVX 2 does not hold; allowed {}; sensors of the "
-          "first generation stand in LVX 1.1 (.lvx)",
-          row, device.type, device_type_name(device.type), livox_types_text(false)));
+      throw InvalidArgument(
+          fmt::format("device {} has the type {} ({}), which LVX 2 does not support; allowed {}; "
+                      "sensors of the first generation need LVX 1.1 (.lvx)",
+                      row, device.type, device_type_name(device.type), livox_types_text(false)));
     }
     State state;
     state.grid = grid.value_or(kUsualGrid);
@@ -452,7 +453,7 @@ void Lvx2Writer::end_frame() {
   frame_at_.reset();
 }
 
-/// Appends a package, in a new frame where that is due. @return where its records go
+/// Appends a package, in a new frame if that is due. @return where its records go
 std::uint8_t* Lvx2Writer::package(std::size_t device, const NumberedHeader& header) {
   if (cut_.begins_frame(device, static_cast<std::int64_t>(header.time_ns))) {
     end_frame();
@@ -521,7 +522,7 @@ void Lvx2Writer::write_packets(const Chunk& chunk) {
         layout.returns == 0) {
       refuse(fmt::format("rows = {} of data type {}", packet.rows, packet.data_type));
     }
-    // A row time that was changed, or a packet that belongs to other rows, is not to be lost.
+    // Changed row times, or packets that belong to other rows, must not be lost silently.
     if (header.time_ns > kLatestPackage || numbered_time_ns(packet) != o.time_ns[row]) {
       refuse(fmt::format("time = {} ns, but the packet's timestamp is {} ns", o.time_ns[row],
                          header.time_ns));
@@ -557,7 +558,7 @@ void Lvx2Writer::write_rows(const Chunk& chunk) {
   while (imu < chunk.imu.size()) write_imu(chunk.imu[imu++]);
 }
 
-/// Puts one row into its slot of the open package, or into a new one where it fits none.
+/// Puts one row into its slot of the open package, or into a new one if it does not fit.
 void Lvx2Writer::place(const Observations& o, std::size_t row) {
   const std::uint64_t row_number = rows_written_ + row;
   State& state = state_of(o.device[row], row_number);
@@ -582,7 +583,7 @@ void Lvx2Writer::place(const Observations& o, std::size_t row) {
       const bool on_grid = std::abs(since - state.grid.offset_ns(nearest)) <= 1;
       const bool free =
           nearest > open.last_slot || (nearest == open.last_slot && number > open.last_return);
-      // Places tell emitters; files that do not know them have 0.
+      // A shot's place gives its emitter; 0 in files that do not store emitters.
       const bool its_emitter = beam == 0 || nearest % beams == beam;
       if (on_grid && free && its_emitter && nearest < open.records) slot = nearest;
     }
@@ -628,7 +629,7 @@ void Lvx2Writer::flush(std::size_t device) {
   header.records = open.records;
   header.time_type = time_type_of(header_.time_reference);
   header.time_ns = static_cast<std::uint64_t>(open.time_ns);
-  if (state.last_ns) {  // what is missing keeps its numbers
+  if (state.last_ns) {  // missing ones keep their numbers
     const double periods =
         static_cast<double>(open.time_ns - *state.last_ns) / static_cast<double>(length_ns(state));
     const double skipped = std::clamp(std::round(periods) - 1.0, 0.0, 1e15);
@@ -659,7 +660,7 @@ void Lvx2Writer::flush_all() {
 
 void Lvx2Writer::write_imu(const ImuSample& sample) {
   State& state = state_of(sample.device, rows_written_);
-  // A package whose time is over goes first, so that the device's times do not run backwards.
+  // A package whose time is over is written first, so that the device's times do not run backwards.
   if (state.open.records > 0 && sample.time_ns >= state.open.time_ns + length_ns(state)) {
     flush(sample.device);
   }

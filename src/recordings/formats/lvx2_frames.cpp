@@ -23,7 +23,7 @@ std::vector<LidarId> lidar_ids(const std::vector<Device>& devices) {
   std::vector<LidarId> ids;
   for (std::size_t row = 0; row < devices.size(); ++row) {
     const auto address = wire::address_from(devices[row].address);
-    // The factory's addresses of the Mid-360 begin so.
+    // Prefix of the Mid-360's factory addresses.
     LidarId id =
         address ? address->bytes : LidarId{192, 168, 1, static_cast<std::uint8_t>(100 + row)};
     for (int i = 0; i < 256 && taken.contains(id); ++i) ++id[3];
@@ -57,7 +57,7 @@ Lvx2Head lvx2_head(const std::vector<Device>& devices) {
     }
     std::copy(device.serial.begin(), device.serial.end(), bytes);
     std::copy(ids[row].begin(), ids[row].end(), bytes + kIdAt);
-    constexpr std::uint8_t kUsual = 247, kOfHap = 246;  // what files of these sensors have
+    constexpr std::uint8_t kUsual = 247, kOfHap = 246;  // value in files of these sensors
     bytes[kLidarTypeAt] = device.type == kHap || device.type == kHapT1 ? kOfHap : kUsual;
     bytes[kDeviceTypeAt] = device.type;
     bytes[kEnableAt] = device.extrinsic_enabled ? 1 : 0;

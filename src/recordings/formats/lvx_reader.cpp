@@ -132,13 +132,13 @@ void LvxReader::make_decoder(std::size_t device_row) {
   }
 }
 
-/// Completes the header from the first packets: what they hold, from when their times count, and
-/// the shot rate of devices whose type does not tell it.
+/// Completes the header from the first packets: their contents, the origin of their times, and the
+/// shot rate of devices whose type does not determine it.
 void LvxReader::describe() {
   constexpr std::size_t kEnoughRows = 20'000;
   std::vector<FirstPackets> first(header_.devices.size());
   Chunk chunk;
-  // Damage behind the first sound packets is reported when the caller comes to it.
+  // Damage after the first undamaged packets is reported when the caller reaches it.
   try {
     read(chunk, kEnoughRows);
   } catch (const FileError&) {
@@ -195,8 +195,8 @@ bool LvxFrameReader::read(Chunk& chunk, std::size_t max_rows) {
   chunk.imu.clear();
   chunk.packet_begins.clear();
   rows_ = 0;
-  // Room for all rows at once, in which the rows before stand. No record has less than 7 bytes per
-  // row, so a huge max_rows costs no memory.
+  // Room for all rows at once, with the previous rows. No record has less than 7 bytes per row, so
+  // a huge max_rows costs no memory.
   const std::uint64_t left = file_.size() - std::min(position_, file_.size());
   chunk.observations.resize(static_cast<std::size_t>(std::min<std::uint64_t>(max_rows, left / 7)));
   while (!ended_) {
@@ -284,7 +284,7 @@ bool LvxFrameReader::next_package(Chunk& chunk, std::size_t max_rows) {
     if (open_ended_) stop_at_cut(0);
     return true;
   }
-  // A frame that was never closed may still be followed by a whole one.
+  // A frame that was never closed may still be followed by a complete one.
   if (open_ended_ && left >= frame_header_bytes_ &&
       load<std::uint64_t>(file_.at(position_, sizeof(std::uint64_t))) == position_) {
     warn(kWarning.header_contradicted, "the previous frame was never closed (next offset {})",
@@ -346,13 +346,13 @@ bool LvxReader::read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t l
     return true;
   }
 
-  // Packets stay whole; one alone is delivered however small the chunk is to be.
+  // Packets stay complete; a single one is delivered however small the chunk should be.
   if (has_to_wait(chunk, max_rows, layout->rows())) return false;
   const auto device_row = static_cast<std::size_t>(device);
   const std::uint8_t device_type = header_.devices[device_row].type,
                      data_type = bytes[1 + kDataTypeAt];
   if (!grids_[device_row] && !shot_grid(device_type, data_type)) {
-    grids_[device_row] = kGrid100kHz;  // the first packets did not tell, either
+    grids_[device_row] = kGrid100kHz;  // the first packets did not show it either
     make_decoder(device_row);
   }
   PacketDecoder& decoder = decoders_[device_row];

@@ -23,34 +23,35 @@ inline constexpr std::string_view kLvxName{"livox_tech\0\0\0\0\0\0", 16};
 inline constexpr std::uint32_t kLvxMagicCode = 0xAC0EA767;
 inline constexpr std::size_t kLvxPublicHeaderBytes = 24;
 
-/// In front of each package's records: the device index and the packet header.
+/// Before each package's records: the device index and the packet header.
 inline constexpr std::size_t kLvxPackageHeaderBytes = 1 + livox::kPacketHeaderBytes;
 
-/// Where a frame header holds the positions of itself and of the next frame, and its number.
+/// Positions of the fields in a frame header: its own position, that of the next frame, and its
+/// number.
 inline constexpr std::size_t kLvxFrameNextAt = 8, kLvxFrameIndexAt = 16;
 
-/// What the versions of LVX do differently.
+/// Differences between the versions of LVX.
 struct LvxVersion {
   std::uint64_t first_frame = 0;  ///< byte offset
   std::size_t frame_header_bytes = 24;
   bool float_points = false;  ///< LVX 1.0: data type 0 holds floats in metres
 };
 
-/// Bytes of a file's header. @throws FileError that names the missing part when it is cut off
+/// Bytes of a file's header. @throws FileError that names the missing part when it is truncated
 const std::uint8_t* lvx_header_bytes(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      std::string_view part);
 
-/// Text of a field that is filled up with NUL.
+/// Text of a field padded with NUL.
 std::string lvx_text(const std::uint8_t* bytes, std::size_t count);
 
 /// Checks name and magic code, and returns the four version bytes. @throws FileError
 std::array<std::uint8_t, 4> lvx_version(io::BlockInput& file);
 
-/// Reads the device table. @throws FileError when it is empty, cut off or names a device twice
+/// Reads the device table. @throws FileError when it is empty, truncated or names a device twice
 std::vector<Device> read_lvx_devices(io::BlockInput& file, std::uint64_t offset, std::size_t count,
                                      bool has_extrinsic_flag);
 
-/// Reads the frames that all LVX files consist of. Which packages stand in them differs.
+/// Reads the frames of any LVX file. The packages in them differ.
 class LvxFrameReader : public Reader {
  public:
   bool read(Chunk& chunk, std::size_t max_rows) final;
@@ -63,10 +64,10 @@ class LvxFrameReader : public Reader {
 
   /// Back to the first frame, without warnings.
   void rewind_frames();
-  /// Reads the package at position(), of whose frame so many bytes are left, at least one.
-  /// @return false when it has to wait for the next chunk
+  /// Reads the package at position(), with this many bytes of its frame remaining, at least one.
+  /// @return false if it must wait for the next chunk
   virtual bool read_package(Chunk& chunk, std::size_t max_rows, std::uint64_t left) = 0;
-  /// The file has ended, or nothing more of it can be read: the time for last warnings.
+  /// The file has ended, or nothing more of it can be read: last warnings are given now.
   virtual void at_end() {}
 
   io::BlockInput& file() { return file_; }
@@ -74,9 +75,9 @@ class LvxFrameReader : public Reader {
   std::uint64_t frame_end() const { return frame_end_; }  ///< byte offset
   std::uint64_t frames() const { return frames_; }        ///< begun so far
   std::size_t rows() const { return rows_; }              ///< of the chunk that is being read
-  /// Whether the present frame ends with the file.
+  /// Whether the current frame ends with the file.
   bool at_file_end() const { return frame_end_ == file_.size(); }
-  /// Whether a package waits for the next chunk, because packages stay whole.
+  /// Whether a package waits for the next chunk, because packages stay complete.
   bool has_to_wait(const Chunk& chunk, std::size_t max_rows, std::size_t more_rows) const {
     return !chunk.packets.empty() &&
            (rows_ + more_rows > max_rows || chunk.packets.size() >= max_rows);
@@ -85,9 +86,9 @@ class LvxFrameReader : public Reader {
   void pass_package(std::uint64_t bytes, std::size_t rows);
   /// The rest of the frame cannot be read.
   void skip_frame();
-  /// The file was cut off within a package of so many records.
+  /// The file was cut off within a package of this many records.
   void stop_at_cut(std::optional<std::size_t> records);
-  /// Nothing behind this damage can be read.
+  /// Nothing after this damage can be read.
   void fail(std::uint64_t offset, std::string problem);
 
  private:
@@ -99,7 +100,7 @@ class LvxFrameReader : public Reader {
   std::size_t frame_header_bytes_;
   std::uint64_t position_ = 0;
   std::uint64_t frame_end_ = 0;
-  std::uint64_t next_offset_ = 0;  // as the frame header gives it
+  std::uint64_t next_offset_ = 0;  // as stated in the frame header
   std::uint64_t frames_ = 0;
   std::size_t rows_ = 0;
   bool in_frame_ = false;
@@ -122,7 +123,8 @@ class LvxReader final : public LvxFrameReader {
 
   bool float_points_;
   std::array<int, 256> device_rows_{};                 // by device index, -1 for none
-  std::vector<std::optional<livox::ShotGrid>> grids_;  // by device row; empty: as the types say
+  std::vector<std::optional<livox::ShotGrid>> grids_;  // by device row; empty: according to the
+                                                       // types
   std::vector<livox::PacketDecoder> decoders_;         // by device row
   std::map<std::uint8_t, std::size_t> stepped_over_;   // data type -> its warning
   std::map<std::uint8_t, std::uint64_t> frames_stepped_over_;

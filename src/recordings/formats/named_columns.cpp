@@ -112,7 +112,7 @@ NamedColumns::Role NamedColumns::role_of(std::string_view base) {
       {Role::beam, {"line", "beam", "ring", "laser_id", "laserid"}},
   }};
   if (const auto role = meant_by(roles, base)) return *role;
-  // Arrays of many are often called by their plural.
+  // Arrays are often named in the plural.
   const bool plural = base.size() > 2 && base.ends_with('s');
   return plural ? role_of(base.substr(0, base.size() - 1)) : Role::none;
 }
@@ -129,7 +129,7 @@ NamedColumns::Meaning NamedColumns::meaning_of(std::string_view name) {
     const auto wants = [&](Role first, Role last, Unit::Kind kind) {
       return role >= first && role <= last && (!unit || unit->kind != kind);
     };
-    // A unit that is not known, or not one of this role, makes the column another one.
+    // A column with an unknown unit, or one not of this role, is ignored for the role.
     if (wants(Role::x, Role::range, Unit::Kind::length) ||
         wants(Role::azimuth, Role::elevation, Unit::Kind::angle) ||
         wants(Role::time, Role::time, Unit::Kind::time)) {
@@ -170,7 +170,7 @@ NamedColumns::NamedColumns(std::vector<NamedColumn> columns) : columns_(std::mov
   };
   for (std::size_t i = 0; i < columns_.size(); ++i) {
     const Role role = meanings[i].role;
-    // Several columns can be times: which has those of the shots shows only in its values.
+    // Several columns can be times: only their values show which holds those of the shots.
     if (!takes(role) || (role != Role::time && find(role) != nullptr)) {
       unused_.push_back(i);
       continue;
@@ -410,8 +410,8 @@ void NamedColumns::settle_intensity(RecordingHeader& header, std::vector<Warning
     header.has_intensity = false;
     cell_of_[static_cast<std::size_t>(Role::intensity)].reset();
     warn(warnings, kWarning.columns_unused,
-         "column {} holds {} to {}, expected intensities in [0, 255]; they were left out", name,
-         low, high);
+         "column {} holds {} to {}, expected intensities in [0, 255]; they were ignored", name, low,
+         high);
   } else if (high <= 1.0 && !all_whole(intensity->samples)) {
     intensity_factor_ = 255.0;
     warn(warnings, kWarning.values_changed, "column {} holds {} to {}: it was multiplied by 255",
@@ -518,7 +518,7 @@ std::int64_t NamedColumns::time_of(std::span<const Decimal> cells, std::uint8_t 
   return next_shot_ - 1;
 }
 
-/// A coordinate or a range, m; NaN where there is none.
+/// A coordinate or a range, m; NaN if there is none.
 double NamedColumns::length(const Decimal& cell, Role role, double low) const {
   const double value = cell.value / length_per_m_;
   if (value < low || value > kFarthest) {
@@ -542,7 +542,7 @@ SphericalAngles<double> NamedColumns::angles(std::span<const Decimal> cells) con
       throw BadRow{fmt::format("expected {} in [{}, {}] deg, found {:.9g}", name_of(role), low_deg,
                                high_deg, value_deg)};
     }
-    // What stands in degrees is not sent through radians.
+    // Values in degrees are not converted to radians and back.
     const double degrees = per_rad == kDegreesPerRadian ? value : value_deg;
     return degrees < low_deg ? low_deg : degrees > high_deg ? high_deg : degrees;
   };
@@ -556,7 +556,7 @@ SphericalAngles<double> NamedColumns::angles(std::span<const Decimal> cells) con
 }
 
 void NamedColumns::append(std::span<const Decimal> cells, Observations& rows) {
-  // All that can be wrong with a row is found before it begins.
+  // All errors of a row are detected before it begins.
   const std::uint8_t number = return_number(cells), intensity = byte(cells, Role::intensity),
                      tag = byte(cells, Role::tag), beam = byte(cells, Role::beam);
   Vector3<double> position;

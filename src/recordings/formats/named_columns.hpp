@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// What columns mean by their names, and how their cells become rows: shared by every format that
-// is a table whose columns have names.
+// Meaning of columns by their names, and conversion of their cells to rows: shared by every format
+// with named columns.
 //
 // Names, in any case and order, each with or without a unit as "x_m", "x [mm]", "X (m)", "Time/s":
 // x, y, z; or azimuth (phi, yaw) and zenith (theta) or elevation (pitch, altitude), with or without
@@ -34,36 +34,36 @@ struct NamedColumn {
   CellType type = CellType::text;
 };
 
-/// Columns that cannot be rows; the reader adds the file and the place.
+/// Columns that cannot form rows; the reader adds the file and the place.
 class BadColumns : public Error {
  public:
   using Error::Error;
 };
 
-/// How many rows a reader shows to NamedColumns before the first is made.
+/// Number of rows that a reader shows to NamedColumns before the first is made.
 inline constexpr std::size_t kNamedRowsLookedAt = 8192;
 
 /// Turns the cells of named columns into observations.
 class NamedColumns {
  public:
   /// Finds the columns by their names.
-  /// @throws BadColumns when those of a direction are missing: what was found and what is needed
+  /// @throws BadColumns when those of a direction are missing: the columns found and those needed
   explicit NamedColumns(std::vector<NamedColumn> columns);
 
-  /// Numbers of the columns that rows are made of; look_at() and append() take their cells in this
-  /// order. Integers beyond 64 bits and floats have decimals = -1, cells without a number are NaN.
+  /// Numbers of the columns that form rows; look_at() and append() take their cells in this order.
+  /// Integers beyond 64 bits and floats have decimals = -1, cells without a number are NaN.
   const std::vector<std::size_t>& wanted() const { return wanted_; }
   const std::string& name(std::size_t wanted) const { return columns_[wanted_[wanted]].name; }
 
   /// One of the first rows, kept until settle().
   void look_at(std::span<const Decimal> cells);
 
-  /// Decides units, rounding and what times are by the rows looked at, and completes the header.
-  /// @param warnings  gets what was assumed and what is left out
-  /// @throws BadColumns when a unit cannot be told
+  /// Decides units, rounding and the meaning of times from the rows seen, and completes the header.
+  /// @param warnings  receives assumptions and ignored columns
+  /// @throws BadColumns when a unit is unclear
   void settle(RecordingHeader& header, std::vector<Warning>& warnings);
 
-  /// Adds one row. @throws BadRow, leaving the rows as they were
+  /// Adds one row. @throws BadRow, leaving the rows unchanged
   void append(std::span<const Decimal> cells, Observations& rows);
 
  private:
@@ -92,7 +92,7 @@ class NamedColumns {
     Role role = Role::none;
     std::optional<Unit> unit;
   };
-  /// A column that is used, or that may be: its cell in look_at() and append().
+  /// A column that is used, or may be: its cell in look_at() and append().
   struct Source {
     std::size_t cell = 0;
     Meaning meaning;
@@ -119,7 +119,7 @@ class NamedColumns {
   bool is_shared_by_many(const Source& time) const;
   int time_shift(const Source& time, RecordingHeader& header, std::vector<Warning>& warnings) const;
 
-  /// The cell of a role, nullptr where no column has it.
+  /// The cell of a role, nullptr if no column has it.
   const Decimal* cell(std::span<const Decimal> cells, Role role) const;
   std::uint8_t byte(std::span<const Decimal> cells, Role role) const;
   std::uint8_t return_number(std::span<const Decimal> cells) const;

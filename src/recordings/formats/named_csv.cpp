@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Texts with named columns in any order and unit, as scripts, CloudCompare, ParaView and
-// spreadsheets write them. Columns are separated by commas, semicolons, tabs or blanks. The header
-// line may begin with # or //, and comment lines may stand before it. A line with the number of
-// rows may stand before the rows or before the names; rows behind it need no names (PTS).
+// Texts with named columns in any order and unit, as written by scripts, CloudCompare, ParaView and
+// spreadsheets. Columns are separated by commas, semicolons, tabs or blanks. The header line may
+// begin with # or //, and comment lines may stand before it. A line with the number of rows may
+// come before the rows or before the names; rows after it need no names (PTS).
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::string_view kNamedCsv = "named-csv";
 
-/// The beginning of a table: how its rows stand in the file, without names where there are none.
+/// The beginning of a table: the layout of its rows in the file, without names if there are none.
 struct TableHead {
   NamedTextLayout layout;
   bool has_row = false;  ///< a row of as many numbers follows
@@ -86,7 +86,7 @@ struct HeadLines {
   std::vector<std::string_view> lines;
 };
 
-/// The number of rows that a line states by itself.
+/// The number of rows stated on a separate line.
 std::optional<std::uint64_t> stated_rows(std::string_view line) {
   try {
     return count_field(line, "");
@@ -95,7 +95,7 @@ std::optional<std::uint64_t> stated_rows(std::string_view line) {
   }
 }
 
-/// What columns hold that follow a number of rows without names, as laser scanners export PTS.
+/// Columns after a number of rows without names, as in PTS exports of laser scanners.
 std::vector<std::string> pts_names(std::size_t columns) {
   std::vector<std::string> names{"x", "y", "z", "intensity", "red", "green", "blue"};
   constexpr std::size_t kCoordinates = 3, kWithIntensity = 4, kWithColour = 6;
@@ -116,7 +116,7 @@ bool has_directions(const TableHead& head) {
   }
 }
 
-/// Finds the line of names: the first line that is no comment or, where that is a row of numbers,
+/// Finds the line of names: the first line that is not a comment or, if that is a row of numbers,
 /// the comment before it. Names are empty when there is no such line.
 std::optional<TableHead> find_head(std::string_view bytes) {
   if (!is_text(bytes)) return std::nullopt;
@@ -160,7 +160,7 @@ std::optional<TableHead> find_head(std::string_view bytes) {
     head.layout.first_row_line = *comment + 2;
     return head;
   }
-  // Names that are cut off are none.
+  // Truncated names are ignored.
   if (at + 1 == lines.size() && bytes.size() >= kHeadBytes) return std::nullopt;
   const auto first = row_of(at, delimiter_of(lines[at]));
   if (!all_numbers(first)) {

@@ -13,21 +13,21 @@
 
 namespace risley::recordings {
 
-/// Where the rows of a text stand and what its columns are called.
+/// Position of the rows of a text, and the names of its columns.
 struct NamedTextLayout {
   std::vector<std::string> names;
   std::vector<bool> lists;  ///< columns of any number of fields, that first; empty without any
   char delimiter = kBlanks;
   std::uint64_t names_line = 1, first_row_line = 2;  ///< from 1
-  std::optional<std::uint64_t> rows;                 ///< where the file tells their number
-  std::uint64_t rows_line = 0;    ///< where it does so and nothing may follow them, otherwise 0
-  std::vector<Warning> warnings;  ///< of what stands before the rows
+  std::optional<std::uint64_t> rows;                 ///< if the file states their number
+  std::uint64_t rows_line = 0;    ///< if it does so and nothing may follow them, otherwise 0
+  std::vector<Warning> warnings;  ///< of the part before the rows
 };
 
 /// Reads rows of numbers whose columns have names.
 class NamedTextReader final : public TextTableReader {
  public:
-  /// @throws FileError when no rows can be made of the columns
+  /// @throws FileError when the columns cannot form rows
   NamedTextReader(const io::InputFile& file, std::string_view format, NamedTextLayout layout);
 
  private:
@@ -40,7 +40,7 @@ class NamedTextReader final : public TextTableReader {
   std::vector<Decimal> cells_;
 };
 
-/// The lines of a file's beginning, in front of text or bytes.
+/// The lines at the beginning of a file, followed by text or bytes.
 class HeaderLines {
  public:
   /// @throws FileError

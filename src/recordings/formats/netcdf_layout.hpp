@@ -25,7 +25,7 @@ inline constexpr std::uint32_t kLayoutVersion = 1;
 inline constexpr const char* kHasTimes = "has_times";  ///< attribute; 0: times are shot numbers
 inline constexpr const char* kDetailsGroup = "details";
 
-/// The dimensions along which the tables run, and the entries per block of their variables.
+/// The dimensions of the tables, and the entries per block of their variables.
 inline constexpr const char* kRowDimension = "row";
 inline constexpr const char* kPacketDimension = "packet";
 inline constexpr const char* kImuDimension = "imu_sample";
@@ -58,7 +58,7 @@ void for_each_row_column(Rows&& rows, const Function& f) {
       rows);
 }
 
-/// As for_each_row_column(), of the tables of records: with the members that columns hold.
+/// As for_each_row_column(), for the tables of records: with the members in the columns.
 template <class Function>
 void for_each_packet_column(Function&& f) {
   f(NetcdfColumn{"packet_rows", "1", "number of rows of the packet"}, &Packet::rows);
@@ -125,10 +125,11 @@ struct ColumnElement<bool> : ColumnElement<std::uint8_t> {};
 template <class Values>
 using ElementOf = typename ColumnElement<Values>::Type;
 
-/// @throws FileError where the file is damaged or of another layout
+/// @throws FileError if the file is damaged or of another layout
 std::unique_ptr<Reader> open_recording(const io::InputFile& file, const Progress& progress);
 
-/// @throws FileError where the file cannot be written, InvalidArgument for a header without device
-std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header);
+/// @throws FileError if the file cannot be written, InvalidArgument for a header without device
+std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header,
+                                         const WriteOptions& options);
 
 }  // namespace risley::recordings::netcdf

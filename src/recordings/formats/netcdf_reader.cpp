@@ -20,11 +20,11 @@ namespace {
 
 using Variables = std::map<std::string_view, tables::NetcdfVariable>;
 
-/// As many as the columns of rows can name.
+/// The largest number that the columns of rows can express.
 constexpr std::size_t kMostDevices = std::size_t{std::numeric_limits<std::uint8_t>::max()} + 1;
 constexpr std::uint32_t kMostReturns = std::numeric_limits<std::uint8_t>::max();
 
-/// Finds the variables of one table, and refuses a file whose variables are not of this layout.
+/// Finds the variables of one table, and rejects a file whose variables have another layout.
 struct RequireColumns {
   const tables::NetcdfInput& file;
   Variables& variables;
@@ -56,7 +56,7 @@ struct GetColumns {
   }
 };
 
-/// Reads records from entry `start` on, as many as there are.
+/// Reads records from entry `start` on, as many as exist.
 template <class Record>
 struct GetRecords {
   const tables::NetcdfInput& file;
@@ -139,7 +139,7 @@ class NetcdfReader final : public Reader {
     }
     header_.format = kName;
     header_.time_reference = read_time_reference();
-    // Files of earlier versions have times and do not say so.
+    // Files of earlier versions have times and do not state it.
     if (file_.has_attribute(kHasTimes)) header_.has_times = file_.number(kHasTimes) != 0;
     header_.has_range = file_.number("has_range") != 0;
     header_.has_intensity = file_.number("has_intensity") != 0;
@@ -178,14 +178,14 @@ class NetcdfReader final : public Reader {
     file_.fail(fmt::format("expected a known time_reference, found \"{}\"", found));
   }
 
-  /// Refuses entry `entry` of a variable where it is no device of the table.
+  /// Rejects entry `entry` of a variable if it is not a device of the table.
   void require_known_device(const char* variable, std::uint8_t device, std::size_t entry) const {
     if (device < header_.devices.size()) return;
     file_.fail(fmt::format("entry {} of variable {} is {}, allowed below {} = {}", entry, variable,
                            device, kDeviceDimension, header_.devices.size()));
   }
 
-  /// Takes the next packets of about max_rows rows, and says what they own.
+  /// Reads the next packets of about max_rows rows, and determines their rows and samples.
   void take_packets(std::vector<Packet>& packets, std::size_t max_rows, std::size_t& rows,
                     std::size_t& samples) {
     rows = samples = 0;
@@ -235,8 +235,8 @@ class NetcdfReader final : public Reader {
     samples = std::move(found);
   }
 
-  /// After damage: drops the packets that did not get all their rows and samples, and the rows of
-  /// a packet that is not whole.
+  /// After damage: drops the packets without all their rows and samples, and the rows of an
+  /// incomplete packet.
   void keep_whole_packets(Chunk& chunk) const {
     if (packet_count_ == 0) return;
     std::size_t rows = 0, samples = 0, whole = 0;

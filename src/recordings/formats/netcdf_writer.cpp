@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Equal recordings give equal bytes, in whatever pieces they are written: blocks of rows and of
-// packet headers go to the file in an order that depends on their content alone.
+// Equal recordings give equal bytes, however they are split into calls: blocks of rows and of
+// packet headers go to the file in an order that depends only on their content.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -165,7 +165,7 @@ class NetcdfWriter final : public Writer {
     for_each_device_column(serial_length, PutRecords<Device>{file_, variables_, 0, header.devices});
   }
 
-  /// Packets, where there are any, must account for all rows and inertial samples.
+  /// Packets, if there are any, must account for all rows and inertial samples.
   void require_whole_packets(const Chunk& chunk) {
     if (chunk.observations.size() == 0 && chunk.imu.empty() && chunk.packets.empty()) return;
     if (!with_packets_) with_packets_ = !chunk.packets.empty();
@@ -184,8 +184,8 @@ class NetcdfWriter final : public Writer {
         chunk.observations.size(), chunk.imu.size(), rows, samples));
   }
 
-  /// Writes the blocks that are full, and at the end the rest: those of rows and of packets in
-  /// the order in which the recording completes them, rows first.
+  /// Writes the full blocks, and at the end the rest: those of rows and of packets in the order in
+  /// which the recording completes them, rows first.
   void flush(bool at_end) {
     const auto block_of = [at_end](std::size_t available, std::size_t block) {
       return available >= block ? block : at_end ? available : 0;
@@ -228,7 +228,8 @@ class NetcdfWriter final : public Writer {
 
 }  // namespace
 
-std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header) {
+std::unique_ptr<Writer> create_recording(const std::string& path, const RecordingHeader& header,
+                                         const WriteOptions&) {
   return std::make_unique<NetcdfWriter>(path, header);
 }
 

@@ -19,7 +19,7 @@ using io::load;
 constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 16;
 constexpr int kDeepest = 8;
 
-/// The Python literals of a header: a dictionary of texts, numbers, truths, tuples and lists.
+/// The Python literals of a header: a dictionary of texts, numbers, booleans, tuples and lists.
 class LiteralReader {
  public:
   explicit LiteralReader(std::string_view text) : text_(text) {}
@@ -98,9 +98,9 @@ std::uint64_t checked_product(std::uint64_t a, std::uint64_t b) {
   return product;
 }
 
-/// What a type such as "<f4" or "<M8[us]" says.
+/// Meaning of a type such as "<f4" or "<M8[us]".
 struct SimpleType {
-  std::optional<NumberType> number;  ///< empty for what is no number
+  std::optional<NumberType> number;  ///< empty for other types
   std::uint64_t bytes = 0;
   std::string time_unit;
 };
@@ -270,7 +270,7 @@ ArrayHeader read_array_header(ByteSource& source) {
   }
   if (!has_descr || !has_order || !has_shape) reader.fail("descr, fortran_order and shape");
   std::uint64_t bytes = std::max<std::size_t>(header.element_bytes, 1);
-  // Lengths of 0 must not hide others beyond all bounds.
+  // Lengths of 0 must not hide others out of bounds.
   for (const std::uint64_t one : header.shape) {
     bytes = checked_product(bytes, std::max<std::uint64_t>(one, 1));
   }

@@ -13,7 +13,7 @@
 
 namespace risley::recordings {
 
-/// What is wrong with the header of an array; the reader adds file and place.
+/// The error in the header of an array; the reader adds file and place.
 class BadArray : public Error {
  public:
   using Error::Error;
@@ -26,7 +26,7 @@ struct ArrayField {
   std::size_t offset = 0;
 };
 
-/// The header of a NumPy array, as .npy files and the members of .npz files begin with it.
+/// The header of a NumPy array, at the beginning of .npy files and of the members of .npz files.
 struct ArrayHeader {
   std::vector<ArrayField> fields;
   std::vector<std::string> other_fields;  ///< whose type is no number

@@ -59,7 +59,7 @@ struct Member {
   }
 };
 
-/// Chooses the array that is the points: the only table, or the one that is called so.
+/// Chooses the array of the points: the only table, or the one with that name.
 const Member* find_table(const std::vector<Member>& members) {
   static const std::set<std::string> names = {"points", "xyz",       "data",       "cloud",
                                               "arr_0",  "positions", "point_cloud"};

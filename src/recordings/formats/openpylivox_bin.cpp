@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Binary captures of openpylivox: the records of the sensor's packets, each followed by its time
-// as a double in seconds. Times are read to the nearest nanosecond, far above the rounding noise
-// that the program's summing leaves.
+// as a double in seconds. Times are rounded to the nearest nanosecond, far above the rounding noise
+// of the program's summation.
 #include <span>
 
 #include <fmt/format.h>
@@ -29,7 +29,7 @@ constexpr std::string_view kImuSignature = "OPENPYLIVOX_IMU";
 constexpr std::uint64_t kHeaderBytes = 15;  // of both kinds
 constexpr std::size_t kTimeBytes = 8;
 
-/// Where the parts of a record stand.
+/// Positions of the parts of a record.
 struct RecordParts {
   RecordLayout points{};  ///< of one record
   std::size_t time_at = 0;
@@ -68,7 +68,7 @@ class OpenpylivoxBinReader final : public Reader {
         append_record(input_.at(offset_, parts_.bytes()), chunk);
       } catch (const FileError&) {
         if (rows == 0) throw;
-        break;  // the next call meets it again
+        break;  // the next call encounters it again
       }
       offset_ += parts_.bytes();
     }
@@ -147,7 +147,7 @@ class OpenpylivoxBinReader final : public Reader {
     tail_reported_ = true;
     warnings_.push_back(
         {kWarning.cut_off,
-         fmt::format("the last record is cut off: expected {} bytes, found {}; it was left out",
+         fmt::format("the last record is cut off: expected {} bytes, found {}; it was ignored",
                      parts_.bytes(), input_.size() - offset_),
          {offset_, {}},
          1});

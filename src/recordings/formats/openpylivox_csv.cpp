@@ -3,7 +3,7 @@
 // Text captures of openpylivox, as captured and as converted from its binary files. Values are the
 // sensor's integers, printed in m and deg, whatever number of decimals they carry. Of the tag byte
 // bits 0-1 are not in the file; the columns of the others are mislabelled there (ReturnType = bits
-// 2-3, sConf = bits 6-7, iConf = bits 4-5) and are read for what they hold.
+// 2-3, sConf = bits 6-7, iConf = bits 4-5) and are read by their actual contents.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,7 +21,7 @@ constexpr const char* kColumns = "columns";  ///< detail: the header line
 constexpr int kTimeDecimals = 6, kMetreDecimals = 3, kDegreeDecimals = 2, kImuDecimals = 6;
 constexpr std::size_t kRowsLookedAt = 4096;
 
-/// One of the header lines that the program writes.
+/// One of the program's header lines.
 struct Variant {
   std::string_view header;
   bool cartesian, return_number, tags, imu;
@@ -149,7 +149,7 @@ class OpenpylivoxCsvReader final : public TextTableReader {
   Variant variant_{};
 };
 
-/// Writes times with 6 decimals as the program does, with 9 where they need them.
+/// Writes times with 6 decimals as the program does, with 9 if needed.
 class OpenpylivoxCsvWriter final : public Writer {
  public:
   OpenpylivoxCsvWriter(const std::string& path, const RecordingHeader& header)
@@ -179,7 +179,7 @@ class OpenpylivoxCsvWriter final : public Writer {
                                    ? find_variant(header.detail(kColumns))
                                    : nullptr;
     if (own != nullptr) return *own;
-    // What the program's own conversion of its binary files writes has the return number always.
+    // The program's own conversion of its binary files always includes the return number.
     const bool with_number = layout.tagged() || layout.firmware_type > 1 ||
                              (source_format(header) == kOpenpylivoxBinName && !layout.imu);
     return *std::find_if(kVariants.begin(), kVariants.end(), [&](const Variant& v) {
@@ -209,7 +209,7 @@ class OpenpylivoxCsvWriter final : public Writer {
     }
   }
 
-  /// @return false for a point closer than the format's step, which it would show as no return
+  /// @return false for a point closer than the format's step, which would appear as no return
   bool write_point(const Observations& rows, std::size_t i) {
     if (variant_.cartesian) {
       const auto point = cartesian_point(rows, i);

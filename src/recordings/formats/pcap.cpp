@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Captures of what sensors sent. Packets do not name their sensor: whoever sends them is one, told
-// apart by address and port, and behind a hub by slot and number. Broadcasts and replies in the
-// capture name serial number, type and firmware. Packets are put into their order, and what is
-// missing is counted, as while recording from the network.
+// Captures of what sensors sent. Packets do not name their sensor: each sender counts as one,
+// identified by address and port, and behind a hub by slot and number. Broadcasts and replies in
+// the capture name serial number, type and firmware. Packets are put in order, and missing ones are
+// counted, as while recording from the network.
 //
-// Sensors of the second generation are told apart by their address alone, as points and inertial
-// samples come from ports of their own. Their packets have numbers, by which they are ordered and
-// counted. Replies to searches and pushes name serial number, type, firmware and field of view.
+// Sensors of the second generation are identified only by their address, because points and
+// inertial samples come from different ports. Their packets have numbers, by which they are ordered
+// and counted. Replies to searches and pushes name serial number, type, firmware and field of view.
 #include <algorithm>
 #include <array>
 #include <deque>
@@ -45,8 +45,8 @@ constexpr std::size_t kMostPending = 4096;         // packets of a frame
 constexpr std::uint8_t kHub = 0;                   // Broadcast::device_type
 constexpr std::uint8_t kDataTypes = 9;
 
-/// Who sent a packet: address, port, and slot and number behind a hub. Of sensors of the second
-/// generation the address, and port 0.
+/// The sender of a packet: address, port, and slot and number behind a hub. Of sensors of the
+/// second generation the address, and port 0.
 using Sender = std::tuple<wire::Address, std::uint16_t, std::uint8_t, std::uint8_t>;
 
 bool is_numbered(Bytes bytes) { return !bytes.empty() && bytes[kVersionAt] == kNumberedVersion; }
@@ -56,8 +56,8 @@ Sender sender_of(const CapturedDatagram& datagram) {
   return {datagram.from.address, datagram.from.port, datagram.bytes[1], datagram.bytes[2]};
 }
 
-/// The layout of a datagram that may be a packet of the second generation, also one whose end was
-/// not captured.
+/// The layout of a datagram that may be a packet of the second generation, even if its end was not
+/// captured.
 std::optional<RecordLayout> numbered_layout_of(const CapturedDatagram& datagram) {
   const Bytes bytes = datagram.bytes;
   constexpr std::size_t kLengthFrom = 1, kRecordsFrom = 5, kTypeFrom = 10;
@@ -71,7 +71,7 @@ std::optional<RecordLayout> numbered_layout_of(const CapturedDatagram& datagram)
   return fits ? layout : std::nullopt;
 }
 
-/// The layout of a datagram that may be a packet, also one whose end was not captured; empty for
+/// The layout of a datagram that may be a packet, even if its end was not captured; empty for
 /// others.
 std::optional<RecordLayout> layout_of(const CapturedDatagram& datagram) {
   const Bytes bytes = datagram.bytes;
@@ -85,13 +85,13 @@ std::optional<RecordLayout> layout_of(const CapturedDatagram& datagram) {
   return std::nullopt;
 }
 
-/// Rows of a whole packet of the second generation.
+/// Rows of a complete packet of the second generation.
 std::size_t numbered_rows(Bytes packet) {
   const NumberedHeader header = decode_numbered_header(packet);
   return numbered_layout(header.data_type, header.records)->rows();
 }
 
-/// What a sensor says of itself; behind one address there may be several.
+/// Identity reported by a sensor; several may share one address.
 struct Named {
   std::optional<wire::Broadcast> broadcast;
   std::string firmware;
@@ -102,7 +102,7 @@ struct Named {
   std::uint8_t views_used = 0;  ///< bits 0 and 1
 };
 
-/// What a datagram says, if it says that. @tparam Whole  wire::Message or wire::Reply
+/// The identity in a datagram, if it contains one. @tparam Whole wire::Message or wire::Reply
 template <class What, class Whole, class Decode>
 std::optional<What> said_in(const CapturedDatagram& datagram, const Decode& decode) {
   const auto decoded = wire::decode_frame(datagram.bytes);
@@ -119,7 +119,7 @@ std::optional<wire::Broadcast> broadcast_of(const CapturedDatagram& datagram) {
   return said_in<wire::Broadcast, wire::Message>(datagram, wire::decode_message);
 }
 
-/// Takes what a frame of the second generation's control protocol says of its sensor.
+/// Reads the identity of a sensor from a frame of the second generation's control protocol.
 void take_control_frame(const wire::ControlFrame& frame, Named& named) {
   if (const auto reply = wire::search_reply_of(frame)) {
     named.type = reply->device_type;
@@ -139,7 +139,7 @@ void take_control_frame(const wire::ControlFrame& frame, Named& named) {
   }
 }
 
-/// The directions that a sensor was set to measure in, in words; empty where nothing limits them.
+/// The configured field of view of a sensor, in words; empty if nothing limits it.
 std::string view_words(const Named& named) {
   std::string words;
   for (std::size_t i = 0; i < named.views.size(); ++i) {
@@ -152,7 +152,7 @@ std::string view_words(const Named& named) {
   return words;
 }
 
-/// Reads captures. The first look at the file finds its sensors.
+/// Reads captures. The first pass over the file finds its sensors.
 class PcapReader final : public Reader {
  public:
   PcapReader(const io::InputFile& file, const Progress& progress);
@@ -161,7 +161,7 @@ class PcapReader final : public Reader {
   double fraction_read() const override { return file_.fraction_read(); }
 
  private:
-  /// A sensor while the file is looked through.
+  /// A sensor during the first pass.
   struct Seen {
     explicit Seen(Sender whose) : sender(std::move(whose)) {}
 
@@ -245,7 +245,7 @@ void PcapReader::look_through(const Progress& progress) {
       if (layout_of(*datagram)) {
         look_at_packet(*datagram, chunk);
       } else if (const auto* frame = std::get_if<wire::ControlFrame>(&control)) {
-        // What a host sets is told by the sensor that replies or pushes.
+        // The sensor's replies and pushes repeat a host's settings.
         if (known && frame->from_sensor) {
           take_control_frame(*frame, named_[datagram->from.address]);
         }
@@ -260,7 +260,7 @@ void PcapReader::look_through(const Progress& progress) {
         named_[datagram->from.address].firmware = wire::firmware_text(info->firmware);
       }
     }
-  } catch (const FileError& error) {  // who reads comes to it again
+  } catch (const FileError& error) {  // reading meets it again
     damage.emplace(error);
   }
   for (const Seen& seen : seen_) {
@@ -454,7 +454,7 @@ void PcapReader::take(const CapturedDatagram& datagram) {
       ++pending_;
     }
   } else if (broadcast_of(datagram)) {
-    // A sensor that broadcasts has no host: what it sends later is another session.
+    // A sensor that broadcasts has no host: its later packets are another session.
     for (std::size_t row = 0; row < live_.size(); ++row) {
       if (endpoints_[row].address == datagram.from.address) live_[row].order->flush();
     }
@@ -491,16 +491,15 @@ void PcapReader::say_what_is_missing() {
     }
     if (counts.duplicates > 0) {
       warn(kWarning.content_left_out,
-           "{}: {} packets were captured twice; the second ones were left out", name_of(row),
+           "{}: {} packets were captured twice; the second ones were ignored", name_of(row),
            counts.duplicates);
     }
     if (counts.wrong_checksums > 0) {
-      warn(kWarning.implausible_values,
-           "{}: {} packets have another checksum than their bytes; they were kept", name_of(row),
-           counts.wrong_checksums);
+      warn(kWarning.implausible_values, "{}: {} packets have wrong checksums; they were kept",
+           name_of(row), counts.wrong_checksums);
     }
     if (counts.rejected > 0) {
-      warn(kWarning.content_left_out, "{}: {} packets that no sensor sends were left out",
+      warn(kWarning.content_left_out, "{}: {} packets that no sensor sends were ignored",
            name_of(row), counts.rejected);
     }
   }
@@ -512,12 +511,12 @@ void PcapReader::say_what_is_missing() {
         .lost_records = cut_rows_;
   }
   if (file_.fragments() > 0) {
-    warn(kWarning.content_left_out, "{} fragments of datagrams were left out; sensors send none",
+    warn(kWarning.content_left_out, "{} fragments of datagrams were ignored; sensors send none",
          file_.fragments());
   }
   if (strangers_ > 0) {
     warn(kWarning.content_left_out,
-         "{} packets were left out: of more than {} senders, or with impossible times", strangers_,
+         "{} packets were ignored: of more than {} senders, or with impossible times", strangers_,
          kMostSenders);
   }
 }
@@ -543,7 +542,7 @@ bool PcapReader::read(Chunk& chunk, std::size_t max_rows) {
     Live& live = live_[next.device];
     const std::size_t rows =
         live.numbered ? numbered_rows(next.bytes) : record_layout(next.bytes[kDataTypeAt])->rows();
-    // Packets stay whole; one alone is delivered however small the chunk is to be.
+    // Packets stay complete; a single one is delivered however small the chunk should be.
     if (!chunk.packets.empty() &&
         (chunk.observations.size() + rows > max_rows || chunk.packets.size() >= max_rows)) {
       return true;
@@ -558,7 +557,7 @@ bool PcapReader::read(Chunk& chunk, std::size_t max_rows) {
       } else {
         decoder.decode(next.bytes, chunk);
       }
-    } catch (const BadPacket&) {  // a clock whose seconds do not fit 64 bits any more
+    } catch (const BadPacket&) {  // a clock whose seconds no longer fit 64 bits
       ++strangers_;
       ready_.pop_front();
       continue;
@@ -580,7 +579,7 @@ bool PcapReader::read(Chunk& chunk, std::size_t max_rows) {
 const Format kPcapFormat = {
     "pcap",
     "",
-    "capture of a network, pcap or pcapng: packets of Livox sensors (read only)",
+    "network capture, pcap or pcapng: packets of Livox sensors (read only)",
     is_capture,
     [](const io::InputFile& file, const Progress& progress) -> std::unique_ptr<Reader> {
       return std::make_unique<PcapReader>(file, progress);

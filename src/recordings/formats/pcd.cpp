@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Point Cloud Data of the Point Cloud Library, versions 0.5 to 0.7, as text, as bytes and packed.
-// Packed points lie column by column; each column is unpacked on its own, so that memory does not
-// grow with their number.
+// Packed points are stored column by column; each column is unpacked separately, so that memory
+// does not grow with their number.
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -38,7 +38,7 @@ struct PcdHeader {
   std::vector<Warning> warnings;
 };
 
-/// Gives each field its value of one line of the header.
+/// Gives each field its value from one line of the header.
 template <class Take>
 void per_field(const HeaderLines& lines, PcdHeader& header,
                const std::vector<std::string_view>& words, const Take& take) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Polygon files: the vertices are shots in their order; faces and other elements are stepped over,
-// and so are lists among the properties of vertices.
+// Polygon files: the vertices are shots in order; faces and other elements are skipped, and so are
+// lists among the properties of vertices.
 #include <algorithm>
 #include <array>
 #include <memory>
@@ -132,7 +132,7 @@ PlyHeader read_ply_header(const io::InputFile& file) {
   return header;
 }
 
-/// The name of a column that no reader takes for a quantity.
+/// A column name that no reader interprets.
 std::string name_of_list(const std::string& name) { return fmt::format("list {}", name); }
 
 NamedTextLayout text_layout(const PlyHeader& header) {
@@ -146,13 +146,13 @@ NamedTextLayout text_layout(const PlyHeader& header) {
   layout.rows = vertices.count;
   layout.first_row_line = header.data_line;
   for (auto element = header.elements.begin(); element + 1 != header.elements.end(); ++element) {
-    // Lines are counted up to the end of the file only.
+    // Lines are counted only up to the end of the file.
     layout.first_row_line += std::min(element->count, UINT64_MAX - layout.first_row_line);
   }
   return layout;
 }
 
-/// Where an element ends that begins at an offset. @throws FileError when the file ends before
+/// End of an element that begins at an offset. @throws FileError when the file ends before
 std::uint64_t end_of(const PlyElement& element, std::uint64_t offset, io::BlockInput& file) {
   const auto require = [&](std::uint64_t count, std::uint64_t bytes) {
     if (bytes == 0 || count <= (file.size() - offset) / bytes) return count * bytes;
@@ -230,7 +230,7 @@ class WithoutLists final : public ByteSource {
       problem_ = fmt::format("found a list of {} numbers", length.value);
       return false;
     }
-    // More than any file has ends with it, too.
+    // More than any file has also ends with it.
     const double bytes = length.value * static_cast<double>(property.type.bytes);
     const auto wanted = static_cast<std::uint64_t>(std::min(bytes, 0x1p62));
     return all_->skip(wanted) == wanted;

@@ -8,18 +8,18 @@
 namespace risley::recordings {
 namespace {
 
-/// One in so many numbers that are rounded to a step is a multiple of the next coarser one.
+/// One in this many numbers rounded to a step is a multiple of the next coarser one.
 constexpr double kChanceOfCoarser = 0.1;
 constexpr double kLeastChance = 1e-9;
 constexpr int kFinestDecimals = 6;
-/// How exactly arithmetic and the type itself keep a decimal fraction, relative.
+/// Relative accuracy of a decimal fraction in arithmetic and in the type itself.
 constexpr double kFloat32Precision = 0x1p-22, kFloat64Precision = 0x1p-50;
-/// So many changing integers that all are multiples of a coarser step are so on purpose.
+/// If this many changing integers are all multiples of a coarser step, it is not a coincidence.
 constexpr std::size_t kChangesForStep = 16;
 
 bool are_multiples(std::span<const std::vector<Decimal>* const> columns, double per_unit,
                    double precision) {
-  double log_chance = 0.0;  // that they are so by accident
+  double log_chance = 0.0;  // probability of a coincidence
   for (const auto* const column : columns) {
     for (const Decimal& cell : *column) {
       if (!std::isfinite(cell.value) || cell.value == 0.0) continue;
@@ -46,7 +46,7 @@ Rounding rounding_of(std::span<const std::vector<Decimal>* const> columns, CellT
       for (const Decimal& cell : *column) rounding.notice(cell);
     }
   }
-  // Numbers that once were float32 are known by being as inexact as these.
+  // Numbers that once were float32 are recognised by the same inaccuracy.
   for (const double precision : {kFloat64Precision, kFloat32Precision}) {
     if (type == CellType::float32 && precision == kFloat64Precision) continue;
     for (int decimals = 0; decimals <= kFinestDecimals; ++decimals) {

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Livox point-cloud sequences: the directions of a sensor's shots, without ranges. A sequence has
-// one row per shot, so that of several returns of a shot only the first with a sound direction is
-// written, ranges are dropped, and rows without a valid direction are left out.
+// one row per shot, so only the first of several returns with a valid direction is written, ranges
+// are dropped, and rows without a valid direction are skipped.
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -24,7 +24,7 @@ constexpr int kDefaultDecimals = 5;
 constexpr int kMostDecimals = 17;
 constexpr std::size_t kSequenceRowsLookedAt = 16384;
 
-/// Details of the header: how the numbers were written.
+/// Details of the header: format of the numbers.
 constexpr const char* kTimeDecimalsNote = "time_decimals";
 constexpr const char* kAzimuthDecimals = "azimuth_decimals";
 constexpr const char* kZenithDecimals = "zenith_decimals";
@@ -120,7 +120,7 @@ class ScanSequenceReader final : public TextTableReader {
     rows.valid[i] = 1;
   }
 
-  /// Trailing zeros may be missing, so that the longest number seen tells the step.
+  /// Trailing zeros may be missing, so the longest number seen gives the step.
   struct Resolution {
     int decimals = -1;
     float value = 0.0F;

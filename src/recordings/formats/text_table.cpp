@@ -117,7 +117,7 @@ bool TextTableReader::read(Chunk& chunk, std::size_t max_rows) {
           !(all_fields && decimals > 0 && decimals == last_field_decimals_)) {
         Warning& warning =
             warn(kWarning.cut_off,
-                 "the last line has no line end and may be cut off (\"{}\"); it was left out",
+                 "the last line has no line end and may be cut off (\"{}\"); it was ignored",
                  printable(line));
         warning.place.line = lines_.line_number();
         warning.lost_records = rows_left_.value_or(1);

@@ -39,11 +39,11 @@ using io::trimmed;
 
 /// Reads a table of rows, one per line, below one or more header lines. A byte order mark, CR LF,
 /// blanks around fields and empty lines at the end are accepted. A last line without line end
-/// counts only when it is certainly whole: it has all fields, and the last one is a decimal
+/// counts only if it is certainly complete: it has all fields, and the last one is a decimal
 /// fraction with as many decimals as that of the line before; otherwise it is dropped with a
-/// warning. Any other line that is not a sound row is damage: the rows before it are returned, then
-/// FileError is thrown. Where the header tells the number of rows, fewer are damage, and so are
-/// more unless the format has other things behind them, which are not read.
+/// warning. Any other invalid line is damage: the rows before it are returned, then FileError is
+/// thrown. If the header states the number of rows, fewer are damage, and so are more unless the
+/// format allows other data after them, which are not read.
 class TextTableReader : public Reader {
  public:
   bool read(Chunk& chunk, std::size_t max_rows) final;
@@ -56,22 +56,22 @@ class TextTableReader : public Reader {
   TextTableReader(const io::InputFile& file, std::string format);
 
   const std::string& table_header() const { return table_header_; }  ///< normalised
-  /// How a row is built; to be called once by the constructor of the derived class.
-  /// @param lists  columns of any number of fields, which their first field states; empty without
+  /// Construction of a row; to be called once by the constructor of the derived class.
+  /// @param lists  columns of any number of fields, stated in their first field; empty without
   void set_column_count(std::size_t columns, char delimiter = ',', std::vector<bool> lists = {}) {
     fields_.resize(columns);
     delimiter_ = delimiter;
     const bool any = std::find(lists.begin(), lists.end(), true) != lists.end();
     if (any) lists_ = std::move(lists);
   }
-  /// Steps over lines, so that the rows begin at this one (from 1).
+  /// Skips lines, so that the rows begin at this one (from 1).
   void begin_rows_at(std::uint64_t line);
-  /// @param stated_in  line that states them where they are all that follows, otherwise 0
+  /// @param stated_in  line that states them if nothing else follows, otherwise 0
   void set_row_count(std::uint64_t rows, std::uint64_t stated_in) {
     rows_left_ = rows;
     all_stated_in_ = stated_in;
   }
-  /// @throws FileError at line 1: what was expected there
+  /// @throws FileError at line 1: the expected contents
   [[noreturn]] void refuse_header(const std::string& expected) const;
 
   std::uint64_t line_number() const { return lines_.line_number(); }
@@ -79,8 +79,8 @@ class TextTableReader : public Reader {
   /// Adds the observations of one row. Must not change the chunk when it throws BadRow.
   virtual void append_row(Fields fields, Chunk& chunk) = 0;
 
-  /// Shows the sound rows among the first max_rows to a function, until that returns false or
-  /// throws BadRow: how a reader learns what the header must tell before the first row is read.
+  /// Passes the valid rows among the first max_rows to a function, until that returns false or
+  /// throws BadRow: the reader's source for the header before the first row is read.
   template <class Function>
   void look_ahead(std::size_t max_rows, Function&& function) const;
 
@@ -93,7 +93,7 @@ class TextTableReader : public Reader {
 
   char delimiter_ = ',';
   std::vector<bool> lists_;
-  std::optional<std::uint64_t> rows_left_;  ///< where the header tells the number of rows
+  std::optional<std::uint64_t> rows_left_;  ///< if the header states the number of rows
   std::uint64_t all_stated_in_ = 0, header_lines_ = 1;
   LineReader lines_;
   std::string table_header_;
@@ -122,13 +122,13 @@ void TextTableReader::look_ahead(std::size_t max_rows, Function&& function) cons
   }
 }
 
-/// Adds one row to all columns and sets those a text format rarely knows: intensity and tag 0,
+/// Adds one row to all columns and sets those that text formats rarely have: intensity and tag 0,
 /// first return, first beam, first device.
 std::size_t append_observation(Observations& rows, std::int64_t time_ns);
 
-/// How a text format writes times: with the decimals it usually has where they are exact, and
-/// with 9 (whole nanoseconds) where they are not. The first chunk decides for the whole file;
-/// only a later time that does not fit is written with 9 decimals on its own.
+/// Time format of a text format: its usual number of decimals if these are exact, and 9 (whole
+/// nanoseconds) if not. The first chunk decides for the whole file; only a later time that does not
+/// fit is written with 9 decimals individually.
 class TimeColumn {
  public:
   explicit TimeColumn(int decimals) : decimals_(decimals) {}

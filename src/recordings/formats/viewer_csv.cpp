@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
 // Tables that Livox Viewer exports: one point per row, each with the header of its packet. All
-// points of a packet carry the packet's time, so that a point's own time follows from its place
+// points of a packet have the packet's time, so that a point's own time follows from its place
 // among the rows of equal time.
 #include <algorithm>
 #include <array>
@@ -29,7 +29,7 @@ namespace {
 using io::store;
 
 constexpr std::string_view kViewerCsv = "livox-viewer-csv";
-constexpr std::string_view kViewerHeader =  // without blanks, as normalized_header() gives it
+constexpr std::string_view kViewerHeader =  // without blanks, as returned by normalized_header()
     "Version,SlotID,LiDARIndex,Rsvd,ErrorCode,TimestampType,DataType,Timestamp,X,Y,Z,Reflectivity,"
     "Tag,Ori_x,Ori_y,Ori_z,Ori_radius,Ori_theta,Ori_phi";
 constexpr std::size_t kColumnCount = 19;
@@ -100,7 +100,7 @@ Row parse(std::span<const std::string_view> fields) {
   return row;
 }
 
-/// Where the reader stands in the packets of one sensor.
+/// Position of the reader in the packets of one sensor.
 struct Sensor {
   int slot = 0, lidar = 0;
   ShotGrid grid = kGrid100kHz;
@@ -122,7 +122,7 @@ class ViewerCsvReader final : public TextTableReader {
   }
 
  private:
-  /// Finds the sensors and, from the time between packets, what kind they are.
+  /// Finds the sensors and, from the time between packets, their type.
   void learn_sensors() {
     struct Seen {
       int slot, lidar;
@@ -145,7 +145,7 @@ class ViewerCsvReader final : public TextTableReader {
       });
       if (found == seen.end()) {
         if (seen.size() == kMostSensors)
-          return false;  // read() refuses the next when it gets there
+          return false;  // read() rejects the next one when it gets there
         seen.push_back({row.slot, row.lidar, row.data_type, row.timestamp_ns, INT64_MAX});
       } else if (row.timestamp_ns > found->timestamp_ns) {
         found->shortest_period_ns =
@@ -175,7 +175,7 @@ class ViewerCsvReader final : public TextTableReader {
     Sensor sensor;
     sensor.slot = slot;
     sensor.lidar = lidar;
-    // What is no Mid-40 or Mid-70 fires at 240 kHz.
+    // All but the Mid-40 and Mid-70 fire at 240 kHz.
     sensor.grid = shot_grid(type, data_type).value_or(kGrid240kHz);
     sensors_.push_back(sensor);
     Device entry;
@@ -208,7 +208,7 @@ class ViewerCsvReader final : public TextTableReader {
            sensor.rows_expected - sensor.rows});
     }
     Packet packet;
-    // The table has nanoseconds also where the packet had a date.
+    // The table has nanoseconds even if the packet had a date.
     packet.timestamp_type =
         row.timestamp_type == kGpsTimestamp ? kPtpTimestamp : row.timestamp_type;
     store<std::uint64_t>(packet.timestamp.data(), static_cast<std::uint64_t>(row.timestamp_ns));

@@ -28,7 +28,7 @@ constexpr std::size_t kEndBytes = 22, kEnd64LocatorBytes = 20, kEnd64Bytes = 56,
 constexpr std::size_t kLongestComment = 65535;
 constexpr std::uint64_t kMostMembers = 1000;
 constexpr std::uint16_t kStored = 0, kDeflated = 8, kEncryptedFlag = 1, kZip64Field = 1;
-/// No deflated bytes become more than 1032 times as many.
+/// Deflate expands by a factor of at most 1032.
 constexpr std::uint64_t kMostExpansion = 1040;
 
 class ZipDirectory {
@@ -94,7 +94,7 @@ class ZipDirectory {
     offset = load<std::uint64_t>(record + 48);
   }
 
-  /// Reads one entry and goes to the next; folders are none.
+  /// Reads one entry and moves to the next; folders are skipped.
   std::optional<ZipMember> read_entry(std::uint64_t& offset) {
     const std::uint64_t place = offset;
     const std::uint8_t* entry = bytes_at(place, kEntryBytes, "the zip directory");
@@ -140,13 +140,13 @@ class ZipDirectory {
     if (stored ? member.bytes != member.packed_bytes
                : member.bytes / kMostExpansion > member.packed_bytes) {
       fail(place,
-           fmt::format("member {} is said to have {} bytes, more than {} compressed bytes can hold",
+           fmt::format("member {} claims to have {} bytes, more than {} compressed bytes can hold",
                        name, member.bytes, member.packed_bytes));
     }
     return member;
   }
 
-  /// Sizes and places beyond 32 bits stand in an extra field, those that are needed.
+  /// Sizes and offsets beyond 32 bits are in an extra field, as far as needed.
   static void read_zip64(std::span<const std::uint8_t> extra, ZipMember& member,
                          std::uint64_t& local) {
     constexpr std::size_t kFieldHeader = 4;
@@ -169,7 +169,7 @@ class ZipDirectory {
   io::BlockInput file_;
 };
 
-/// The bytes of a member, and at their end the test of the checksum.
+/// The bytes of a member, and at their end the check of the checksum.
 class MemberSource final : public ByteSource {
  public:
   MemberSource(const io::InputFile& file, const ZipMember& member)

@@ -22,10 +22,10 @@ struct ZipMember {
 
 /// Lists the members, also of files beyond 4 GiB.
 /// @throws FileError when the directory is damaged, or a member is encrypted, packed by another
-///         method, outside of the file, or larger than its packed bytes can be
+/// method, outside of the file, or larger than its packed bytes allow
 std::vector<ZipMember> zip_members(const io::InputFile& file);
 
-/// Opens a member at an offset. Its checksum is tested when all of it was read.
+/// Opens a member at an offset. Its checksum is verified when all of it was read.
 std::unique_ptr<ByteSource> open_member(const io::InputFile& file, const ZipMember& member,
                                         std::uint64_t offset = 0);
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::int64_t kWatchedSecond = 1'000'000'000;  // ns
 
-/// A field of a status: its place, and what its values say; empty for what is as it should be.
+/// A field of a status: its place, and the meaning of its values; empty for normal ones.
 struct StatusField {
   unsigned at, mask;
   std::array<const char*, 5> words;
@@ -99,7 +99,7 @@ void ClockWatch::add(std::uint8_t timestamp_type, std::uint32_t status, std::int
   }
 }
 
-/// The best packet of the second counts.
+/// The best packet of the second is used.
 void ClockWatch::end_second() {
   if (stretches_.empty()) return;
   ClockStretch& stretch = stretches_.back();

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/recordings/livox/numbered_order.hpp"
 
-#include <cstdlib>
+#include <cmath>
 #include <utility>
 
 #include "risley/core/saturating.hpp"
@@ -11,7 +11,7 @@
 namespace risley::recordings::livox {
 namespace {
 
-constexpr std::size_t kChecked = 28;  // bytes in front of what the checksum is of
+constexpr std::size_t kChecked = 28;  // bytes before those covered by the checksum
 
 }  // namespace
 
@@ -20,13 +20,13 @@ bool NumberedOrder::add(std::span<const std::uint8_t> packet, std::int64_t host_
   NumberedHeader header;
   try {
     header = decode_numbered_header(packet);
-    decode_numbered_packet(packet, kMid360, 0, chunk_);  // which sensor it is changes no check
+    decode_numbered_packet(packet, kMid360, 0, chunk_);  // the sensor does not affect the checks
   } catch (const BadPacket&) {
     ++counts_.rejected;
     return false;
   }
   if (!first_host_ns_) first_host_ns_ = host_ns;
-  if (chunk_.packets.empty()) return true;  // no records: nothing that could be lost
+  if (chunk_.packets.empty()) return true;  // no records: nothing to lose
   if (header.checksum != 0 && header.checksum != packet_checksum(packet.subspan(kChecked))) {
     ++counts_.wrong_checksums;
   }
@@ -57,17 +57,19 @@ bool NumberedOrder::add(std::span<const std::uint8_t> packet, std::int64_t host_
   return true;
 }
 
-/// Counts what is missing before a packet, and sees where the clock does not fit the numbers.
+/// Counts packets missing before one, and detects a clock that does not fit the numbers.
 void NumberedOrder::compare(Track& track, const Held& packet, std::int64_t index) {
-  constexpr std::int64_t kSurelyNotIn = 10'000'000;  // ns, by which times may be off the period
-  constexpr std::int64_t kLeastSure = 1000;          // of a gap's length
+  constexpr double kSurelyNotIn = 10'000'000;  // ns, tolerance of times about the period
+  constexpr double kLeastSure = 1000;          // of a gap's length
   const std::int64_t steps = index - *track.last_index;
   const std::int64_t passed = saturating_difference(packet.time_ns, track.last_ns);
   PacketGap gap{track.last_ns,   packet.time_ns, track.last_host_ns, packet.host_ns, {},
                 packet.rows == 0};
   const bool same_clock = !track.restarted && packet.time_type == track.last_time_type;
-  const bool in_time = track.period_ns == 0 || std::abs(passed - steps * track.period_ns) <
-                                                   kSurelyNotIn + std::abs(passed) / kLeastSure;
+  const auto length = static_cast<double>(passed);
+  const double off = length - static_cast<double>(steps) * static_cast<double>(track.period_ns);
+  const bool in_time =
+      track.period_ns == 0 || std::abs(off) < kSurelyNotIn + std::abs(length) / kLeastSure;
   if (!track.restarted) {
     gap.lost = static_cast<std::uint64_t>(steps - 1);
     counts_.lost += *gap.lost;
@@ -88,7 +90,7 @@ void NumberedOrder::compare(Track& track, const Held& packet, std::int64_t index
   if (notable) note_gap(gap);
 }
 
-/// Gives out the first packet of those that wait.
+/// Returns the first of the waiting packets.
 void NumberedOrder::give_out(Track& track) {
   const auto first = track.held.begin();
   Held& packet = first->second;

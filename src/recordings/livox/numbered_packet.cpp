@@ -30,7 +30,7 @@ constexpr std::size_t kPacketLengthAt = 1, kIntervalAt = 3, kRecordsAt = 5, kNum
                       kChecksumAt = 24, kTimeAt = 28;
 constexpr std::uint16_t kShortBytes = 8;
 constexpr std::int64_t kIntervalUnit_ns = 100;
-/// A packet's last shot is later than its first: room for it is left.
+/// A packet's last shot is later than its first: room for it is reserved.
 constexpr auto kLatestNumbered =
     static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max() - 3'600'000'000'000);
 
@@ -262,7 +262,7 @@ void encode_numbered_record(std::uint8_t data_type, const Observations& observat
 
 std::string tag_words(std::uint8_t device_type, std::uint8_t tag) {
   if (tag == 0) return "a good point";
-  // Manuals and firmwares of the HAP differ in what else they say.
+  // Manuals and firmwares of the HAP differ in the other bits.
   if (device_type == kHap || device_type == kHapT1) return "perhaps no good point";
   struct Field {
     unsigned at;
@@ -284,10 +284,10 @@ PacketNumbers::Place PacketNumbers::advance(const Packet& packet, std::int64_t s
                                             std::uint64_t lost) {
   constexpr auto kMost = static_cast<std::int64_t>(kRemembered);
   for (std::int64_t i = 1; i <= std::min(steps, kMost); ++i) {
-    came_.reset(static_cast<std::size_t>(index_ + i) % kRemembered);
+    times_ns_[static_cast<std::size_t>(saturating_sum(index_, i)) % kRemembered] = kNever;
   }
-  index_ += steps;
-  came_.set(static_cast<std::size_t>(index_) % kRemembered);
+  index_ = saturating_sum(index_, steps);
+  times_ns_[static_cast<std::size_t>(index_) % kRemembered] = numbered_time_ns(packet);
   last_ = packet;
   return {kind, index_, lost};
 }
@@ -298,12 +298,10 @@ PacketNumbers::Place PacketNumbers::add(const Packet& packet, bool paused) {
   const std::int64_t passed =
       saturating_difference(numbered_time_ns(packet), numbered_time_ns(*last_));
   const bool same_clock = packet.timestamp_type == last_->timestamp_type;
-  if (same_clock && passed < (paused ? 0 : -kFarBack)) {
-    came_.reset();
-    // Room for those that this one has overtaken.
-    return advance(packet, kRemembered, Kind::restarted, 0);
-  }
-  // Numbers that begin anew with every frame.
+  // With room for those that this one has overtaken.
+  const auto restart = [&] { return advance(packet, kRemembered, Kind::restarted, 0); };
+  if (same_clock && passed < (paused ? 0 : -kFarBack)) return restart();
+  // Numbers that restart with every frame.
   if (packet.reserved != last_->reserved && packet.number < last_->number) {
     return advance(packet, std::int64_t{packet.number} + 1, Kind::next, packet.number);
   }
@@ -311,20 +309,26 @@ PacketNumbers::Place PacketNumbers::add(const Packet& packet, bool paused) {
   if (same_clock && ahead == 1 && passed > 0 && (period_ns_ == 0 || passed < period_ns_)) {
     period_ns_ = passed;
   }
-  // Of the numbers that it can be, the one nearest to what the times say.
+  // Of the possible numbers, the one nearest to the times, unless a clock was set.
+  constexpr double kLongestGap = 1e12;  // packets, 15 years
   const double by_time = same_clock && period_ns_ > 0
                              ? static_cast<double>(passed) / static_cast<double>(period_ns_)
                              : 0.0;
-  std::int64_t steps =
-      ahead + kRound * std::llround((by_time - static_cast<double>(ahead)) / kRound);
+  std::int64_t steps = ahead;
+  if (by_time < kLongestGap) {
+    steps += kRound * std::llround((by_time - static_cast<double>(ahead)) / kRound);
+  }
   if (steps == 0 && passed != 0) steps = 1;  // a writer that numbers no packets
   if (steps > 0) return advance(packet, steps, Kind::next, static_cast<std::uint64_t>(steps - 1));
   const std::int64_t index = index_ + steps;
   const bool known = -steps < static_cast<std::int64_t>(kRemembered);
   const std::size_t place =
       static_cast<std::size_t>(std::max<std::int64_t>(index, 0)) % kRemembered;
-  if (known && index > 0 && came_.test(place)) return {Kind::duplicate, index, 0};
-  if (known && index > 0) came_.set(place);
+  if (!known || index <= 0) return {Kind::late, index, 0};
+  const std::int64_t time_ns = numbered_time_ns(packet);
+  if (times_ns_[place] == time_ns) return {Kind::duplicate, index, 0};
+  if (times_ns_[place] != kNever) return restart();  // it gives a number again
+  times_ns_[place] = time_ns;
   return {Kind::late, index, 0};
 }
 

@@ -29,7 +29,7 @@ constexpr std::array<RecordLayout, 9> kLayouts{{
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kHour = 3600 * kSecond;
-/// A packet's last shot is later than its first: room for it is left.
+/// A packet's last shot is later than its first: room for it is reserved.
 constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() - kHour;
 
 }  // namespace
@@ -101,8 +101,8 @@ std::optional<std::int64_t> PacketClock::time_ns(const Packet& packet) {
 }
 
 std::optional<std::int64_t> PacketClock::pps_time(std::int64_t since_edge_ns) {
-  // Packets may overtake each other on the network by a few ms; everything longer is an edge,
-  // also when the packets just after it were lost.
+  // Packets may overtake each other on the network by a few ms; any longer step is an edge, even if
+  // the packets just after it were lost.
   constexpr std::int64_t kDisorder = 10'000'000, kAfterEdge = 1'000'000;
   const std::int64_t back = last_since_edge_ns_ - since_edge_ns;
   std::int64_t second_ns = second_ns_;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -47,7 +48,7 @@ std::optional<std::size_t> decode_spherical_records(const RecordLayout& layout,
   return sound < a.records ? std::optional(sound) : std::nullopt;
 }
 
-/// Records of three whole numbers, an intensity and perhaps a tag.
+/// Records of three integers, an intensity and possibly a tag.
 /// @param step  of the numbers, m
 template <class Number, bool kTagged>
 void decode_cartesian(std::size_t points, const std::uint8_t* bytes, double step, Observations& o,
@@ -70,7 +71,7 @@ void decode_cartesian(std::size_t points, const std::uint8_t* bytes, double step
 }
 
 /// As data type 0, but in metres.
-/// @return number of the first record that is no point
+/// @return number of the first record that is not a point
 std::optional<std::size_t> decode_float_points(std::size_t points, const std::uint8_t* bytes,
                                                Observations& o, std::size_t row) {
   for (std::size_t point = 0; point < points; ++point, ++row, bytes += 13) {
@@ -113,7 +114,7 @@ void require_bytes(std::size_t found, std::size_t expected, const char* what) {
                   fmt::format("expected {} bytes of {}, found {}", expected, what, found));
 }
 
-/// Rows of one shot follow each other, whether one record holds them or several.
+/// Rows of one shot are consecutive, whether one record holds them or several.
 void set_shots(const RecordLayout& layout, std::int64_t time_ns, const ShotGrid& grid,
                std::uint8_t device, Observations& o, std::size_t first_row) {
   const auto at = [first_row](auto& column) {
@@ -130,10 +131,12 @@ void set_shots(const RecordLayout& layout, std::int64_t time_ns, const ShotGrid&
         o.time_ns[row] = shot_time;
         shot_time += step;
       }
+      // The first period by counting, then copies of the existing part, doubling each time.
       std::uint8_t* const beams = o.beam.data() + first_row;
-      std::fill_n(beams, layout.rows(), std::uint8_t{0});
-      for (std::uint8_t beam = 1; beam < grid.beams; ++beam) {  // without a division for each row
-        for (std::size_t row = beam; row < layout.rows(); row += grid.beams) beams[row] = beam;
+      std::size_t known = std::min<std::size_t>(grid.beams, layout.rows());
+      std::iota(beams, beams + known, std::uint8_t{0});
+      for (; known < layout.rows(); known *= 2) {
+        std::copy_n(beams, std::min(known, layout.rows() - known), beams + known);
       }
       std::fill_n(at(o.return_number), layout.rows(), std::uint8_t{1});
       return;
@@ -165,7 +168,7 @@ std::optional<std::size_t> decode_points(const RecordLayout& layout, const std::
   return decode_spherical_records(layout, bytes, o, first_row);
 }
 
-/// Gives columns room for more rows while a function fills them; takes it back where that throws.
+/// Gives columns room for more rows while a function fills them; reverts it if that throws.
 template <class Function>
 void with_more_rows(Observations& rows, std::size_t more, Function&& fill) {
   const std::size_t before = rows.size();
@@ -178,7 +181,7 @@ void with_more_rows(Observations& rows, std::size_t more, Function&& fill) {
   }
 }
 
-/// Runs a function on what stands behind the header, whose places are counted from the records on.
+/// Runs a function on the data after the header, with places counted from the records on.
 template <class Function>
 void behind_header(Function&& function) {
   try {

@@ -26,7 +26,7 @@ using io::store;
       fmt::format("row {}: {} = {} {}, allowed {}", row, column, value, unit, allowed));
 }
 
-/// Whether a row holds a return; checks everything a record of any kind needs.
+/// Whether a row holds a return; checks the requirements of any kind of record.
 bool has_return(const Observations& o, std::size_t row, std::uint64_t row_number) {
   if (!o.valid[row]) return false;
   const double range = o.range[row];
@@ -48,7 +48,7 @@ bool has_return(const Observations& o, std::size_t row, std::uint64_t row_number
   return true;
 }
 
-/// The integer of an angle that a record without return holds, 0 for none.
+/// The integer of an angle in a record without return, 0 for none.
 std::uint16_t untrusted_angle(double angle, int limit) {
   const double units = std::round(degrees_from_radians(angle) * 100.0);
   return units >= 0 && units <= limit ? static_cast<std::uint16_t>(units) : std::uint16_t{0};
@@ -64,7 +64,7 @@ RawAngles raw_angles(const Observations& o, std::size_t row, bool trusted) {
   if (!trusted) {
     constexpr int kLimit = std::numeric_limits<std::uint16_t>::max();
     RawAngles raw{untrusted_angle(o.zenith[row], kLimit), 0};
-    // A negative azimuth that rounds to no step is 0, not a full turn.
+    // A negative azimuth that rounds to zero steps is 0, not a full turn.
     const bool negative = azimuth <= -0.5 * kCentidegree;
     raw.azimuth = untrusted_angle(negative ? azimuth + kTwoPi : std::fabs(azimuth), kLimit);
     if (raw.azimuth == kFullTurn) raw.azimuth = 0;

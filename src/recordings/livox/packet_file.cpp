@@ -17,7 +17,7 @@ constexpr std::uint32_t kFrameDurationMs = 50;
 
 }  // namespace
 
-/// What LVX 2 needs from package to package.
+/// State that LVX 2 needs from package to package.
 struct PacketFile::Numbered {
   std::vector<LidarId> ids;
   Lvx2FrameCut cut;

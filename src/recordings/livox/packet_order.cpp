@@ -19,10 +19,10 @@ constexpr std::int64_t kImuPeriod = 5'000'000;         // ns
 constexpr std::int64_t kSurelyNoJump = 1'000'000'000;  // ns
 /// A clock that runs faster than that has jumped: emulated time may be faster than real time.
 constexpr std::int64_t kFastestClock = 200;
-/// Farther back than packets can be late: the clock began again.
+/// Farther back than packets can be late: the clock restarted.
 constexpr std::int64_t kFarBack = 1'000'000'000;  // ns
 constexpr std::size_t kRemembered = 1024;
-/// So many late packets in a row are none: the clock was set back.
+/// This many consecutive late packets mean that the clock was set back.
 constexpr std::size_t kSetBack = 16;
 /// Delays of packets differ by less on a network that is not overloaded.
 constexpr std::int64_t kSurelyEarly = 10'000'000;            // ns
@@ -140,8 +140,7 @@ void PacketOrder::place(Track& track, std::int64_t time_ns, Held&& packet) {
   while (track.held.size() > kWindow) give_out(track);
 }
 
-/// A packet of a time that was given out already: it came twice, or too late, or the clock was set
-/// back.
+/// A packet with a time already returned: it is a duplicate, or late, or the clock was set back.
 void PacketOrder::place_late(Track& track, std::int64_t time_ns, Held&& packet) {
   const Mark mark{time_ns, hash_of(packet.bytes)};
   if (std::find(track.recent.rbegin(), track.recent.rend(), mark) != track.recent.rend()) {
@@ -160,14 +159,14 @@ std::int64_t PacketOrder::passed_ns(const Track& track, std::int64_t time_ns,
                                     const Held& packet) const {
   const std::int64_t passed = time_ns - *track.last_ns;
   if (track.timestamp_type != kPps || !track.arrivals.in_real_time()) return passed;
-  // Of PPS times the whole seconds of a silence are not known but by the host's clock.
+  // Of PPS times the whole seconds of a silence are known only from the host's clock.
   const double unseen = static_cast<double>(packet.host_ns) -
                         static_cast<double>(track.last_host_ns) - static_cast<double>(passed);
   const std::int64_t seconds = std::llround(unseen / static_cast<double>(kPpsPeriod));
   return saturating_sum(passed, std::max<std::int64_t>(seconds, 0) * kPpsPeriod);
 }
 
-/// Gives out the first packet of those that wait, and counts what is missing before it.
+/// Returns the first of the waiting packets, and counts the missing ones before it.
 void PacketOrder::give_out(Track& track) {
   const auto first = track.held.begin();
   const std::int64_t time = first->first;

@@ -4,12 +4,12 @@
 
 #include <cstddef>
 
-// Spherical records, as decoder and encoder know them.
+// Spherical records, shared by decoder and encoder.
 namespace risley::recordings::livox {
 
 inline constexpr int kHalfTurn = 18'000, kFullTurn = 36'000;  // 0.01 deg
 
-/// Where the numbers of a record with this many returns stand. Records of one return begin with
+/// Positions of the numbers in a record with this many returns. Records of one return begin with
 /// the distance, records of several with the angles.
 constexpr std::size_t zenith_at(int returns) { return returns == 1 ? 4 : 0; }
 constexpr std::size_t depth_at(int returns, int number) {

@@ -18,7 +18,7 @@
 
 namespace risley::trajectories {
 
-/// What identifies the format of a file.
+/// Data that identify the format of a file.
 struct FileHead {
   std::string name;        ///< of the file, in lower case
   std::string bytes;       ///< its beginning
@@ -26,18 +26,18 @@ struct FileHead {
   bool has_ending(std::string_view ending) const { return name.ends_with(ending); }
 };
 
-/// So much of a file's beginning is looked at.
+/// Number of bytes examined at the beginning of a file.
 inline constexpr std::size_t kHeadBytes = 16384;
 
 /// One format of trajectories. Adding one means a file in this folder that defines one of these,
 /// and one line in the list of trajectory_file.cpp.
 struct Format {
   std::string_view name;    ///< Trajectory::format
-  std::string_view ending;  ///< for writing; empty when it is only read
+  std::string_view ending;  ///< for writing; empty when it is read-only
   std::string_view description;
   bool (*recognises)(const FileHead& head);
   Trajectory (*read)(const std::string& path, const Progress& progress);
-  /// nullptr when the format is only read; as write_trajectory.
+  /// nullptr when the format is read-only; as write_trajectory.
   std::vector<std::string> (*write)(const std::string& path, const Trajectory& trajectory);
 };
 
@@ -53,11 +53,10 @@ extern const Format kRosBagFormat;            // ros_bag.cpp
 
 bool is_smrmsg(const FileHead& head);  // smrmsg.cpp
 
-/// The lines of a text's beginning that are whole, without carriage returns; none where it is no
-/// text.
+/// The complete lines at the beginning of a text, without carriage returns; none if it is not text.
 std::vector<std::string_view> lines_of(std::string_view head);
 
-/// The numbers of a line of text; nothing where it has another number of fields, or one that is no
+/// The numbers of a line of text; nothing if it has another number of fields, or one that is not a
 /// number.
 template <std::size_t N>
 std::optional<std::array<double, N>> numbers_in(std::string_view line, char delimiter) {

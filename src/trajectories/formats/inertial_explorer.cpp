@@ -17,7 +17,7 @@
 #include "trajectories/formats/pose_table.hpp"
 
 /// Text of NovAtel's (Waypoint's) Inertial Explorer: lines about the project, a line of names of
-/// columns, a line of their units, rows. Which columns there are is the exporting user's choice.
+/// columns, a line of their units, rows. The exporting user chooses the columns.
 namespace risley::trajectories {
 namespace {
 
@@ -50,13 +50,13 @@ constexpr FieldName kExplorerNames[] = {
 
 constexpr std::size_t kLongestHeader = 200;  // lines
 
-/// A name or unit and where it ends in its line.
+/// A name or unit and its end in the line.
 struct ExplorerWord {
   std::string text;
   std::size_t end = 0;
 };
 
-/// Names or units of a line: words, of which one in parentheses may have blanks.
+/// Names or units of a line: words, of which one in parentheses may contain blanks.
 std::vector<ExplorerWord> placed_words(std::string_view line) {
   std::vector<ExplorerWord> words;
   for (std::size_t i = 0; i < line.size();) {
@@ -83,7 +83,7 @@ std::vector<std::string> words_of_line(std::string_view line) {
 }
 
 /// The units of names, one each; columns without a unit have none written. Both lines end their
-/// columns at the same places, or have commas; otherwise the units are those that are written.
+/// columns at the same places, or have commas; otherwise the units are those written.
 std::vector<std::string> units_of(std::string_view names_line, std::string_view units_line) {
   const std::vector<ExplorerWord> names = placed_words(names_line);
   const std::vector<ExplorerWord> written = placed_words(units_line);
@@ -127,16 +127,16 @@ bool is_explorer(const FileHead& head) {
   return false;
 }
 
-/// What a header says beside names and units.
+/// Content of a header apart from names and units.
 struct ExplorerHeader {
   std::vector<std::string> names, units;
   std::uint64_t names_line = 0;
-  /// By what standard deviations were multiplied.
+  /// Factor by which standard deviations were multiplied.
   double position_scale = 1, attitude_scale = 1;
   std::vector<Warning> warnings;
 };
 
-/// The factor behind "Position:", 1 for "No scaling".
+/// The factor after "Position:", 1 for "No scaling".
 std::optional<double> scaling_of(std::string_view line) {
   const auto colon = line.find(':');
   const std::string text = lower_case(std::string(io::trimmed(line.substr(colon + 1))));
@@ -196,7 +196,7 @@ ExplorerHeader read_explorer_header(const std::string& path) {
       "Explorer with GPSTime, Latitude, Longitude, H-Ell, Roll, Pitch and Heading");
 }
 
-/// A unit that columns may have, and what it makes of them.
+/// A possible unit of columns, and its factor.
 struct ExplorerUnit {
   std::string_view written;  ///< in lower case
   double scale = 1;
@@ -225,7 +225,7 @@ constexpr ExplorerUnit kAngles[] = {{"(deg)", kRadiansPerDegree},
 constexpr ExplorerUnit kMetres[] = {{"(m)"}};
 constexpr ExplorerUnit kSpeeds[] = {{"(m/s)"}};
 
-/// The units of a field, and which to name where it has another one.
+/// The units of a field, and the one to name if it has another.
 std::pair<std::span<const ExplorerUnit>, const char*> units_for(PoseField field) {
   if (is_angle(field) || is_angle_sigma(field)) return {kAngles, "(deg) or (+/-D M S)"};
   if (field == PoseField::date) return {kDates, "(YMD), (MDY) or (DMY)"};
@@ -238,7 +238,7 @@ std::pair<std::span<const ExplorerUnit>, const char*> units_for(PoseField field)
 /// Sets scale and fields of a column by its unit. @throws FileError
 void set_unit(PoseColumn& column, const std::string& unit, const std::string& path,
               std::uint64_t line) {
-  // Columns that are not read may take three fields, too.
+  // Unused columns may take three fields, too.
   const bool unused = column.field == PoseField::unused;
   const auto [units, expected] =
       unused ? std::pair{std::span(kAngles), ""} : units_for(column.field);

@@ -13,7 +13,7 @@
 #include "trajectories/formats/format.hpp"
 
 /// KITTI's poses: lines of 12 numbers, a rotation and a place as the rows of a 3x4 matrix, without
-/// times. They are recognised to say why they will not do.
+/// times. They are recognised in order to explain why they are unsuitable.
 namespace risley::trajectories {
 namespace {
 
@@ -37,9 +37,8 @@ bool is_kitti(const FileHead& head) {
 Trajectory refuse_kitti(const std::string& path, const Progress& /*progress*/) {
   throw FileError(
       path, {},
-      "is a trajectory of KITTI (a 3x4 matrix a line), which has no times; expected one "
-      "with times, such as lines of TUM: time x y z qx qy qz qw, with the times of "
-      "KITTI's times.txt");
+      "is a trajectory of KITTI (a 3x4 matrix per line), which has no times; expected one with "
+      "times, such as lines of TUM: time x y z qx qy qz qw, with the times of KITTI's times.txt");
 }
 
 }  // namespace

@@ -18,8 +18,8 @@
 #include "trajectories/formats/format.hpp"
 #include "trajectories/formats/pose_table.hpp"
 
-/// CSV whose header names the columns, each with its unit: what users of systems of their own
-/// write, and what is written here.
+/// CSV whose header names the columns, each with its unit: for users' own systems, and the output
+/// format.
 namespace risley::trajectories {
 namespace {
 
@@ -121,7 +121,7 @@ const std::vector<std::string>& all_csv_names() {
   return all;
 }
 
-/// Other names of the same, as receivers and data sets write them.
+/// Alternative names, as used by receivers and data sets.
 struct CsvAlias {
   std::string_view written, base;
 };
@@ -152,7 +152,7 @@ constexpr CsvAlias kCsvAliases[] = {{"timestamp", "time"},
                                     {"v_rs_r_z", "velocity_z"}};
 constexpr std::string_view kEurocPosition = "p_rs_r_x";
 
-/// Units as they stand in brackets.
+/// Units in brackets.
 struct CsvUnitAlias {
   std::string_view written, suffix;
 };
@@ -173,7 +173,7 @@ constexpr std::array kCsvUnitAliases{
     CsvUnitAlias{"m s^-1", "_m_per_s"},
 };
 
-/// "Lat [deg]" as latitude_deg, "#timestamp [ns]" as time_ns; what is not known as it is, in lower
+/// "Lat [deg]" as latitude_deg, "#timestamp [ns]" as time_ns; unknown names unchanged, in lower
 /// case.
 std::string csv_name(std::string_view written) {
   while (written.starts_with('#') || written.starts_with('"')) written.remove_prefix(1);
@@ -211,15 +211,14 @@ std::vector<std::string> header_names(std::string_view line) {
   for (const std::string_view field : io::fields_of(line, csv_delimiter(line))) {
     names.push_back(csv_name(field));
   }
-  // EuRoC counts nanoseconds, whether its header says so or not.
+  // EuRoC counts nanoseconds, whether its header states it or not.
   if (lower_case(std::string(line)).find(kEurocPosition) != std::string::npos) {
     std::ranges::replace(names, std::string("time"), std::string("time_ns"));
   }
   return names;
 }
 
-/// Two or more of a header's names are those of an attitude or of a place on the globe, or nearly
-/// so.
+/// Two or more of a header's names are those of an attitude or of a geographic place, or nearly so.
 bool is_trajectory_csv(const FileHead& head) {
   const std::vector<std::string_view> lines = lines_of(head.bytes);
   if (lines.empty()) return false;
@@ -247,7 +246,7 @@ bool is_trajectory_csv(const FileHead& head) {
   return found >= 2;
 }
 
-/// Names that may mean one thing or another: what they would have to be called.
+/// Ambiguous names, and their unambiguous replacements.
 void refuse_ambiguous(const std::string& path, const std::vector<PoseColumn>& columns,
                       const std::vector<std::string>& unknown) {
   std::vector<std::string> names, remedies;
@@ -391,7 +390,7 @@ std::string_view csv_time_name(TimeScale scale) {
   return "time";
 }
 
-/// @param end_row  called after each row, also that of the names
+/// @param end_row  called after each row, also after the names
 template <class EndRow>
 void append_csv(const Trajectory& trajectory, fmt::memory_buffer& buffer, const EndRow& end_row) {
   const bool local = trajectory.frame == Frame::local;

@@ -10,8 +10,8 @@
 #include "trajectories/formats/format.hpp"
 #include "trajectories/formats/pose_table.hpp"
 
-/// What POSPac exports by the profile of OpenMMS: a line about the project, then 15 columns without
-/// names. Times are UTC seconds of the day; there are no accuracies.
+/// POSPac's export by the profile of OpenMMS: a line on the project, then 15 columns without names.
+/// Times are UTC seconds of the day; there are no accuracies.
 namespace risley::trajectories {
 namespace {
 

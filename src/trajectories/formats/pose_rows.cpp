@@ -18,7 +18,7 @@ namespace risley::trajectories {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
-/// Largest delay of a record; a larger step back is another flight or another clock.
+/// Largest delay of a record; a larger step back indicates another flight or another clock.
 constexpr std::int64_t kLatest_ns = kSecond_ns;
 constexpr double kFastest = 1e4;        // m/s
 constexpr double kFarthest = 1e7;       // m, from the origin of a map
@@ -56,23 +56,23 @@ TimeScale scale_by_size(const std::vector<std::int64_t>& ascending) {
   return fits ? TimeScale::utc_unix : TimeScale::unknown;
 }
 
-std::vector<Warning> order_warnings(const TimeOrder& told, std::size_t records,
+std::vector<Warning> order_warnings(const TimeOrder& found, std::size_t records,
                                     const std::function<FilePlace(std::size_t)>& place_of) {
   std::vector<Warning> warnings;
-  if (told.moved > 0) {
+  if (found.moved > 0) {
     warnings.push_back(
         {kWarning.rows_sorted,
          fmt::format("records that come after later ones: {} of {}, by up to {:.6f} s; all were "
                      "sorted by time",
-                     told.moved, records, 1e-9 * static_cast<double>(told.largest_back_ns)),
-         place_of(told.largest_back_at)});
+                     found.moved, records, 1e-9 * static_cast<double>(found.largest_back_ns)),
+         place_of(found.largest_back_at)});
   }
-  if (told.repeated > 0) {
+  if (found.repeated > 0) {
     warnings.push_back(
         {kWarning.content_left_out,
-         fmt::format("records that repeat the time of an earlier one: {}; they were left out",
-                     told.repeated),
-         place_of(told.repeated_at)});
+         fmt::format("records that repeat the time of an earlier one: {}; they were ignored",
+                     found.repeated),
+         place_of(found.repeated_at)});
   }
   return warnings;
 }
@@ -175,18 +175,18 @@ void PoseRows::make_times_run_on() {
 
 void PoseRows::put_in_order() {
   const RowOrder order = row_order(trajectory_.time_ns);
-  const TimeOrder& told = order.told;
-  trajectory_.time_order = told;
-  if (told.largest_back_ns > kLatest_ns) {
-    refuse(told.largest_back_at, places_[told.largest_back_at],
+  const TimeOrder& found = order.times;
+  trajectory_.time_order = found;
+  if (found.largest_back_ns > kLatest_ns) {
+    refuse(found.largest_back_at, places_[found.largest_back_at],
            fmt::format("time jumps back by {:.6f} s, to {:.6f} s; expected one flight with one "
                        "clock: keep only its records",
-                       1e-9 * static_cast<double>(told.largest_back_ns),
-                       1e-9 * static_cast<double>(trajectory_.time_ns[told.largest_back_at])));
+                       1e-9 * static_cast<double>(found.largest_back_ns),
+                       1e-9 * static_cast<double>(trajectory_.time_ns[found.largest_back_at])));
   }
   if (order.rows.empty()) return;
   const auto place_of = [this](std::size_t row) { return places_[row]; };
-  append(warnings(), order_warnings(told, trajectory_.size(), place_of));
+  append(warnings(), order_warnings(found, trajectory_.size(), place_of));
   reorder(wander_, order.rows);
   static_cast<void>(order_by_time(trajectory_));
 }

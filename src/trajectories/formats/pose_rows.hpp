@@ -16,8 +16,8 @@
 
 namespace risley::trajectories {
 
-/// One record of a file, in SI units. Angles, places and positions as the trajectory's frame needs
-/// them.
+/// One record of a file, in SI units. Angles, places and positions in the form for the trajectory's
+/// frame.
 struct PoseRow {
   std::int64_t time_ns = 0;  ///< as the file counts
   Geodetic place;
@@ -29,7 +29,7 @@ struct PoseRow {
   PoseAccuracy accuracy;
 };
 
-/// What the records of a file hold.
+/// Contents of a file's records.
 struct RowContents {
   std::string format;
   TimeScale time_scale = TimeScale::unknown;
@@ -39,21 +39,21 @@ struct RowContents {
   std::optional<VelocityAxes> velocity_axes;  ///< where the file states them
 };
 
-/// Makes a trajectory of records: what every format's records must be, and how they are ordered.
+/// Makes a trajectory from records: common requirements of all formats, and their ordering.
 class PoseRows {
  public:
   PoseRows(std::string path, RowContents contents);
 
   /// Adds a record. @param place  of the record, for messages; none: its number
-  /// @throws FileError for values that no platform has
+  /// @throws FileError for physically impossible values
   void add(const PoseRow& row, const FilePlace& place);
 
   std::vector<Warning>& warnings() { return trajectory_.warnings; }
   std::size_t size() const { return trajectory_.size(); }
 
-  /// Times that ran on beyond the end of the week or day; records in the order of their times;
-  /// velocities in the frame.
-  /// @throws FileError without any record, and where times run back by more than a second
+  /// Continues times beyond the end of the week or day; sorts records by time; converts velocities
+  /// to the frame.
+  /// @throws FileError without any record, and if times run back by more than a second
   Trajectory finish();
 
  private:
@@ -69,30 +69,30 @@ class PoseRows {
   std::vector<FilePlace> places_;  ///< of the rows
 };
 
-/// Warnings about records that were put in order.
+/// Warnings about records that were sorted.
 /// @param place_of  of a record, by its number from 0
-std::vector<Warning> order_warnings(const TimeOrder& told, std::size_t records,
+std::vector<Warning> order_warnings(const TimeOrder& found, std::size_t records,
                                     const std::function<FilePlace(std::size_t)>& place_of);
 
-/// Seconds after which a scale of time begins again; nothing where it never does.
+/// Period of a scale of time, s; nothing if it does not repeat.
 std::optional<std::int64_t> period_ns(TimeScale scale);
 
-/// Times that begin again after a period made to run on: each is as near as can be to the one
+/// Times that restart after a period made continuous: each is as near as possible to the one
 /// before.
 /// @return how often they began again
 int unwrap_times(std::vector<std::int64_t>& times_ns, std::int64_t period_ns);
 
-/// What times count from by their size: UTC since 1970 where they are of the years 1998 to 2100, a
-/// clock unless stated otherwise.
+/// Origin of times by their size: UTC since 1970 if they are of the years 1998 to 2100, a clock
+/// unless stated otherwise.
 TimeScale scale_by_size(const std::vector<std::int64_t>& ascending_ns);
 
-/// Half the body's turn about its x axis: forward-left-up axes, as ROS has them, to
-/// forward-right-down and back. Exact.
+/// Half a turn of the body about its x axis: forward-left-up axes, as in ROS, to forward-right-down
+/// and back. Exact.
 Eigen::Quaterniond right_down_from_left_up(const Eigen::Quaterniond& frame_from_left_up);
 Eigen::Quaterniond left_up_from_right_down(const Eigen::Quaterniond& frame_from_right_down);
 
-/// A quaternion of a file made a unit quaternion; those that are already keep their bits.
-/// @return nothing where its length is not within a hundredth of 1
+/// A file's quaternion normalised to unit length; those that already are keep their bits.
+/// @return nothing if its length is not within a hundredth of 1
 std::optional<Eigen::Quaterniond> unit_quaternion(const Eigen::Quaterniond& q);
 
 }  // namespace risley::trajectories

@@ -71,7 +71,7 @@ std::int64_t gps_day(std::string_view field, const PoseColumn& column) {
                            io::printable(field))};
 }
 
-/// Digits behind the point of a field.
+/// Digits after the point of a field.
 std::size_t decimals_in(std::string_view field) {
   const auto point = field.find('.');
   return point == std::string_view::npos ? 0 : field.size() - point - 1;
@@ -140,8 +140,8 @@ class RowReader {
   std::optional<std::int64_t> first_week() const { return first_week_; }
 
  private:
-  /// Makes a second of the day, or of the week, one of the week, as the first date behind a Sunday
-  /// shows; on a Sunday both are the same.
+  /// Converts a second of the day, or of the week, to one of the week, as the first date after a
+  /// Sunday shows; on a Sunday both are the same.
   void place_in_week(std::int64_t day, std::int64_t& time_ns, std::optional<std::int64_t>& week) {
     constexpr std::int64_t kDay_ns = 86'400'000'000'000, kDays = 7;
     constexpr std::int64_t kLate_ns =
@@ -161,7 +161,7 @@ class RowReader {
     if (first_day_ < 0) first_day_ = day;
     const bool of_day = seconds_ == Seconds::of_day;
     if (of_day) time_ns += before_ns;
-    // Times of the week run on beyond its end without the date.
+    // Times of the week continue beyond its end without the date.
     if (!week) week = (of_day ? day : first_day_) / kDays;
   }
 
@@ -215,7 +215,7 @@ bool is_angle(PoseField field) {
 bool is_angle_sigma(PoseField field) { return field >= PoseField::sigma_roll; }
 
 void take_contents(PoseTable& table, std::vector<Warning>& warnings) {
-  // A quantity counts when all its columns are there.
+  // A quantity is used if all its columns are present.
   const auto whole = [&](std::initializer_list<PoseField> fields, const char* what) {
     std::vector<std::string> there;
     for (const PoseColumn& column : table.columns) {
@@ -230,7 +230,7 @@ void take_contents(PoseTable& table, std::vector<Warning>& warnings) {
       }
     }
     if (!there.empty()) {
-      warn(warnings, kWarning.columns_unused, "{} are incomplete (only {}) and were left out", what,
+      warn(warnings, kWarning.columns_unused, "{} are incomplete (only {}) and were ignored", what,
            fmt::join(there, ", "));
     }
     return false;
@@ -301,7 +301,7 @@ Trajectory read_pose_table(const std::string& path, const PoseTable& table,
     const bool cut = !lines.has_line_end() &&
                      (!row || (rows.size() > 0 && decimals_in(fields.back()) != last_decimals));
     if (cut) {
-      warn(rows.warnings(), kWarning.cut_off, "the last line is cut off and was left out").place =
+      warn(rows.warnings(), kWarning.cut_off, "the last line is cut off and was ignored").place =
           place;
       break;
     }

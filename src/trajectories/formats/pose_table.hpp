@@ -15,12 +15,12 @@
 
 namespace risley::trajectories {
 
-/// What a column of a table of poses holds.
+/// Content of a column in a table of poses.
 enum class PoseField : std::uint8_t {
   unused,
   time,
   gps_week,
-  date,  ///< of the time; decides whether that is the second of the day or of the week
+  date,  ///< of the time; determines whether that is the second of the day or of the week
   latitude,
   longitude,
   height,
@@ -46,13 +46,13 @@ enum class PoseField : std::uint8_t {
   count,
 };
 
-/// How a format calls what a column holds.
+/// A format's name for a column's content.
 struct FieldName {
   std::string_view name;
   PoseField field;
 };
 
-/// In which order a date has year, month and day.
+/// Order of year, month and day in a date.
 enum class DateOrder : std::uint8_t { ymd, mdy, dmy };
 
 /// One column of a table.
@@ -71,19 +71,19 @@ struct PoseTable {
   RowContents contents;
   char delimiter = ',';
   std::uint64_t first_row = 1;  ///< line, from 1
-  char comment = '\0';          ///< lines that begin with it are stepped over
-  /// Text may follow behind an empty line.
+  char comment = '\0';          ///< lines that begin with it are skipped
+  /// Text may follow after an empty line.
   bool has_footer = false;
-  /// Bodies are forward-left-up, as ROS has them.
+  /// Bodies are forward-left-up, as in ROS.
   bool left_up = false;
 };
 
-/// Reads the rows of a table. A last line that is cut off is left out with a warning.
-/// @throws FileError at the line that is no row or holds what no platform does; Cancelled
+/// Reads the rows of a table. A truncated last line is dropped with a warning.
+/// @throws FileError at the line that is not a row or is physically impossible; Cancelled
 Trajectory read_pose_table(const std::string& path, const PoseTable& table,
                            const Progress& progress, const std::vector<Warning>& warnings = {});
 
-/// Which fields the columns have; RowContents::has_velocity and so on follow from it.
+/// The fields of the columns; RowContents::has_velocity and so on follow from them.
 bool has_field(const std::vector<PoseColumn>& columns, PoseField field);
 
 /// The names of those fields that no column has.
@@ -95,8 +95,8 @@ std::vector<std::string_view> missing_fields(
 bool is_angle(PoseField field);
 bool is_angle_sigma(PoseField field);
 
-/// Sets what the columns hold in the table's contents. Velocities and accuracies that are there in
-/// part are left out with a warning.
+/// Sets the table's contents from the columns. Partial velocities and accuracies are dropped with a
+/// warning.
 void take_contents(PoseTable& table, std::vector<Warning>& warnings);
 
 }  // namespace risley::trajectories

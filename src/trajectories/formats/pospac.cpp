@@ -15,7 +15,7 @@
 #include "trajectories/formats/format.hpp"
 #include "trajectories/formats/pose_table.hpp"
 
-/// Text that Applanix POSPac exports: lines about the project, a line of 20 names with commas, a
+/// Text exported by Applanix POSPac: lines about the project, a line of 20 names with commas, a
 /// line of units, rows with blanks. Eastings and northings are of a map projection and not read.
 namespace risley::trajectories {
 namespace {
@@ -112,7 +112,7 @@ Trajectory read_pospac(const std::string& path, const Progress& progress) {
     for (const FieldName& known : kPospacNames) {
       if (known.name == name && !has_field(table.columns, known.field)) column.field = known.field;
     }
-    // "H" behind the longitude, where the other height has another name.
+    // "H" after the longitude, if the other height has another name.
     const bool is_height = !heights && (name == "h" || name == "height") &&
                            has_field(table.columns, PoseField::longitude) &&
                            !has_field(table.columns, PoseField::height);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Poses of bags of ROS 1 and ROS 2. Frames of ROS have x east, y north and z up where they are of
-// a map, bodies x forward, y left and z up (REP 103); twists stand in the body's axes.
+// Poses of bags of ROS 1 and ROS 2. Frames of ROS have x east, y north and z up if they are maps,
+// bodies x forward, y left and z up (REP 103); twists are in the body's axes.
 #include "trajectories/formats/ros_bag.hpp"
 
 #include <algorithm>
@@ -67,8 +67,8 @@ std::size_t chosen_topic(const bags::Bag& bag, const std::string& name) {
   return static_cast<std::size_t>(found - topics.begin());
 }
 
-/// The standard deviations that a covariance states; nothing where it states none, as with zeros,
-/// -1, or the large numbers that stand for "unknown".
+/// The standard deviations in a covariance; nothing if it states none, as with zeros, -1, or the
+/// large numbers used for "unknown".
 std::optional<PoseAccuracy> stated_accuracy(const RosPose& pose,
                                             const Eigen::Quaterniond& frame_from_body) {
   if (!pose.covariance || !pose.covariance->allFinite()) return std::nullopt;
@@ -92,7 +92,7 @@ std::optional<PoseAccuracy> stated_accuracy(const RosPose& pose,
   return PoseAccuracy{{*north, *east, *down}, *roll, *pitch, *vertical};
 }
 
-/// What the messages hold beside times and poses, in rows that lack it where one lacks it.
+/// Contents of the messages other than times and poses, removed from all rows if one lacks them.
 struct PosesOfTopic {
   std::vector<PoseRow> rows;
   std::size_t without_accuracy = 0, without_velocity = 0;
@@ -179,7 +179,7 @@ Trajectory read_ros_bag(const std::string& path, const std::string& topic_name,
   const auto warn_of_part = [&](std::size_t without, const char* what) {
     if (without == 0 || without == all.rows.size()) return;
     warn(rows.warnings(), kWarning.columns_unused,
-         "{} of {} messages of topic {} state no {}; they were left out for the others, too",
+         "{} of {} messages of topic {} state no {}; they were ignored for the others, too",
          without, all.rows.size(), topic.name, what);
   };
   warn_of_part(all.without_accuracy, "accuracies of position and attitude");

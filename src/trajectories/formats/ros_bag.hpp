@@ -14,9 +14,9 @@ namespace risley::trajectories {
 bool holds_poses_alone(const std::string& path, const Progress& progress);
 
 /// The poses of one topic.
-/// @param topic  its name; empty where the bag has only one topic of poses
-/// @throws FileError; InvalidArgument where the topic has no poses, and without a name where there
-///         are several; Cancelled
+/// @param topic  its name; empty if the bag has only one topic of poses
+/// @throws FileError; InvalidArgument if the topic has no poses, and without a name if there are
+/// several; Cancelled
 Trajectory read_ros_bag(const std::string& path, const std::string& topic,
                         const Progress& progress);
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The risley authors
 // SPDX-License-Identifier: MIT
-// Messages of ROS that hold a pose: nav_msgs Odometry, geometry_msgs PoseStamped,
+// Messages of ROS with a pose: nav_msgs Odometry, geometry_msgs PoseStamped,
 // PoseWithCovarianceStamped and TransformStamped.
 #pragma once
 
@@ -30,8 +30,8 @@ struct RosPose {
 /// Whether messages of a kind hold poses.
 bool holds_pose(bags::MessageKind kind);
 
-/// @throws BadMessage for a message that is too short or too long, and for a pose that is none;
-///         covariances and velocities may hold anything
+/// @throws BadMessage for a message that is too short or too long, and for an invalid pose;
+/// covariances and velocities may hold anything
 RosPose decode_ros_pose(bags::Serialisation serialisation, bags::MessageKind kind,
                         std::span<const std::uint8_t> bytes);
 

@@ -6,7 +6,8 @@
 
 #include "trajectories/formats/format.hpp"
 
-/// RTKLIB's solutions: places without attitudes. They are recognised to say why they will not do.
+/// RTKLIB's solutions: places without attitudes. They are recognised in order to explain why they
+/// are unsuitable.
 namespace risley::trajectories {
 namespace {
 

@@ -29,7 +29,7 @@ enum SbetField {
   kSbetLatitude,
   kSbetLongitude,
   kSbetHeight,
-  kSbetVelocity,  // three, along axes that the writer chose
+  kSbetVelocity,  // three, along axes chosen by the writer
   kSbetRoll = 7,
   kSbetPitch,
   kSbetPlatformHeading,
@@ -148,7 +148,7 @@ std::vector<std::string> write_sbet(const std::string& path, const Trajectory& t
   std::vector<std::string> left_out{"accelerations and angular rates are 0"};
   if (trajectory.velocity.empty()) left_out.emplace_back("velocities are 0");
   if (!trajectory.accuracy.empty()) left_out.emplace_back("accuracies are left out");
-  if (trajectory.gps_week) left_out.emplace_back("the GPS week is left out");
+  if (trajectory.gps_week) left_out.emplace_back("the GPS week is dropped");
   return left_out;
 }
 

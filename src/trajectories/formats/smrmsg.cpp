@@ -29,7 +29,7 @@ constexpr double kRadiansPerArcMinute = kRadiansPerDegree / 60;
 /// Largest standard deviations of a record: m, m/s, arc-minutes.
 constexpr double kWorstSmrmsgPosition = 1e5, kWorstSmrmsgVelocity = 1e4, kWorstSmrmsgAngle = 21600;
 
-/// What is wrong with a record; empty when nothing is.
+/// The defect of a record; empty when there is none.
 std::string smrmsg_fault(const SmrmsgNumbers& n) {
   constexpr std::array kNames{"time",          "north",         "east", "down",  "north velocity",
                               "east velocity", "down velocity", "roll", "pitch", "heading"};
@@ -93,7 +93,7 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
       progress.report(static_cast<double>(offset) / static_cast<double>(file.size()));
     }
   }
-  // Records need not be ordered, so a week that ends among them is seen by its two halves.
+  // Records need not be ordered, so a week that ends among them is recognised by its two halves.
   const std::int64_t week = *period_ns(TimeScale::gps_second_of_week);
   const auto [least, greatest] =
       std::minmax_element(records.time_ns.begin(), records.time_ns.end());
@@ -108,7 +108,7 @@ AccuracyRecords load_accuracies(const std::string& path, const Progress& progres
   const auto place_of = [](std::size_t row) {
     return FilePlace{static_cast<std::uint64_t>(row) * kSmrmsgRecord, {}};
   };
-  append(records.warnings, order_warnings(order.told, records.time_ns.size(), place_of));
+  append(records.warnings, order_warnings(order.times, records.time_ns.size(), place_of));
   if (!order.rows.empty()) {
     reorder(records.accuracy, order.rows);
     reorder(records.velocity, order.rows);
@@ -132,7 +132,7 @@ void add_accuracies(Trajectory& trajectory, const AccuracyRecords& accuracies,
         fmt::format("its times are of the scale {}, the trajectory's of {}",
                     to_string(accuracies.time_scale), to_string(trajectory.time_scale)));
   }
-  // Either file may have run on beyond the end of a week.
+  // Either file may continue beyond the end of a week.
   std::int64_t shift = 0;
   if (const auto period = period_ns(trajectory.time_scale)) {
     const auto middle_of = [](const std::vector<std::int64_t>& ordered) {

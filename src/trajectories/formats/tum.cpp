@@ -15,12 +15,12 @@
 #include "trajectories/formats/format.hpp"
 #include "trajectories/formats/pose_table.hpp"
 
-/// TUM: lines of "time x y z qx qy qz qw", in seconds and metres, as evaluations of SLAM have them.
-/// A line before the first row may name another order of the quaternion.
+/// TUM: lines of "time x y z qx qy qz qw", in seconds and metres, as used in SLAM evaluations. A
+/// line before the first row may name another order of the quaternion.
 namespace risley::trajectories {
 namespace {
 
-/// Whether a line has eight numbers of which the last four make a rotation.
+/// Whether a line has eight numbers with the last four a rotation.
 bool is_tum_row(std::string_view line) {
   const auto n = numbers_in<8>(line, io::kBlanks);
   if (!n) return false;
@@ -32,7 +32,7 @@ bool is_tum_row(std::string_view line) {
 using Order = std::array<PoseField, 4>;
 constexpr Order kUsualOrder{PoseField::qx, PoseField::qy, PoseField::qz, PoseField::qw};
 
-/// The order of the quaternion that a line names; empty where it does not.
+/// The order of the quaternion named in a line; empty if there is none.
 std::optional<Order> named_order(std::string_view line) {
   static constexpr std::array kNames{std::pair{"qx", PoseField::qx}, std::pair{"qy", PoseField::qy},
                                      std::pair{"qz", PoseField::qz},
@@ -68,7 +68,7 @@ bool is_tum(const FileHead& head) {
   return rows > 0;
 }
 
-/// What lines before the first row say.
+/// Information in lines before the first row.
 struct TumHeader {
   std::optional<Order> order;
   std::uint64_t first_row = 1;
@@ -87,8 +87,8 @@ TumHeader read_tum_header(const std::string& path) {
   return header;
 }
 
-/// Bodies that lie on their backs, and would stand upright were the scalar the first number of the
-/// quaternion and not the last.
+/// Whether bodies lie on their backs, but would be upright if the scalar were the first number of
+/// the quaternion instead of the last.
 void check_order(Trajectory& trajectory) {
   std::vector<double> up_as_read, up_otherwise;  // cosine of the tilt
   for (const Eigen::Quaterniond& attitude : trajectory.attitude) {
@@ -104,9 +104,9 @@ void check_order(Trajectory& trajectory) {
     return degrees_from_radians(std::acos(std::clamp(cosine, -1.0, 1.0)));
   };
   warn(trajectory.warnings, kWarning.columns_guessed,
-       "the quaternions were read as qx qy qz qw, and so the body is tilted by {:.0f} deg; as qw "
-       "qx qy qz by {:.0f} deg: if that is their order, state it in a first line \"# time x y z qw "
-       "qx qy qz\"",
+       "the quaternions were read as qx qy qz qw, which tilts the body by {:.0f} deg; as qw qx qy "
+       "qz by {:.0f} deg: if that is their order, state it in a first line \"# time x y z qw qx qy "
+       "qz\"",
        tilt_deg(as_read), tilt_deg(otherwise));
 }
 

@@ -10,24 +10,24 @@
 
 namespace risley::recordings::livox {
 
-/// What a status says, each fact in words: "motor: warning", "PPS signal". Empty for a healthy
+/// The facts in a status, each in words: "motor: warning", "PPS signal". Empty for a healthy
 /// sensor without a signal. @param status  Packet::status
 std::vector<std::string> status_words(std::uint32_t status);
 
-/// How the clock of a sensor runs beside that of the host.
+/// Behaviour of a sensor's clock compared with the host's.
 struct ClockDrift {
   double ppm = 0;        ///< by which the sensor's clock is faster
   double sigma_ppm = 0;  ///< one standard deviation
 };
 
-/// A time in which the clock of a sensor neither jumped nor changed its source.
+/// A period in which the clock of a sensor neither jumped nor changed its source.
 struct ClockStretch {
   std::uint8_t timestamp_type = 0;                ///< Packet::timestamp_type
   std::int64_t host_from_ns = 0, host_to_ns = 0;  ///< when its packets came, by the host's clock
   /// Sensor's time less the host's, ns, of the packets that came with the least delay: least and
   /// greatest of all seconds.
   std::int64_t least_offset_ns = 0, greatest_offset_ns = 0;
-  std::optional<ClockDrift> drift;  ///< empty where it was too short
+  std::optional<ClockDrift> drift;  ///< empty if it was too short
 };
 
 /// A status that a sensor reports from some time on.
@@ -36,14 +36,14 @@ struct StatusChange {
   std::uint32_t status = 0;  ///< Packet::status
 };
 
-/// Follows the clock of a sensor beside the host's, and its status. Packets can be late, but never
-/// early: of every second the packet with the least delay counts, and a line through those gives
+/// Tracks the clock of a sensor against the host's, and its status. Packets can be late, but never
+/// early: of every second the packet with the least delay is used, and a line through those gives
 /// the drift. Memory does not grow with the time.
 class ClockWatch {
  public:
-  /// Stretches that are kept; those behind are left out.
+  /// Number of stretches kept; later ones are dropped.
   static constexpr std::size_t kMostStretches = 100;
-  /// Changes of the status that are kept; those behind are left out.
+  /// Number of status changes kept; later ones are dropped.
   static constexpr std::size_t kMostChanges = 1000;
 
   /// A packet, in the order of the sensor's times.

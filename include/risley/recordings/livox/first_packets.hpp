@@ -13,8 +13,8 @@
 
 namespace risley::recordings::livox {
 
-/// What the first packets of a sensor reveal that no packet states: how its shots follow each
-/// other, and what kind of sensor it may be.
+/// Properties of a sensor that only several of its first packets reveal: the timing of its shots,
+/// and its possible type.
 class FirstPackets {
  public:
   /// A packet of points. @param rows  its rows are [first_row, first_row + packet.rows)
@@ -22,7 +22,7 @@ class FirstPackets {
 
   bool empty() const { return !last_time_ns_; }          ///< no packet of points was added
   std::uint8_t data_type() const { return data_type_; }  ///< of the last packet
-  /// Shortest time between two packets over the records of one, ns; of use behind two packets.
+  /// Shortest time between two packets over the records of one, ns; usable after two packets.
   double interval_ns() const;
   /// Grid of its shots: if the type does not imply it, it is judged by the packets' times, and
   /// the Mid-40 firmware that stores several returns as so many records shows it by intensities.

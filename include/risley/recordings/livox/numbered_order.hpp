@@ -16,7 +16,7 @@
 
 namespace risley::recordings::livox {
 
-/// Packets of the second generation: their numbers say exactly what is missing, whatever the clock
+/// Packets of the second generation: their numbers show exactly what is missing, whatever the clock
 /// does.
 class NumberedOrder final : public PacketSequence {
  public:
@@ -40,8 +40,8 @@ class NumberedOrder final : public PacketSequence {
     std::int64_t period_ns = 0;  // shortest time between neighbours so far; 0 when unknown
     std::uint8_t last_time_type = 0;
     bool flushed = false;    // before the next packet
-    bool paused = false;     // before the next packet that is given out
-    bool restarted = false;  // before the next packet that is given out
+    bool paused = false;     // before the next packet returned
+    bool restarted = false;  // before the next packet returned
   };
 
   void give_out(Track& track);

@@ -5,12 +5,13 @@
 // the header. All numbers are little-endian and packed.
 #pragma once
 
-#include <bitset>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "risley/recordings/livox/packet.hpp"
 #include "risley/recordings/livox/packet_decoder.hpp"
@@ -28,10 +29,10 @@ inline constexpr std::uint8_t kNumberedImu = 0,  ///< one inertial sample
     kNumberedShortPoints = 2,                    ///< coordinates in cm
     kNumberedSpherical = 3,                      ///< range in mm, angles in 0.01 deg
     kNumberedTwoReturns = 0x11;                  ///< two returns of a shot, as kNumberedPoints
-/// Intensity of a record without return outside the field of view that was set.
+/// Intensity of a record without return outside the configured field of view.
 inline constexpr std::uint8_t kOutsideViewIntensity = 60;
 
-/// What stands in front of the records.
+/// Fields before the records.
 struct NumberedHeader {
   std::uint16_t interval = 0;  ///< first to last record, 0.1 us; 0 for inertial samples
   std::uint16_t records = 0;   ///< in the packet
@@ -39,20 +40,20 @@ struct NumberedHeader {
   std::uint8_t frame = 0, data_type = kNumberedPoints;
   std::uint8_t time_type = 0;  ///< 0 since power-on, 1 PTP, 2 GPS
   std::uint8_t safety = 0;     ///< bits 0-1: 0 trustworthy, 1 not, 2 only points that are not 0
-  std::uint32_t checksum = 0;  ///< CRC-32 of time and records; 0 where the sensor computes none
+  std::uint32_t checksum = 0;  ///< CRC-32 of time and records; 0 if the sensor computes none
   std::uint64_t time_ns = 0;   ///< of the first record
 };
 
-/// Layout of so many records of a data type; empty for other data types.
+/// Layout of this many records of a data type; empty for other data types.
 std::optional<RecordLayout> numbered_layout(std::uint8_t data_type, std::uint16_t records);
 
 /// Shots of a device type; empty if the type does not imply them. @param device_type  Device::type
 std::optional<ShotGrid> numbered_grid(std::uint8_t device_type);
 
-/// Shots of a packet by its own interval; where it states none, those of the device type.
+/// Shots of a packet by its own interval; if it states none, those of the device type.
 ShotGrid interval_grid(const NumberedHeader& header, std::uint8_t device_type);
 
-/// What the origin of times of NumberedHeader::time_type is.
+/// Origin of the times of NumberedHeader::time_type.
 TimeReference numbered_time_reference(std::uint8_t time_type);
 /// The inverse of it.
 std::uint8_t time_type_of(TimeReference reference);
@@ -65,11 +66,11 @@ std::uint32_t packet_checksum(std::span<const std::uint8_t> bytes);
 ///         data type, records that do not fit, and a time so late that its last shot does not fit
 NumberedHeader decode_numbered_header(std::span<const std::uint8_t> bytes);
 
-/// @param bytes  [kNumberedHeaderBytes + records], whose records stand there already; length and
-///               checksum are computed
+/// @param bytes  [kNumberedHeaderBytes + records], with the records already in place; length and
+/// checksum are computed
 void encode_numbered_header(const NumberedHeader& header, std::span<std::uint8_t> bytes);
 
-/// The header as chunks keep it, without rows. @param device  Packet::device_index
+/// The header as stored in chunks, without rows. @param device  Packet::device_index
 Packet packet_of(const NumberedHeader& header, std::uint8_t device);
 /// Time of the first record, ns. @param packet  of the second generation
 std::int64_t numbered_time_ns(const Packet& packet);
@@ -79,8 +80,8 @@ std::int64_t numbered_time_ns(const Packet& packet);
 /// @param records  [whole records of the data type]
 /// @param grid     of the shots
 /// @param device   Observations::device and Packet::device_index
-/// @throws BadPacket for angles beyond a turn of a return, and inertial values that are no finite
-///         numbers; the place is counted from the first record. The chunk is then as before.
+/// @throws BadPacket for angles beyond a turn of a return, and non-finite inertial values; the
+/// place is counted from the first record. The chunk is then unchanged.
 void decode_numbered_records(const NumberedHeader& header, std::span<const std::uint8_t> records,
                              const ShotGrid& grid, std::uint8_t device, Chunk& chunk);
 /// The same for a chunk whose columns have room for the rows from a row on.
@@ -91,7 +92,7 @@ void decode_numbered_records_into(const NumberedHeader& header,
 /// Turns a datagram into rows: the times of its shots follow from its header.
 /// @param device_type  which emitters fire in turn
 /// @throws BadPacket as decode_numbered_header() and decode_numbered_records(); the chunk is then
-///         as before
+/// unchanged
 void decode_numbered_packet(std::span<const std::uint8_t> bytes, std::uint8_t device_type,
                             std::uint8_t device, Chunk& chunk);
 
@@ -102,42 +103,45 @@ void decode_numbered_packet(std::span<const std::uint8_t> bytes, std::uint8_t de
 void encode_numbered_record(std::uint8_t data_type, const Observations& observations,
                             std::size_t first_row, std::uint64_t row_number, std::uint8_t* bytes);
 
-/// What a tag says of a point, in words. @param device_type  Device::type
+/// Meaning of a point's tag, in words. @param device_type  Device::type
 std::string tag_words(std::uint8_t device_type, std::uint8_t tag);
 
-/// Counts packets of one sensor and port by their numbers of 16 bits. Where more than 32768 are
-/// missing, the times of the packets say how often the number went round.
+/// Counts packets of one sensor and port by their numbers of 16 bits. If more than 32768 are
+/// missing, the times of the packets determine how often the number wrapped.
 class PacketNumbers {
  public:
-  /// Packets behind the newest one that are known again.
+  /// Number of earlier packets in which duplicates are recognised.
   static constexpr std::size_t kRemembered = 1024;
 
-  /// What a packet is behind those before.
+  /// Relation of a packet to the previous ones.
   enum class Kind : std::uint8_t {
-    next,       ///< follows the newest one, perhaps behind a gap
-    duplicate,  ///< one of the last kRemembered once more
+    next,       ///< follows the newest one, possibly after a gap
+    duplicate,  ///< one of the last kRemembered once more, with its number and time
     late,       ///< belongs before the newest one
-    restarted,  ///< the sensor began anew: nothing is known of what is missing
+    restarted,  ///< the sensor restarted: the number of missing packets is unknown
   };
   /// What a packet's number says.
   struct Place {
     Kind kind = Kind::next;
-    std::int64_t index = 0;  ///< of the packet in a count without end; grows with every restart
+    std::int64_t index = 0;  ///< of the packet in a count without wrapping; grows with every
+                             ///< restart
     std::uint64_t lost = 0;  ///< packets between the newest one and this
   };
 
   /// The next packet that came. @param paused  the sensor was away: if its time goes back, even by
-  /// little, it began anew
+  /// little, it restarted
   Place add(const Packet& packet, bool paused = false);
 
  private:
-  /// Goes on by so many packets, of which only the last one came.
+  /// Advances by this number of packets when only the last one arrived.
   Place advance(const Packet& packet, std::int64_t steps, Kind kind, std::uint64_t lost);
 
-  std::bitset<kRemembered> came_;     ///< by index
-  std::optional<Packet> last_;        ///< the newest
-  std::int64_t index_ = kRemembered;  ///< of it
-  std::int64_t period_ns_ = 0;        ///< shortest time between neighbours so far; 0 when unknown
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+
+  std::vector<std::int64_t> times_ns_ = std::vector(kRemembered, kNever);  ///< by index
+  std::optional<Packet> last_;                                             ///< the newest
+  std::int64_t index_ = kRemembered;                                       ///< of it
+  std::int64_t period_ns_ = 0;  ///< shortest time between neighbours so far; 0 when unknown
 };
 
 }  // namespace risley::recordings::livox

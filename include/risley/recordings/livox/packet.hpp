@@ -14,7 +14,7 @@
 
 namespace risley::recordings::livox {
 
-/// Bytes of the header in front of the records.
+/// Bytes of the header before the records.
 inline constexpr std::size_t kPacketHeaderBytes = 18;
 /// The only packet version there is.
 inline constexpr std::uint8_t kPacketVersion = 5;
@@ -27,7 +27,7 @@ inline constexpr std::size_t kVersionAt = 0,  ///< kPacketVersion, one byte
     kDataTypeAt = 9,                          ///< see record_layout(), one byte
     kTimestampAt = 10;                        ///< eight bytes
 
-/// How a data type stores its points.
+/// Point layout of a data type.
 struct RecordLayout {
   bool cartesian, tagged;
   std::uint8_t returns;   ///< per record; 0 for the inertial sample
@@ -43,11 +43,11 @@ struct RecordLayout {
 /// Layout of data types 0-8, nullptr for others.
 const RecordLayout* record_layout(std::uint8_t data_type);
 
-/// The data type that stores such shots. @param returns  1-3; two and more need a tag byte
+/// The data type for such shots. @param returns  1-3; two and more need a tag byte
 /// @throws InvalidArgument for other numbers of returns
 std::uint8_t data_type_of(bool cartesian, bool tagged, int returns);
 
-/// When the records of a packet were measured, and by which beam.
+/// Measurement times and beams of a packet's records.
 struct ShotGrid {
   /// Time between two shots as a fraction, ns: 1/240 kHz is no whole number.
   std::uint32_t interval_numerator_ns = 10'000, interval_denominator = 1;
@@ -69,7 +69,7 @@ inline constexpr ShotGrid kGrid100kHz{10'000, 1, 1, 1};
 /// Sensors with six beams: a shot every 12500/3 ns.
 inline constexpr ShotGrid kGrid240kHz{12'500, 3, 6, 1};
 
-/// Mid-40 firmware with two returns of a shot as so many records.
+/// Mid-40 firmware with two returns of a shot as separate records.
 inline constexpr ShotGrid kGridOfTwo{10'000, 1, 1, 2};
 /// The same with three.
 inline constexpr ShotGrid kGridOfThree{50'000, 3, 1, 3};
@@ -80,19 +80,18 @@ std::optional<ShotGrid> shot_grid(std::uint8_t device_type, std::uint8_t data_ty
 /// Whether sensors of this type send inertial samples. @param device_type  Device::type
 bool has_imu(std::uint8_t device_type);
 
-/// Shots of the Mid-40 firmware that stores several returns as so many records, empty for others.
+/// Shots of the Mid-40 firmware that stores several returns as separate records, empty for others.
 /// @param firmware  "03.03.0001"
 std::optional<ShotGrid> grid_of_firmware(std::string_view firmware);
 
-/// What the origin of times of a timestamp type is.
+/// Origin of the times of a timestamp type.
 TimeReference time_reference_of(std::uint8_t timestamp_type);
 
-/// Times of the packets of one device, made continuous where the sensor counts from the last PPS
-/// edge.
+/// Times of the packets of one device, made continuous if the sensor counts from the last PPS edge.
 class PacketClock {
  public:
-  /// Time of the packet's first shot, ns; UTC since 1970 for GPS times. Empty when its bytes are no
-  /// time, or one so late that its last shot does not fit 64 bits; the clock is then as before.
+  /// Time of the packet's first shot, ns; UTC since 1970 for GPS times. Empty if its bytes are not
+  /// a time, or one so late that its last shot does not fit 64 bits; the clock is then unchanged.
   std::optional<std::int64_t> time_ns(const Packet& packet);
 
   /// New seconds seen in PPS times.
