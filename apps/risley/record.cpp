@@ -379,7 +379,10 @@ Run declare_record(CLI::App& verb) {
             line.show(live);
             if (page) page->send(event_of(live));
           });
-      if (points) recorded.viewers = points->viewers();
+      if (points) {
+        points->close();
+        recorded.viewers = points->viewers();
+      }
     }
     if (common.json) {
       print_json(common, json::of(recorded));

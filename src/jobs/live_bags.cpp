@@ -40,6 +40,7 @@ class FoxgloveBag final : public LiveBag {
   void write(std::size_t topic, const bags::Message& message) override {
     server_.send(static_cast<std::uint32_t>(topic), message.time_ns, message.bytes);
   }
+  void close() override { server_.close(); }
   std::string place() const override { return fmt::format("ws://{}/", to_string(server_.local())); }
   std::optional<wire::FoxgloveCounts> viewers() const override { return server_.counts(); }
 

@@ -97,6 +97,7 @@ py::object record(const py::dict& values, const py::object& note, const Stop& st
             job,
             [&](const std::string& words, bool is_wrong) { pass_words(note, words, is_wrong); },
             progress);
+        if (points) points->close();
       },
       stop.get());
   if (points) recorded.viewers = points->viewers();

@@ -326,8 +326,10 @@ std::string advice_of(const Axes& axes, const std::string& combination) {
   return "";
 }
 
+constexpr const char* kNotConverged = "<p>The adjustment did not converge.</p>\n";
+
 std::string not_told_html(const View& r) {
-  if (!r["converged"].flag()) return "<p>The adjustment did not converge.</p>\n";
+  if (!r["converged"].flag()) return kNotConverged;
   if (r["not_told"].size() == 0) {
     return r["unknowns"].size() == 0
                ? "<p>Nothing was adjusted.</p>\n"
@@ -474,22 +476,19 @@ std::string shots_html(const View& r) {
 }
 
 std::string corrections_html(const View& r, Figures& figures) {
+  if (!r["converged"].flag()) return kNotConverged;
   const View late = r["attitude_delay_s"];
-  const NumberText text = number_text(1e3 * late["value"].number(), 1e3 * late["sigma"].number());
-  const std::string delay =
-      r["converged"].flag()
-          ? fmt::format(
-                "<p>According to the strips, attitudes are {} ± {} ms later than positions.</p>\n",
-                text.value, text.sigma)
-          : std::string();
+  const NumberText delay = number_text(1e3 * late["value"].number(), 1e3 * late["sigma"].number());
   return fmt::format(
              "<p>Position and attitude are corrected at {} knots, points in time {} s apart, and "
              "linearly between. σ is their remaining uncertainty. Corrections should be about as "
              "large as the trajectory's stated errors; where they jump or are larger, a warning "
-             "appears and the uncertainties account for it.</p>\n",
+             "appears and the uncertainties account for it.</p>\n"
+             "<p>According to the strips, attitudes are {} ± {} ms later than positions.</p>\n",
              count_text(r["knots"].count()),
-             finite_text("{:.3g}", r["page"]["knot_spacing_s"].number())) +
-         delay + charts_html(r["charts"]["corrections"].json(), figures);
+             finite_text("{:.3g}", r["page"]["knot_spacing_s"].number()), delay.value,
+             delay.sigma) +
+         charts_html(r["charts"]["corrections"].json(), figures);
 }
 
 }  // namespace

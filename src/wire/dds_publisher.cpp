@@ -40,7 +40,7 @@ namespace rtps = eprosima::fastdds::rtps;
 using DdsDuration = dds::Duration_t;
 #endif
 
-const DdsDuration kForConfirmation{0, 500'000'000};
+const DdsDuration kForConfirmation{2, 0};
 /// Initial room for a message; it grows.
 constexpr std::uint32_t kUsualBytes = 1U << 16U;
 

@@ -48,7 +48,8 @@ constexpr std::chrono::seconds kForRequest(10);
 constexpr std::size_t kMostRequestBytes = 8192;
 constexpr std::uint8_t kMessageData = 1;                // opcode
 constexpr std::size_t kMessageHead = 1 + 4 + 8;         // opcode, subscription, time
-constexpr std::chrono::milliseconds kForRest(500);      // at the end
+constexpr std::chrono::seconds kForNextRest(1);         // at the end, for each queued message
+constexpr std::chrono::seconds kForWholeRest(5);        // and for all of them
 constexpr std::chrono::milliseconds kAfterFailure(50);  // before the next connection is accepted
 
 /// Bytes that several viewers get.
@@ -118,10 +119,7 @@ class FoxgloveServer::Server {
     thread_ = std::thread([this] { run(); });
   }
 
-  ~Server() {
-    asio::post(io_, [this] { end(); });
-    thread_.join();
-  }
+  ~Server() { close(); }
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
@@ -129,6 +127,7 @@ class FoxgloveServer::Server {
 
   std::uint32_t add(const FoxgloveChannel& channel);
   void send(std::uint32_t channel, std::uint64_t time_ns, std::span<const std::uint8_t> message);
+  void close();
   FoxgloveCounts counts() const { return {connected_, connections_, refused_, sent_, dropped_}; }
 
  private:
@@ -150,6 +149,13 @@ class FoxgloveServer::Server {
 
   void accept();
   void end();
+  /// Ends when no viewer has taken a message for a while.
+  void wait_for_rest() {
+    timer_.expires_at(std::min(std::chrono::steady_clock::now() + kForNextRest, latest_end_));
+    timer_.async_wait([this](error_code stopped) {
+      if (!stopped) io_.stop();
+    });
+  }
   void forget(const std::shared_ptr<Viewer>& viewer) {
     viewers_.remove(viewer);
     if (ending_ && viewers_.empty()) io_.stop();
@@ -159,6 +165,7 @@ class FoxgloveServer::Server {
   asio::io_context io_{1};
   tcp::acceptor acceptor_;
   asio::steady_timer timer_{io_};
+  std::chrono::steady_clock::time_point latest_end_;
   std::vector<std::string> hosts_;
   SharedBytes info_;
   std::vector<json> advertised_;
@@ -207,6 +214,12 @@ class FoxgloveServer::Server::Viewer : public std::enable_shared_from_this<Viewe
     ending_ = true;
     if (!open_) return close();
     if (waiting_.empty()) say_farewell();
+  }
+
+  /// Messages that wait to be sent.
+  std::uint64_t waiting_messages() const {
+    return static_cast<std::uint64_t>(
+        std::ranges::count_if(waiting_, [](const Waiting& one) { return one.is_message(); }));
   }
 
  private:
@@ -366,6 +379,7 @@ class FoxgloveServer::Server::Viewer : public std::enable_shared_from_this<Viewe
     if (waiting_.front().is_message()) ++server_.sent_;
     waiting_bytes_ -= waiting_.front().bytes->size();
     waiting_.pop_front();
+    if (ending_) server_.wait_for_rest();
     if (!waiting_.empty()) return write();
     if (ending_) say_farewell();
   }
@@ -446,11 +460,18 @@ void FoxgloveServer::Server::end() {
   ending_ = true;
   error_code ignored;
   acceptor_.close(ignored);
-  timer_.expires_after(kForRest);
-  timer_.async_wait([this](error_code) { io_.stop(); });
+  latest_end_ = std::chrono::steady_clock::now() + kForWholeRest;
+  wait_for_rest();
   const auto viewers = viewers_;
   for (const auto& viewer : viewers) viewer->end();
   if (viewers_.empty()) io_.stop();
+}
+
+void FoxgloveServer::Server::close() {
+  if (!thread_.joinable()) return;
+  asio::post(io_, [this] { end(); });
+  thread_.join();
+  for (const auto& viewer : viewers_) dropped_ += viewer->waiting_messages();
 }
 
 FoxgloveServer::FoxgloveServer(const Endpoint& local, const std::string& name)
@@ -463,6 +484,7 @@ void FoxgloveServer::send(std::uint32_t channel, std::uint64_t time_ns,
                           std::span<const std::uint8_t> message) {
   server_->send(channel, time_ns, message);
 }
+void FoxgloveServer::close() { server_->close(); }
 FoxgloveCounts FoxgloveServer::counts() const { return server_->counts(); }
 
 }  // namespace risley::wire

@@ -261,6 +261,31 @@ TEST_F(FoxgloveServerTest, AViewerThatNeverReadsHoldsNobodyUp) {
   EXPECT_LT(counts.dropped_messages, static_cast<std::uint64_t>(kMessages));
 }
 
+TEST_F(FoxgloveServerTest, TheEndCountsWhatAViewerDidNotTake) {
+  const std::uint32_t channel = server_->add(kPoints);
+  FoxgloveViewer quick(*server_), slow(*server_, {}, 4096);
+  for (FoxgloveViewer* viewer : {&quick, &slow}) {
+    viewer->read_until("advertise");
+    viewer->say(subscription(1, static_cast<int>(channel)));
+    wait_for_subscription(*viewer, channel);
+  }
+  quick.say("", 9);
+  while (quick.next().opcode == 2) {  // what the other one has waited for
+  }
+  const std::vector<std::uint8_t> message(1'000'000);
+  constexpr int kMessages = 20;
+  for (int i = 0; i < kMessages; ++i) server_->send(channel, 1, message);
+  std::thread reader([&] {
+    for (int i = 0; i < kMessages; ++i) EXPECT_EQ(quick.next().payload.size(), 13 + message.size());
+    EXPECT_EQ(quick.next().opcode, 8);
+  });
+  server_->close();
+  reader.join();
+  // Buffers of the kernel hold the others.
+  EXPECT_GT(server_->counts().dropped_messages, 10U);
+  EXPECT_LE(server_->counts().dropped_messages, static_cast<std::uint64_t>(kMessages));
+}
+
 TEST_F(FoxgloveServerTest, ConnectionsAreBoundedAndComeAgain) {
   for (int round = 0; round < 3; ++round) {
     std::vector<std::unique_ptr<FoxgloveViewer>> many;

@@ -14,6 +14,7 @@ namespace risley::jobs {
 /// A bag that is read while it is written. Adding an existing topic continues it. Thread-safe.
 class LiveBag : public bags::BagWriter {
  public:
+  /// Gives readers some seconds for the messages they have not taken yet.
   void close() override {}
   /// Its address for readers, in words.
   virtual std::string place() const = 0;

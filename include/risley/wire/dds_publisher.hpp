@@ -27,7 +27,7 @@ class DdsPublisher {
   /// Fast DDS
   /// @throws NetworkError
   DdsPublisher(int domain, bool local_only);
-  ~DdsPublisher();  ///< gives subscribers half a second for unconfirmed messages
+  ~DdsPublisher();  ///< gives subscribers two seconds for unconfirmed messages
   DdsPublisher(const DdsPublisher&) = delete;
   DdsPublisher& operator=(const DdsPublisher&) = delete;
 

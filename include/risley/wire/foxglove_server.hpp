@@ -50,7 +50,7 @@ class FoxgloveServer {
   /// @param name   of the server, for viewers
   /// @throws InvalidArgument, NetworkError
   FoxgloveServer(const Endpoint& local, const std::string& name);
-  ~FoxgloveServer();  ///< gives viewers half a second for queued messages
+  ~FoxgloveServer();  ///< as close()
   FoxgloveServer(const FoxgloveServer&) = delete;
   FoxgloveServer& operator=(const FoxgloveServer&) = delete;
 
@@ -60,6 +60,10 @@ class FoxgloveServer {
   /// Sends a message to all subscribers of its channel. Never waits for the network.
   /// @param time_ns  of the message, since 1970
   void send(std::uint32_t channel, std::uint64_t time_ns, std::span<const std::uint8_t> message);
+  /// Ends the connections once the queued messages are sent: waits five seconds at most, and ends
+  /// when no viewer has taken one for a second. The rest is counted as dropped. Nothing may be added
+  /// or sent afterwards.
+  void close();
   FoxgloveCounts counts() const;  ///< so far
 
  private:
