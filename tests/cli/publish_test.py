@@ -141,8 +141,11 @@ class PublishTest(ProcessTest):
         """By Fast DDS alone: one that is reliable, one of best effort, one that never takes a message."""
         self.emulate()
         kinds = ("reliable", "best_effort", "deaf")
-        listeners = [subprocess.Popen([LISTENER, "83", "rt/scan", kind], stdout=open(self.folder / kind, "wb"),
-                                      stderr=subprocess.PIPE) for kind in kinds]
+        listeners = []
+        for kind in kinds:
+            with open(self.folder / kind, "wb") as output:
+                listeners.append(subprocess.Popen([LISTENER, "83", "rt/scan", kind], stdout=output,
+                                                  stderr=subprocess.PIPE))
         for listener in listeners:
             self.addCleanup(listener.kill)
             self.assertEqual(listener.stderr.readline(), b"ready\n")
