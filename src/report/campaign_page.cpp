@@ -121,6 +121,7 @@ std::string settings_html(const std::vector<SettingSummary>& settings) {
 }
 
 std::string parameters_html(const SettingSummary& one) {
+  if (one.parameters.empty()) return {};
   std::string html =
       "<div class=\"wide\"><table><thead><tr><th>parameter</th><th>mean error</th><th>root mean "
       "square</th><th>bound</th><th>unit</th><th>error over bound</th><th>95 of 100</th><th>in two "
@@ -152,18 +153,21 @@ std::string campaign_words(const CampaignResult& merged) {
     below += one.nees.value < one.nees.low ? 1 : 0;
   }
   if (tested == 0) return "No setting has a result whose errors could be compared with sigmas.";
-  std::string words =
-      fmt::format("{} of {} cells have an answer; ", count_text(answered), count_text(cells));
-  if (above == 0 && below == 0) {
-    return words +
-           (tested == 1
-                ? "errors agree with the covariances."
-                : fmt::format("in each of {} settings errors agree with the covariances.", tested));
+  std::string words = fmt::format("{} of {} cells {} an answer; ", count_text(answered),
+                                  count_text(cells), answered == 1 ? "has" : "have");
+  const std::size_t all = merged.settings.size(), agree = tested - above - below;
+  if (all == 1) {
+    if (agree == 1) return words + "errors agree with the covariances.";
+    return words + fmt::format("errors are {} than the covariances predict.",
+                               above == 1 ? "larger" : "smaller");
   }
-  words += fmt::format("in {} of {} settings errors agree with the covariances",
-                       tested - above - below, tested);
+  if (agree == all) {
+    return words + fmt::format("in each of {} settings errors agree with the covariances.", all);
+  }
+  words += fmt::format("in {} of {} settings errors agree with the covariances", agree, all);
   if (above > 0) words += fmt::format(", in {} they are larger", above);
   if (below > 0) words += fmt::format(", in {} they are smaller", below);
+  if (tested < all) words += fmt::format(", in {} they could not be compared", all - tested);
   return words + ".";
 }
 
@@ -190,11 +194,11 @@ std::string campaign_page(const CampaignResult& merged, const jobs::Provenance& 
       fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(campaign_words(merged)));
   if (!sound) {
     std::vector<std::string> texts;
-    for (const Warning& warning : merged.warnings) texts.push_back(escape_html(warning.message));
+    for (const Warning& warning : merged.warnings) texts.push_back(warning.message);
     if (!merged.missing.empty()) {
-      texts.push_back(fmt::format("{} of {} cells have no result.",
-                                  count_text(merged.cells - merged.done),
-                                  count_text(merged.cells)));
+      const std::uint64_t missing = merged.cells - merged.done;
+      texts.push_back(fmt::format("{} of {} cells {} no result.", count_text(missing),
+                                  count_text(merged.cells), missing == 1 ? "has" : "have"));
     }
     head += "<section class=\"verdict care\"><strong>With care:</strong>" + list_html(texts) +
             "</section>\n";
@@ -209,10 +213,10 @@ std::string campaign_page(const CampaignResult& merged, const jobs::Provenance& 
                  settings.size() == 1 ? Sections::Shown::unfolded : Sections::Shown::folded);
   }
   sections.add(kHowToRepeat, provenance_html(provenance));
-  return page_html(
-      "A campaign",
-      fmt::format("{} cells in {} settings.", count_text(merged.cells), settings.size()), head,
-      sections, figures);
+  return page_html("A campaign",
+                   fmt::format("{} cells in {} setting{}.", count_text(merged.cells),
+                               settings.size(), settings.size() == 1 ? "" : "s"),
+                   head, sections, figures);
 }
 
 }  // namespace risley::report

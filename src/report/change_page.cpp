@@ -125,9 +125,10 @@ std::string change_page(const ComparedClouds& compared, const jobs::Provenance& 
   sections.add("Cells that have changed", changed_html(compared), Sections::Shown::unfolded);
   sections.add(
       "What was compared",
-      fmt::format("<p>{} points of {} and {} of {}; {} cells have too few points in one of them, "
-                  "{} are not a surface. {} common factors of one calibration are in both and "
-                  "mostly cancel. Distances are along the normals of the first cloud.</p>\n",
+      fmt::format("<p>{} points of {} and {} of {}. Cells with too few points in one of them: {}; "
+                  "cells that are not a surface: {}; common factors of one calibration in both, "
+                  "which mostly cancel: {}. Distances are along the normals of the first "
+                  "cloud.</p>\n",
                   count_text(compared.points_a), escape_html(compared.a),
                   count_text(compared.points_b), escape_html(compared.b), count_text(change.unseen),
                   count_text(change.uneven), change.shared));

@@ -172,11 +172,11 @@ Series peak_line(std::string label, std::string colour, std::size_t rows, const 
   return series;
 }
 
-std::string peak_line_note(std::size_t rows) {
+std::string peak_line_note(std::size_t rows, std::string_view what) {
   const std::size_t bin = stride_for(rows, kLineBins);
-  if (bin <= 2) return fmt::format("All {} shots are drawn.", count_text(rows));
-  return fmt::format("The smallest and the largest value of every {} of the {} shots are drawn.",
-                     bin, count_text(rows));
+  if (bin <= 2) return fmt::format("All {} {} are drawn.", count_text(rows), what);
+  return fmt::format("The smallest and the largest value of every {} of the {} {} are drawn.", bin,
+                     count_text(rows), what);
 }
 
 std::vector<Series> histogram(const std::string& label, const std::string& colour,

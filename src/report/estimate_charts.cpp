@@ -103,7 +103,7 @@ class EstimateCharts {
                         "time, s",
                         label,
                         {line(rotor, speed.change)},
-                        peak_line_note(states_.size())});
+                        peak_line_note(states_.size(), "knots")});
       if (!(speed.moments.std > 0)) continue;  // it stood still
       distributions.push_back(distribution(
           fmt::format("Distribution of the angular velocity of prism {}", capital(rotor)), label,
@@ -117,7 +117,7 @@ class EstimateCharts {
                         "time, s",
                         "estimate minus truth, deg",
                         {line(rotor, errors[rotor])},
-                        peak_line_note(states_.size())});
+                        peak_line_note(states_.size(), "knots")});
     }
     for (std::size_t rotor = 0; rotor < errors.size(); ++rotor) {
       charts.push_back(
@@ -211,9 +211,9 @@ class EstimateCharts {
   Chart distribution(const std::string& title, const std::string& x_label,
                      const std::string& colour, const std::vector<double>& values,
                      const Moments& moments, const std::string& what) const {
-    return {title, x_label, "shots",
+    return {title, x_label, "knots",
             histogram(what, colour, values, states_.outlier, moments, kDegreesPerRadian),
-            fmt::format("{} shots: mean {:.7g}, standard deviation {} deg{}. The outermost bins "
+            fmt::format("{} knots: mean {:.7g}, standard deviation {} deg{}. The outermost bins "
                         "hold everything beyond 4.5 standard deviations.",
                         count_text(moments.count), degrees_from_radians(moments.mean),
                         finite_text("{:.3g}", degrees_from_radians(moments.std)),
@@ -241,7 +241,8 @@ class EstimateCharts {
     }
     std::string note = every_nth_note(shots, kMostShotPoints);
     if (!rows.empty()) {
-      note += " " + every_nth_note(rows.size(), kMostShotPoints, "outliers");
+      note += rows.size() == 1 ? " The outlier is drawn."
+                               : " " + every_nth_note(rows.size(), kMostShotPoints, "outliers");
     }
     Chart chart{title, "time, s", "observed minus estimated, deg", {used}, note};
     if (!rows.empty()) chart.series.push_back(outliers);

@@ -39,16 +39,11 @@ double residual_rms(const View& r, const char* angle) {
 Verdict estimate_verdict(const View& r) {
   Verdict verdict = verdict_of(r);
   verdict.facts = fmt::format(
-      "The residuals are {}° in azimuth and {}° in zenith (root mean square). {}{} of {} shots "
-      "were rejected as outliers.",
+      "The residuals are {}° in azimuth and {}° in zenith (root mean square). {}Rejected as "
+      "outliers: {} of {} shots.",
       finite_text("{:.3g}", residual_rms(r, "azimuth_deg")),
       finite_text("{:.3g}", residual_rms(r, "zenith_deg")), noise_words(r),
       count_text(r["outliers"].count()), count_text(r["observations_used"].count()));
-  verdict.mend = fmt::format(
-      "check that {} is the instrument that made the recording, that its times are correct, and "
-      "whether the elevation in the file has the opposite sign ({} yes); a longer recording, or {} "
-      "full, gives the estimate more data",
-      name_of(kSetting.sensor), name_of(kSetting.mirror), name_of(kSetting.rate));
   return verdict;
 }
 
@@ -67,9 +62,10 @@ std::vector<KeyNumber> estimate_numbers(const View& r) {
         add(noise["azimuth_deg"]["value"].number(), noise["zenith_deg"]["value"].number(),
             "noise of the directions, estimated from the data, one standard deviation: at most "));
   }
-  numbers.push_back(
-      {count_text(r["observations_used"].count()),
-       fmt::format("shots used, of which {} are outliers", count_text(r["outliers"].count()))});
+  const std::uint64_t outliers = r["outliers"].count();
+  numbers.push_back({count_text(r["observations_used"].count()),
+                     fmt::format("shots used, of which {} {}", count_text(outliers),
+                                 outliers == 1 ? "is an outlier" : "are outliers")});
   return numbers;
 }
 
@@ -162,7 +158,8 @@ std::string estimate_parameters_html(const View& r) {
 }
 
 std::string estimate_unobservable_html(const View& r) {
-  std::string html = "<p>The recording determines all free parameters.</p>\n";
+  std::string html;
+  if (r["converged"].flag()) html = "<p>The recording determines all free parameters.</p>\n";
   if (r["unobservable"].size() > 0) {
     html = fmt::format(
                "<p>The recording does not determine these combinations of the free parameters "
@@ -190,7 +187,9 @@ std::string pieces_html(const View& r, Figures& figures) {
              p["count"].count(), p["duration_s"].number(),
              finite_text("{:.2f}", p["chi2_per_degree_of_freedom"].number()), freedom,
              freedom > 0 ? std::sqrt(2.0 / freedom) : 0.0,
-             failed == 0 ? "" : fmt::format(" {} more pieces gave no estimate.", failed)) +
+             failed == 0 ? ""
+                         : fmt::format(" {} more piece{} gave no estimate.", failed,
+                                       failed == 1 ? "" : "s")) +
          charts_html(charts, figures);
 }
 
@@ -226,21 +225,22 @@ std::string moments_html(const View& r) {
 
 /// Effect of the residuals on the sigmas, and their dependence on a prism's angle.
 std::string variance_html(const View& r) {
-  const View residuals = r["residuals"];
+  const auto factor = [residuals = r["residuals"]](const char* key) {
+    return finite_text("{:.3f}", residuals[key].number());
+  };
   return fmt::format(
-      "<p>The residuals have {:.3f} times the stated variance, and their autocorrelation "
-      "multiplies the variance of means by {:.3f}; every variance on this page was therefore "
-      "multiplied by {:.3f}.</p>\n<p>The residuals' means over 5° of a prism's rotation angle have "
+      "<p>The residuals have {} times the stated variance, and their autocorrelation "
+      "multiplies the variance of means by {}; every variance on this page was therefore "
+      "multiplied by {}.</p>\n<p>The residuals' means over 5° of a prism's rotation angle have "
       "this many times the variance that noise alone would give them: {}. Far above 1, the optics "
       "are off in a way that the free parameters do not describe.</p>\n",
-      residuals["unit_variance"].number(), residuals["autocorrelation_factor"].number(),
-      residuals["variance_factor"].number(),
+      factor("unit_variance"), factor("autocorrelation_factor"), factor("variance_factor"),
       by_prism_words(r["residuals_over_angle_chi2_per_bin"], "{:.2f}", ""));
 }
 
-/// Inputs for programs of lidar odometry.
+/// Inputs for programs of lidar odometry; none from a failure.
 std::string noise_model_html(const View& r) {
-  if (!r.has("noise_model")) return {};
+  if (!r.has("noise_model") || !r["converged"].flag()) return {};
   const View model = r["noise_model"], shared = r["noise_model"]["shared"];
   const auto number = [](const View& value) { return finite_text("{:.3g}", value.number()); };
   const auto known = [&](const char* key, const char* unit, const char* source) {

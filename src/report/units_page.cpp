@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -29,15 +30,15 @@ using jobs::ParameterDifference;
 /// More do not help a reader.
 constexpr std::size_t kMostPairsShown = 500;
 
-std::size_t changes_of(const ComparedUnits& compared) {
-  return static_cast<std::size_t>(std::count_if(compared.pairs.begin(), compared.pairs.end(),
-                                                [](const auto& pair) { return pair.changed; }));
-}
-
 bool is_tested(const ComparedPair& pair) { return pair.comparison.change.degrees_of_freedom > 0; }
 
+/// Results of two units differ without any change.
+bool can_have_changed(const ComparedPair& pair) {
+  return jobs::one_unit_words(pair.comparison) != "no";
+}
+
 std::string probability_text(bool tested, double p_value) {
-  return tested ? fmt::format("{:.2g}", p_value) : "&ndash;";
+  return tested ? fmt::format("{:.2g}", p_value) : "–";
 }
 
 /// Places of the displayed pairs, in order: all, or those least explained by chance.
@@ -101,19 +102,22 @@ std::string fleet_html(const ComparedFleet& one, const ComparedUnits& compared) 
         "<td>{}</td><td>{}</td></tr>\n",
         found.outlier ? " class=\"bad\"" : "", escape_html(unit.serial), jobs::answer_words(found),
         jobs::worst_words(found, one.fleet),
-        found.tested ? fmt::format("{:.1f}", found.worst_z) : "&ndash;",
+        found.tested ? fmt::format("{:.1f}", found.worst_z) : "–",
         probability_text(found.tested, found.p_value),
         angle_with_sigma(found.beams.errors.total, found.beams.total_sigma),
         angle_with_sigma(found.beams.errors.shape, found.beams.shape_sigma),
         escape_html(compared.results[unit.results.back()]));
   }
+  html +=
+      "</tbody></table></div>\n<p class=\"note\">Each unit by its last result, against the median "
+      "of all.";
+  if (one.fleet.parameters.empty()) return html + "</p>\n";
   return html +
          fmt::format(
-             "</tbody></table></div>\n<p class=\"note\">Each unit by its last result, against "
-             "the median of all. Robust z is the distance of a parameter from its median over the "
+             " Robust z is the distance of a parameter from its median over the "
              "spread of the fleet and the standard uncertainty of the result together. p is an "
              "upper limit of the probability that chance alone puts any of the {} units so far off "
-             "in any of {} parameters, or in any of {} combinations of them.</p>\n",
+             "in any of their parameters ({}) or of the combinations of these ({}).</p>\n",
              one.units.size(), one.fleet.parameters.size(), one.fleet.combinations.cols());
 }
 
@@ -136,7 +140,7 @@ bool can_change(const std::string& name, TrainShape shape) {
 struct ParameterOverResults {
   Chart chart;
   bool can_change = false;
-  double largest = 0;  ///< difference of two results, sigmas
+  double largest = 0;  ///< difference of two results of a unit, sigmas
   std::string words;   ///< of that difference
 };
 
@@ -159,22 +163,23 @@ std::vector<ParameterOverResults> parameters_over_results(const ComparedUnits& c
     ParameterOverResults one;
     one.can_change = can_change(name, shape);
     Series values{"", "a", SeriesKind::points, {}, {}};
-    const auto add = [&](std::size_t place, double value, double sigma) {
-      values.x.push_back(static_cast<double>(dates ? compared.written_ms[place]
-                                                   : static_cast<std::int64_t>(place) + 1));
-      values.y.push_back(value / unit.si_per_unit);
-      values.sigma.push_back(sigma / unit.si_per_unit);
-    };
+    std::map<std::size_t, std::pair<double, double>> by_place;  // value and sigma
     for (const ComparedPair& pair : compared.pairs) {
       const ParameterDifference& own = pair.comparison.parameters[i];
-      if (pair.b == 1) add(0, own.value_a, own.sigma_a);
-      if (pair.a + 1 == pair.b) add(pair.b, own.value_b, own.sigma_b);
+      by_place.emplace(pair.a, std::pair(own.value_a, own.sigma_a));
+      by_place.emplace(pair.b, std::pair(own.value_b, own.sigma_b));
       const double sigmas = std::abs(own.difference) / own.sigma;
-      if (sigmas <= one.largest) continue;
+      if (sigmas <= one.largest || !can_have_changed(pair)) continue;
       one.largest = sigmas;
       const NumberText text =
           number_text(own.difference / unit.si_per_unit, own.sigma / unit.si_per_unit);
       one.words = fmt::format("{} by {} ± {} {}", name, text.value, text.sigma, unit.unit);
+    }
+    for (const auto& [place, known] : by_place) {
+      values.x.push_back(static_cast<double>(dates ? compared.written_ms[place]
+                                                   : static_cast<std::int64_t>(place) + 1));
+      values.y.push_back(known.first / unit.si_per_unit);
+      values.sigma.push_back(known.second / unit.si_per_unit);
     }
     one.chart.title = name;
     one.chart.x_label = dates ? "when the result was written" : "result, in the order given";
@@ -215,6 +220,7 @@ Chart chart_of_fleet(const ComparedFleet& one) {
 }
 
 std::string fleet_parameters_html(const jobs::Fleet& fleet) {
+  if (fleet.parameters.empty()) return {};
   std::string html =
       "<table><thead><tr><th>parameter</th><th>middle</th><th>spread among units</th><th>unit</th>"
       "</tr></thead><tbody>\n";
@@ -234,7 +240,7 @@ std::string left_out_html(const ComparedUnits& compared) {
   if (compared.left_out.empty()) return {};
   std::vector<std::string> items;
   for (const jobs::LeftOut& one : compared.left_out) {
-    items.push_back(escape_html(fmt::format("{}: {}", one.name, one.reason)));
+    items.push_back(fmt::format("{}: {}", one.name, one.reason));
   }
   return list_html(items);
 }
@@ -250,18 +256,26 @@ std::string results_html(const ComparedUnits& compared) {
 /// One sentence on changes. @param parameters  of a series; empty otherwise
 std::string change_words(const ComparedUnits& compared,
                          const std::vector<ParameterOverResults>& parameters) {
-  if (compared.pairs.empty()) return "No unit has two results.";
-  const std::size_t changes = changes_of(compared);
+  std::vector<const ComparedPair*> pairs;
+  for (const ComparedPair& pair : compared.pairs) {
+    if (can_have_changed(pair)) pairs.push_back(&pair);
+  }
+  if (pairs.empty()) return "No unit has two results.";
+  const auto changes = std::ranges::count_if(pairs, &ComparedPair::changed);
   if (changes > 0) {
-    const ComparedPair& first = *std::ranges::find_if(compared.pairs, &ComparedPair::changed);
-    std::string words =
-        fmt::format("{} of {} pairs differ by more than chance explains, first {} to {}", changes,
-                    compared.pairs.size(), compared.results[first.a], compared.results[first.b]);
+    const ComparedPair& first = **std::ranges::find_if(pairs, &ComparedPair::changed);
+    const std::string &a = compared.results[first.a], &b = compared.results[first.b];
+    std::string words = fmt::format("{} and {} differ by more than chance explains", a, b);
+    if (pairs.size() > 1) {
+      words = fmt::format("{} of {} pairs{} {} by more than chance explains, {}{} to {}", changes,
+                          pairs.size(), pairs.size() < compared.pairs.size() ? " of one unit" : "",
+                          changes == 1 ? "differs" : "differ", changes == 1 ? "" : "first ", a, b);
+    }
     const auto most = std::ranges::max_element(parameters, {}, &ParameterOverResults::largest);
     if (most != parameters.end()) words += fmt::format("; most of all {}", most->words);
     return words + ".";
   }
-  return std::any_of(compared.pairs.begin(), compared.pairs.end(), is_tested)
+  return std::ranges::any_of(pairs, [](const ComparedPair* pair) { return is_tested(*pair); })
              ? "No change is seen."
              : "No conclusion is possible: the results have no covariance.";
 }
@@ -275,6 +289,11 @@ std::string fleet_words(const ComparedFleet& one, const ComparedUnits& compared)
     ++count;
   }
   const std::string& sensor = compared.units[one.units.front()].sensor;
+  if (std::ranges::none_of(one.fleet.units, &jobs::FleetUnit::tested)) {
+    return fmt::format(
+        " Whether one of the {} units ({}) stands out is unknown: the results have no covariance.",
+        one.units.size(), sensor);
+  }
   if (count == 0) {
     return fmt::format(" None of the {} units ({}) stands out from the others.", one.units.size(),
                        sensor);
@@ -283,19 +302,22 @@ std::string fleet_words(const ComparedFleet& one, const ComparedUnits& compared)
                      sensor, count == 1 ? "is" : "are", outliers);
 }
 
-/// Of the first result of a series and its last.
+/// Of the first result of a series and its last; none if these were not compared.
 std::vector<KeyNumber> numbers_of_series(const ComparedUnits& compared) {
-  const ComparedPair& ends =
-      *std::find_if(compared.pairs.begin(), compared.pairs.end(), [&](const ComparedPair& pair) {
-        return pair.a == 0 && pair.b + 1 == compared.results.size();
-      });
-  const jobs::ResultComparison& c = ends.comparison;
-  return {{angle_with_sigma(c.beams.errors.total, c.beams.total_sigma),
-           "between the directions of the first result and the last"},
-          {angle_with_sigma(c.beams.errors.shape, c.beams.shape_sigma),
-           "of that is between the beams: their shape"},
-          {probability_text(is_tested(ends), c.change.p_value),
-           "is the probability of such differences by chance"}};
+  const auto ends = std::ranges::find_if(compared.pairs, [&](const ComparedPair& pair) {
+    return pair.a == 0 && pair.b + 1 == compared.results.size();
+  });
+  if (ends == compared.pairs.end()) return {};
+  const jobs::ResultComparison& c = ends->comparison;
+  std::vector<KeyNumber> numbers{{angle_with_sigma(c.beams.errors.total, c.beams.total_sigma),
+                                  "between the directions of the first result and the last"},
+                                 {angle_with_sigma(c.beams.errors.shape, c.beams.shape_sigma),
+                                  "of that is between the beams: their shape"}};
+  if (is_tested(*ends)) {
+    numbers.push_back({probability_text(true, c.change.p_value),
+                       "is the probability of such differences by chance"});
+  }
+  return numbers;
 }
 
 std::string subject_of(const ComparedUnits& compared) {
@@ -316,7 +338,9 @@ std::string units_page(const ComparedUnits& compared, const jobs::Provenance& pr
   charts.reserve(parameters.size());
   for (ParameterOverResults& one : parameters) charts.push_back(std::move(one.chart));
   std::vector<Chart> fleets;
-  for (const ComparedFleet& fleet : compared.fleets) fleets.push_back(chart_of_fleet(fleet));
+  for (const ComparedFleet& fleet : compared.fleets) {
+    if (!fleet.fleet.parameters.empty()) fleets.push_back(chart_of_fleet(fleet));
+  }
   const std::string head =
       fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(words)) +
       (compared.is_one_series ? overview_html(numbers_of_series(compared), charts, figures)

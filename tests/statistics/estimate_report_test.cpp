@@ -20,7 +20,6 @@ namespace risley::estimate_report_test {
 using estimation::Estimate;
 using estimation::Method;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using testing::table3_settings;
 
 struct Case {
@@ -177,24 +176,10 @@ report::Report report_of(const Case& one, bool truth = true) {
   return report::report_of(found);
 }
 
-TEST(EstimatePage, HasEverySectionInItsOrder) {
+TEST(EstimateReport, ItsFileMakesTheSamePage) {
   const report::Report report = report_of(make_case(5));
-  const std::string html = report::report_page(report);
-  EXPECT_EQ(report::report_page(report::parse_report(report::report_text(report), "f")), html);
-  std::size_t last = 0;
-  for (const char* text :
-       {"class=\"verdict", "<h2>Parameters</h2>", "<h2>What this recording does not determine</h2>",
-        "<h2>Are the parameters stable?</h2>", "<h2>Rotors</h2>", "<h2>Residuals</h2>",
-        "<h2>Scan pattern</h2>", "<h2>Correlations of the parameters</h2>",
-        "<h2>Times of the recording</h2>", "<h2>How to make it again</h2>"}) {
-    const std::size_t at = html.find(text);
-    ASSERT_NE(at, std::string::npos) << text;
-    EXPECT_GT(at, last) << text;
-    last = at;
-  }
-  EXPECT_THAT(html, HasSubstr("unit &lt;1&gt;.lvx"));
-  EXPECT_THAT(html, Not(HasSubstr("unit <1>")));
-  EXPECT_THAT(html, HasSubstr("<li>a gap</li>"));
+  EXPECT_EQ(report::report_page(report::parse_report(report::report_text(report), "f")),
+            report::report_page(report));
 }
 
 TEST(EstimateReport, DrawsEveryDistributionOfThePaper) {
@@ -239,7 +224,6 @@ TEST(EstimateReport, WithoutTruthHasNoErrors) {
   const report::Report r = report_of(make_case(5), false);
   EXPECT_FALSE(r.json.contains("truth"));
   EXPECT_EQ(r.json["charts"]["rotors"].size(), 4u);
-  EXPECT_THAT(report::report_page(r), Not(HasSubstr("error / σ")));
 }
 
 TEST(EstimateReport, TheFiltersPageTellsTheSameThings) {
@@ -250,7 +234,6 @@ TEST(EstimateReport, TheFiltersPageTellsTheSameThings) {
   EXPECT_LT(page["pieces"]["chi2_per_degree_of_freedom"].get<double>(), 1.5);
   EXPECT_EQ(r.json["charts"]["parameters"].size(), page["correlation"]["names"].size());
   EXPECT_FALSE(page["advice"].empty());
-  EXPECT_THAT(report::report_page(r), HasSubstr("Are the parameters stable?"));
 }
 
 }  // namespace risley::estimate_report_test

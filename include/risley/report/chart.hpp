@@ -108,7 +108,7 @@ std::string every_nth_note(std::size_t rows, std::size_t most, std::string_view 
 Series peak_line(std::string label, std::string colour, std::size_t rows, const Column& x,
                  const Column& y);
 /// Which rows peak_line() draws, as a sentence.
-std::string peak_line_note(std::size_t rows);
+std::string peak_line_note(std::size_t rows, std::string_view what);
 
 /// Counts per bin within 4.5 standard deviations of the mean (9 to 61 bins, by the cube root of the
 /// number of values), and the normal curve of the same mean, deviation and count. Values beyond are
