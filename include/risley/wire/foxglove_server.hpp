@@ -61,8 +61,8 @@ class FoxgloveServer {
   /// @param time_ns  of the message, since 1970
   void send(std::uint32_t channel, std::uint64_t time_ns, std::span<const std::uint8_t> message);
   /// Ends the connections once the queued messages are sent: waits five seconds at most, and ends
-  /// when no viewer has taken one for a second. The rest is counted as dropped. Nothing may be added
-  /// or sent afterwards.
+  /// when no viewer has taken one for a second. The rest is counted as dropped. Nothing may be
+  /// added or sent afterwards.
   void close();
   FoxgloveCounts counts() const;  ///< so far
 
