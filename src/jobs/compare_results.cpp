@@ -256,10 +256,13 @@ Sensor load_result(const GivenSensor& given) {
   return sensors::load_sensor(*file);
 }
 
+bool are_two_units(const ResultComparison& comparison) {
+  return !comparison.same_unit && !comparison.a.serial.empty() && !comparison.b.serial.empty();
+}
+
 std::string one_unit_words(const ResultComparison& comparison) {
   if (comparison.same_unit) return "yes";
-  const bool unknown = comparison.a.serial.empty() || comparison.b.serial.empty();
-  return unknown ? "not known" : "no";
+  return are_two_units(comparison) ? "no" : "not known";
 }
 
 ResultComparison compare_results(const GivenSensor& a, const GivenSensor& b) {

@@ -324,7 +324,7 @@ ComparedUnits compare_units(const CompareUnitsOptions& options, const Progress& 
 
 std::string answer_words(const ComparedPair& pair) {
   if (pair.comparison.change.degrees_of_freedom == 0) return "no sigmas to test with";
-  if (one_unit_words(pair.comparison) == "no") return "two units";
+  if (are_two_units(pair.comparison)) return "two units";
   return pair.changed ? "changed" : "no change seen";
 }
 

@@ -36,7 +36,7 @@ double boresight_sigma(const View& r) {
 
 const char* datum_text(const View& r) {
   using calibration::DatumKind;
-  const std::string& kind = r["datum"]["kind"].text();
+  const std::string kind = r["datum"]["kind"].text();
   if (kind == to_string(DatumKind::planes)) {
     return "the known normals of walls fix the sensor's frame";
   }

@@ -117,7 +117,12 @@ std::string settings_html(const std::vector<SettingSummary>& settings) {
          "the prisms' parameters relative to the stated sigmas, given the held parameters; 1 if "
          "the sigmas are correct. NEES: the same with all covariances, squared. 95 of 100: the "
          "range of the preceding figure in 95 of 100 campaigns of this size if the covariances "
-         "are correct.</p>\n";
+         "are correct." +
+         (settings.size() > kMostTables
+              ? fmt::format(" Parameters are shown for the first {} settings; the JSON has all.",
+                            kMostTables)
+              : "") +
+         "</p>\n";
 }
 
 std::string parameters_html(const SettingSummary& one) {

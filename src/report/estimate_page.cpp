@@ -173,8 +173,8 @@ std::string estimate_unobservable_html(const View& r) {
 }
 
 std::string pieces_html(const View& r, Figures& figures) {
-  const Json& charts = r["charts"]["parameters"].json();
-  if (!r["page"].has("pieces") || charts.empty()) return "";
+  const View charts = r["charts"]["parameters"];
+  if (!r["page"].has("pieces") || charts.size() == 0) return "";
   const View p = r["page"]["pieces"];
   const double freedom = p["degrees_of_freedom"].number();
   const std::uint64_t failed = p["failed"].count();
@@ -190,7 +190,7 @@ std::string pieces_html(const View& r, Figures& figures) {
              failed == 0 ? ""
                          : fmt::format(" {} more piece{} gave no estimate.", failed,
                                        failed == 1 ? "" : "s")) +
-         charts_html(charts, figures);
+         charts_html(charts.json(), figures);
 }
 
 std::string moments_html(const View& r) {
@@ -273,16 +273,16 @@ std::string noise_model_html(const View& r) {
 std::string estimate_page(const View& r) {
   Figures figures;
   const View charts = r["charts"];
-  const Json& residuals = charts["residuals"].json();
-  const std::string head =
-      verdict_html(estimate_verdict(r)) + overview_html(estimate_numbers(r), residuals, figures);
+  const View residuals = charts["residuals"];
+  const std::string head = verdict_html(estimate_verdict(r)) +
+                           overview_html(estimate_numbers(r), residuals.json(), figures);
   Sections sections;
   sections.add("Parameters", estimate_parameters_html(r), Sections::Shown::unfolded);
   sections.add("What this recording does not determine", estimate_unobservable_html(r));
   sections.add("Are the parameters stable?", pieces_html(r, figures));
   sections.add("Rotors", charts_html(charts["rotors"].json(), figures));
   sections.add("Residuals",
-               moments_html(r) + variance_html(r) + charts_html(residuals, figures, 1));
+               moments_html(r) + variance_html(r) + charts_html(residuals.json(), figures, 1));
   sections.add("Numbers for lidar odometry", noise_model_html(r));
   sections.add("Scan pattern", charts_html(charts["pattern"].json(), figures));
   add_end(sections, r);

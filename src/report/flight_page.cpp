@@ -121,7 +121,7 @@ std::string flight_subject(const View& r) {
       count_text(r["shots"]["on_strips"].count()), count_text(r["shots"]["used"].count()),
       r["preset"].text(), serial.empty() ? "" : " " + serial, shape_of(r).prisms.elements,
       r["preset"].text());
-  const std::string& mount = r["page"]["mount"]["name"].text();
+  const std::string mount = r["page"]["mount"]["name"].text();
   if (!mount.empty()) text += fmt::format(", on {}", mount);
   return text + "; by an adjustment of all strips, the mount and the trajectory together.";
 }
@@ -163,7 +163,7 @@ std::string unknown_row(const View& r, const std::string& name, const View& unkn
     html += fmt::format("<td class=\"text\" colspan=\"2\">{}</td>",
                         is_sigma(sigma) ? "held, but uncertain" : "held");
   } else {
-    const std::string& twin = unknown["twin"].text();
+    const std::string twin = unknown["twin"].text();
     const double correlation = unknown["twin_correlation"].number();
     html +=
         fmt::format("<td>{}</td>", finite_text("{:.0f} %", 100 * unknown["prior_share"].number()));
@@ -227,7 +227,7 @@ std::string axis_text(const Axes& axes, std::size_t axis) {
 std::string mount_html(const View& r) {
   std::string html;
   const Axes m = body_from_sensor(r);
-  const std::string& reference = r["page"]["mount"]["reference_point"].text();
+  const std::string reference = r["page"]["mount"]["reference_point"].text();
   html += fmt::format(
       "<p>As designed, the sensor's X, its optical axis, points {}, its Y {} and its Z {}. "
       "Reference point of the trajectory: {}.</p>\n",
@@ -339,7 +339,7 @@ std::string not_told_html(const View& r) {
       "<p>The flight determines these less well than the prior knowledge, so the given values "
       "dominate (numbers are in units of the σ before).</p>\n<ul>";
   for (const View& one : r["not_told"].list()) {
-    const std::string& combination = one["combination"].text();
+    const std::string combination = one["combination"].text();
     html += fmt::format("<li>{}: {} of the σ before remains. {}</li>",
                         escape_html(words_of_unknowns(combination, shape_of(r))),
                         finite_text("{:.0f} %", 100 * one["sigma_over_before"].number()),

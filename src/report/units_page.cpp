@@ -32,11 +32,6 @@ constexpr std::size_t kMostPairsShown = 500;
 
 bool is_tested(const ComparedPair& pair) { return pair.comparison.change.degrees_of_freedom > 0; }
 
-/// Results of two units differ without any change.
-bool can_have_changed(const ComparedPair& pair) {
-  return jobs::one_unit_words(pair.comparison) != "no";
-}
-
 std::string probability_text(bool tested, double p_value) {
   return tested ? fmt::format("{:.2g}", p_value) : "–";
 }
@@ -169,7 +164,7 @@ std::vector<ParameterOverResults> parameters_over_results(const ComparedUnits& c
       by_place.emplace(pair.a, std::pair(own.value_a, own.sigma_a));
       by_place.emplace(pair.b, std::pair(own.value_b, own.sigma_b));
       const double sigmas = std::abs(own.difference) / own.sigma;
-      if (sigmas <= one.largest || !can_have_changed(pair)) continue;
+      if (sigmas <= one.largest || jobs::are_two_units(pair.comparison)) continue;
       one.largest = sigmas;
       const NumberText text =
           number_text(own.difference / unit.si_per_unit, own.sigma / unit.si_per_unit);
@@ -258,7 +253,7 @@ std::string change_words(const ComparedUnits& compared,
                          const std::vector<ParameterOverResults>& parameters) {
   std::vector<const ComparedPair*> pairs;
   for (const ComparedPair& pair : compared.pairs) {
-    if (can_have_changed(pair)) pairs.push_back(&pair);
+    if (!jobs::are_two_units(pair.comparison)) pairs.push_back(&pair);
   }
   if (pairs.empty()) return "No unit has two results.";
   const auto changes = std::ranges::count_if(pairs, &ComparedPair::changed);

@@ -125,4 +125,22 @@ TEST(CampaignPage, DrawsNumbersOfTheGridToScale) {
   EXPECT_EQ(testing::series(places, "found").at("x"), (nlohmann::json{1, 2}));
 }
 
+TEST(CampaignPage, StatesThatTablesOfParametersAreLimited) {
+  constexpr std::size_t kTables = 60;
+  jobs::CampaignResult merged = example();
+  const auto tables = [&] {
+    const std::string html = page(merged);
+    std::size_t count = 0;
+    for (std::size_t at = html.find("<th>mean error"); at != std::string::npos;
+         at = html.find("<th>mean error", at + 1)) {
+      ++count;
+    }
+    return std::pair(count, html.find("the JSON has all") != std::string::npos);
+  };
+  merged.settings.assign(kTables, setting("0.01", 1.02));
+  EXPECT_EQ(tables(), std::pair(kTables, false));
+  merged.settings.push_back(merged.settings.front());
+  EXPECT_EQ(tables(), std::pair(kTables, true));
+}
+
 }  // namespace risley::report::campaign_page_test

@@ -49,7 +49,9 @@ struct ResultComparison {
   ChangeTest change;
 };
 
-/// Whether two results are of one unit, by their serial numbers: "yes", "no" or "not known".
+/// Whether two results are of different units, by their serial numbers.
+bool are_two_units(const ResultComparison& comparison);
+/// Whether two results are of one unit: "yes", "no" or "not known".
 std::string one_unit_words(const ResultComparison& comparison);
 
 /// Reason for treating two results as results of one unit.
