@@ -62,9 +62,9 @@ std::vector<KeyNumber> estimate_numbers(const View& r) {
         add(noise["azimuth_deg"]["value"].number(), noise["zenith_deg"]["value"].number(),
             "noise of the directions, estimated from the data, one standard deviation: at most "));
   }
-  numbers.push_back({count_text(r["observations_used"].count()),
-                     fmt::format("shots used; outliers among them: {}",
-                                 count_text(r["outliers"].count()))});
+  numbers.push_back(
+      {count_text(r["observations_used"].count()),
+       fmt::format("shots used; outliers among them: {}", count_text(r["outliers"].count()))});
   return numbers;
 }
 
