@@ -29,12 +29,12 @@ std::vector<PointFieldEntry> driver_fields() {
 }
 constexpr std::size_t kDriverBytes = 30;
 
+}  // namespace
+
 Header header_of(std::uint64_t stamp_ns, const std::string& frame, std::uint32_t sequence) {
   return {static_cast<std::int64_t>(stamp_ns / kSecond),
           static_cast<std::uint32_t>(stamp_ns % kSecond), frame, sequence};
 }
-
-}  // namespace
 
 LidarTopic::LidarTopic(BagWriter& bag, BagKind kind, const LidarTopicOptions& options,
                        std::vector<PointFieldEntry> more, std::size_t more_bytes,

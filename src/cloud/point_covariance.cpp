@@ -62,6 +62,15 @@ MovedPoint moved_point(const Points& points, const TrajectoryErrors& errors, std
 
 }  // namespace
 
+Matrix3d own_covariance(const Points& points, std::size_t row) {
+  const auto& own = points.own_covariance;
+  Matrix3d c;
+  c << own[kXX][row], own[kXY][row], own[kXZ][row],  //
+      own[kXY][row], own[kYY][row], own[kYZ][row],   //
+      own[kXZ][row], own[kYZ][row], own[kZZ][row];
+  return c;
+}
+
 Eigen::MatrixXd joint_covariance(const Points& points, const TrajectoryErrors& errors,
                                  std::span<const std::size_t> rows) {
   require_at_least("places of the trajectory", errors.time_ns.size(), 1);
@@ -95,14 +104,7 @@ Eigen::MatrixXd joint_covariance(const Points& points, const TrajectoryErrors& e
         const Vector3d g(factor[0][rows[j]], factor[1][rows[j]], factor[2][rows[j]]);
         block += f * g.transpose();
       }
-      if (rows[i] == rows[j]) {
-        const auto& own = points.own_covariance;
-        Matrix3d c;
-        c << own[kXX][rows[i]], own[kXY][rows[i]], own[kXZ][rows[i]],  //
-            own[kXY][rows[i]], own[kYY][rows[i]], own[kYZ][rows[i]],   //
-            own[kXZ][rows[i]], own[kYZ][rows[i]], own[kZZ][rows[i]];
-        block += c;
-      }
+      if (rows[i] == rows[j]) block += own_covariance(points, rows[i]);
       joint.block<3, 3>(3 * i, 3 * j) = block;
       joint.block<3, 3>(3 * j, 3 * i) = block.transpose();
     }

@@ -18,6 +18,7 @@
 
 #include "risley/algebra/rotation_vector.hpp"
 #include "risley/algebra/symmetric.hpp"
+#include "risley/cloud/point_covariance.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
@@ -56,12 +57,6 @@ constexpr double kLeastSigmaShare = 1e-3;
 /// Targets have no common line about which they could turn.
 constexpr double kLeastTurning = 1e-14;
 
-Matrix3d cross_matrix(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 double reach_of(const StationTarget& target) {
   if (target.radius) return kNearSphere * *target.radius;
   return std::max(kNearPicked, kNearPickedShare * target.in_scan.norm());
@@ -87,12 +82,9 @@ class TargetPoints::Sink final : public CloudWriter {
       for (std::size_t i = 0; i < points.size(); ++i) {
         const Vector3d at(points.x[i], points.y[i], points.z[i]);
         if (!((at - target.in_scan).squaredNorm() < reach)) continue;
-        const auto& c = points.own_covariance;
         Near& near = whole_.near_[t].emplace_back();
         near.at = at;
-        near.own << c[kXX][i], c[kXY][i], c[kXZ][i],  //
-            c[kXY][i], c[kYY][i], c[kYZ][i],          //
-            c[kXZ][i], c[kYZ][i], c[kZZ][i];
+        near.own = own_covariance(points, i);
         for (const auto& factor : points.loading) {
           near.loading.emplace_back(factor[0][i], factor[1][i], factor[2][i]);
         }
@@ -269,7 +261,7 @@ AdjustedStation adjust_station(const std::vector<StationTarget>& targets,
     for (Index t = 0; t < n; ++t) {
       const Vector3d& p = measured[t].at;
       off.segment<3>(3 * t) = pose.turn.transpose() * (places.col(t) - position) - p;
-      design.block<3, 3>(3 * t, 0) = -cross_matrix(p);
+      design.block<3, 3>(3 * t, 0) = -algebra::cross_matrix(p);
       design.block<3, 3>(3 * t, 3).setIdentity();
       const Matrix3d to_sensor = pose.turn.transpose() * axes;
       own.block<3, 3>(3 * t, 3 * t) =
@@ -350,7 +342,7 @@ std::string share_targets(std::span<const Station> stations,
     const auto& [name, numbers] = key;
     const Eigen::Map<const Vector3d> place(numbers.data()), sigma(numbers.data() + 3);
     const Vector3d weight = sigma.cwiseMax(kLeastSigmaShare * largest).cwiseInverse();
-    turned.block<3, 3>(row, 0) = weight.asDiagonal() * -cross_matrix(place - middle);
+    turned.block<3, 3>(row, 0) = weight.asDiagonal() * -algebra::cross_matrix(place - middle);
     turned.block<3, 3>(row, 3) = weight.asDiagonal();
     at = row;
     row += 3;

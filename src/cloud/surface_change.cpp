@@ -19,6 +19,7 @@
 #include "risley/cloud/point_covariance.hpp"
 #include "risley/cloud/pointing_model.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/setting.hpp"
 #include "risley/parallel/parallel.hpp"
@@ -42,8 +43,6 @@ constexpr std::size_t kMost = 400;
 constexpr double kThickness = 0.35;
 /// Points this many scatters from the middle belong to another object.
 constexpr double kOffSurface = 4;
-/// Factor from a median of absolute deviations to the sigma of normal errors.
-constexpr double kSigmaOfDeviation = 1.4826;
 /// Number of points for which the trajectory's errors are evaluated: they change slowly.
 constexpr std::size_t kOfTrajectory = 24;
 
@@ -146,12 +145,6 @@ struct Patch {
   std::size_t size() const { return height.size(); }
 };
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// Two directions across a normal.
 Eigen::Matrix<double, 3, 2> across(const Vector3d& normal) {
   Index least = 0;
@@ -169,9 +162,10 @@ std::vector<std::size_t> on_surface(const CellIndex& index, std::vector<std::uin
   if (rows.size() < kFewest) return kept;
   std::vector<double> height, off;
   for (const std::uint32_t row : rows) height.push_back(normal.dot(index.place(row) - middle));
-  const double center = median_of(height);
+  std::vector<double> ordered = height;
+  const double center = upper_median(ordered);
   for (const double h : height) off.push_back(std::abs(h - center));
-  const double limit = kOffSurface * kSigmaOfDeviation * median_of(off);
+  const double limit = kOffSurface * kSigmaOverMedianDistance * upper_median(off);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (std::abs(height[i] - center) <= limit) kept.push_back(rows[i]);
   }

@@ -194,21 +194,16 @@ std::string campaign_page(const CampaignResult& merged, const jobs::Provenance& 
                        settings.size() > 1 ? "largest error over bound, of " + name_of(*worst)
                                            : std::string("errors relative to the stated sigmas")});
   }
-  const bool sound = merged.missing.empty() && merged.warnings.empty();
-  std::string head =
-      fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(campaign_words(merged)));
-  if (!sound) {
-    std::vector<std::string> texts;
-    for (const Warning& warning : merged.warnings) texts.push_back(warning.message);
-    if (!merged.missing.empty()) {
-      const std::uint64_t missing = merged.cells - merged.done;
-      texts.push_back(fmt::format("{} of {} cells {} no result.", count_text(missing),
-                                  count_text(merged.cells), missing == 1 ? "has" : "have"));
-    }
-    head += "<section class=\"verdict care\"><strong>With care:</strong>" + list_html(texts) +
-            "</section>\n";
+  std::vector<std::string> care;
+  for (const Warning& warning : merged.warnings) care.push_back(warning.message);
+  if (!merged.missing.empty()) {
+    const std::uint64_t missing = merged.cells - merged.done;
+    care.push_back(fmt::format("{} of {} cells {} no result.", count_text(missing),
+                               count_text(merged.cells), missing == 1 ? "has" : "have"));
   }
-  head += overview_html(numbers, charts, figures);
+  const std::string head =
+      fmt::format("<p class=\"verdict\"><b>{}</b></p>\n", escape_html(campaign_words(merged))) +
+      care_html(care) + overview_html(numbers, charts, figures);
   Sections sections;
   sections.add("Settings", settings_html(settings), Sections::Shown::unfolded);
   sections.add("Errors over the settings", charts_html(charts, figures, 1),

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "risley/core/median.hpp"
 #include "risley/core/text.hpp"
 #include "risley/report/html.hpp"
 #include "risley/report/page_parts.hpp"
@@ -28,8 +28,7 @@ double detection_at(const ComparedClouds& compared, double share) {
   for (const SurfaceCell& cell : compared.change.cells) {
     levels.push_back(compared.change.critical * cell.sigma);
   }
-  std::ranges::sort(levels);
-  return levels[static_cast<std::size_t>(share * static_cast<double>(levels.size() - 1))];
+  return quantile(levels, share);
 }
 
 std::string share_text(const ComparedClouds& compared) {
@@ -115,12 +114,7 @@ std::string change_page(const ComparedClouds& compared, const jobs::Provenance& 
        {fmt::format("{:.1f} mm", 1e3 * detection_at(compared, 0.5)), "level of detection, median"},
        {count_text(change.cells.size()), "cells with a distance"}},
       std::vector<Chart>{}, figures);
-  if (!change.warnings.empty()) {
-    std::vector<std::string> texts;
-    std::ranges::transform(change.warnings, std::back_inserter(texts), warning_text);
-    head += "<section class=\"verdict care\"><strong>With care:</strong>" + list_html(texts) +
-            "</section>\n";
-  }
+  head += care_html(change.warnings);
   Sections sections;
   sections.add("Cells that have changed", changed_html(compared), Sections::Shown::unfolded);
   sections.add(

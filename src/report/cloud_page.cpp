@@ -2,9 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "risley/report/cloud_page.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -157,12 +155,7 @@ std::string cloud_page(const CloudSummary& cloud, const std::string& recording,
   }
   Figures figures;
   std::string head = overview_html(key_numbers(cloud), std::vector<Chart>{}, figures);
-  if (!cloud.warnings.empty()) {
-    std::vector<std::string> texts;
-    std::ranges::transform(cloud.warnings, std::back_inserter(texts), warning_text);
-    head += "<section class=\"verdict care\"><strong>With care:</strong>" + list_html(texts) +
-            "</section>\n";
-  }
+  head += care_html(cloud.warnings);
   Sections sections;
   sections.add("Uncertainty of the points", uncertainty_html(*cloud.sample, figures),
                Sections::Shown::unfolded);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -136,6 +137,18 @@ std::string list_html(const std::vector<std::string>& items) {
   std::string html = "<ul>";
   for (const std::string& item : items) html += fmt::format("<li>{}</li>", escape_html(item));
   return html + "</ul>";
+}
+
+std::string care_html(const std::vector<std::string>& reasons) {
+  if (reasons.empty()) return "";
+  return "<section class=\"verdict care\"><strong>With care:</strong>" + list_html(reasons) +
+         "</section>\n";
+}
+
+std::string care_html(const std::vector<Warning>& warnings) {
+  std::vector<std::string> texts;
+  std::ranges::transform(warnings, std::back_inserter(texts), warning_text);
+  return care_html(texts);
 }
 
 std::string verdict_html(const Verdict& verdict) {

@@ -50,7 +50,7 @@ Message message_of(const Kept& kept) {
   return message;
 }
 
-/// Topics that nobody here knows, a known one, and one of whose type nothing is known.
+/// An IMU and two cameras, one with details and one without.
 std::vector<Topic> topics_of(Serialisation serialisation) {
   std::vector<Topic> topics;
   topics.push_back(topic_of("/imu", WrittenMessage::imu, serialisation));

@@ -389,9 +389,9 @@ TEST(Netcdf, RefusesPacketsThatDoNotFit) {
   append_rows(loose, 5);
   EXPECT_THROW(writer->write(loose), InvalidArgument);
   writer.reset();
-  RecordingHeader nobody = rich_header();
-  nobody.devices.clear();
-  EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), nobody, {}), InvalidArgument);
+  RecordingHeader no_device = rich_header();
+  no_device.devices.clear();
+  EXPECT_THROW(kNetcdfFormat.create(folder.file("x.nc"), no_device, {}), InvalidArgument);
   EXPECT_EQ(folder.names().size(), 0U) << "an unfinished writer must leave nothing";
   EXPECT_THROW(kNetcdfFormat.create(folder.file("no/such/folder.nc"), rich_header(), {}),
                FileError);

@@ -123,7 +123,7 @@ class FoxgloveServerTest : public ::testing::Test {
   FoxgloveServerTest()
       : server_(std::make_unique<FoxgloveServer>(Endpoint{kLoopback, 0}, "a test")) {}
 
-  /// Sends messages that nobody counts until a viewer gets one: its subscription stands then.
+  /// Sends empty messages until a viewer has received one, and so is subscribed.
   void wait_for_subscription(FoxgloveViewer& viewer, std::uint32_t channel) {
     const std::uint64_t before = server_->counts().sent_messages;
     for (int i = 0; i < 500 && server_->counts().sent_messages == before; ++i) {
@@ -160,7 +160,7 @@ TEST_F(FoxgloveServerTest, AViewerLearnsOfChannelsAndGetsMessages) {
   wait_for_subscription(viewer, channel);
   std::vector<std::uint8_t> message(200'000);
   std::iota(message.begin(), message.end(), std::uint8_t{0});
-  server_->send(later, 5, message);  // to which nobody has subscribed
+  server_->send(later, 5, message);  // a channel without subscribers
   server_->send(channel, 1'234'567'890'123'456'789, message);
   frame = viewer.next_filled();
   EXPECT_EQ(frame.opcode, 2);

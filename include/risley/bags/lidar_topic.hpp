@@ -32,6 +32,9 @@ struct LidarPoint {
   std::uint8_t intensity = 0, tag = 0, line = 0;
 };
 
+/// Header of a message. @param stamp_ns  time on the bag's clock
+Header header_of(std::uint64_t stamp_ns, const std::string& frame, std::uint32_t sequence);
+
 /// Divides the points of one sensor into messages of a topic. A message begins at the time of its
 /// first point and covers 1 / frame_rate; a clock that goes back also begins a message. A
 /// PointCloud2 has the fields of livox_ros_driver2 (x, y, z, intensity, tag, line, timestamp in ns)

@@ -11,6 +11,9 @@
 
 namespace risley::cloud {
 
+/// Covariance of the own errors of one point, m^2. @param points  with own_covariance
+Eigen::Matrix3d own_covariance(const Points& points, std::size_t row);
+
 /// Joint covariance [3 n, 3 n], m^2, of points of a moving sensor, x, y, z of the first one first:
 ///
 ///     cov(x_i, x_j) = [i = j] own_i + sum over factors of f_i f_j' + L_i K(t_i, t_j) L_j'

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "risley/core/warning.hpp"
 #include "risley/jobs/provenance.hpp"
 #include "risley/optics/parameters.hpp"
 #include "risley/report/chart.hpp"
@@ -33,6 +34,9 @@ std::string angle_with_sigma(double value, double sigma);
 
 /// Texts as the items of a bulleted list.
 std::string list_html(const std::vector<std::string>& items);
+/// A box of reasons for care; empty if there are none.
+std::string care_html(const std::vector<std::string>& reasons);
+std::string care_html(const std::vector<Warning>& warnings);
 
 /// What a page says first.
 struct Verdict {

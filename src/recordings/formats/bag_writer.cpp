@@ -89,12 +89,9 @@ class BagRecordingWriter final : public Writer {
           bags::topic_of(fmt::format("{}/imu{}", space, ending(header_.devices[sample.device])),
                          bags::WrittenMessage::imu, bags::serialisation_of(kind_)))});
     }
-    constexpr std::uint64_t kSecond = 1'000'000'000;
     const std::uint64_t stamp_ns = lidars_[sample.device].stamp_of(sample.time_ns);
     bags::ImuMessage imu;
-    imu.header = {static_cast<std::int64_t>(stamp_ns / kSecond),
-                  static_cast<std::uint32_t>(stamp_ns % kSecond), options_.frame_id,
-                  inertia->messages++};
+    imu.header = bags::header_of(stamp_ns, options_.frame_id, inertia->messages++);
     const auto& [rate_x, rate_y, rate_z] = sample.angular_velocity;
     const auto& [force_x, force_y, force_z] = sample.acceleration_g;
     imu.angular_velocity = {rate_x, rate_y, rate_z};
