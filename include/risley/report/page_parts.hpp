@@ -36,6 +36,7 @@ std::string angle_with_sigma(double value, double sigma);
 std::string list_html(const std::vector<std::string>& items);
 /// A box of reasons for care; empty if there are none.
 std::string care_html(const std::vector<std::string>& reasons);
+/// As above, in the words of warnings.
 std::string care_html(const std::vector<Warning>& warnings);
 
 /// What a page says first.
