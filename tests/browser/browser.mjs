@@ -7,7 +7,7 @@ import { accessSync, constants } from 'node:fs';
 import { delimiter, join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-export const longestDrawing = 60_000; // ms
+export const longestDrawing = 120_000; // ms, on a busy machine
 export const usualView = { width: 1300, height: 900 };
 
 function findChromium() {
@@ -57,6 +57,7 @@ export async function newTab(browser, options = {}) {
     viewport: usualView, colorScheme: 'light', reducedMotion: 'reduce',
     ...options,
   });
+  context.setDefaultTimeout(longestDrawing);
   const tab = await context.newPage();
   const complaints = [];
   let own;

@@ -145,7 +145,9 @@ test('no values under the mouse, or those of another point', async () => {
   await withPage(replaced("trigger: lines ? 'axis' : 'item'", "trigger: 'none'"),
                  async (tab) => complains(await checks.checkHover(tab, soon), /no tooltip/));
   await withPage(replaced('rounded(item.value[1], digits.y)', 'rounded(item.value[1] + 1, digits.y)'),
-                 async (tab) => complains(await checks.checkHover(tab, { most: 1 }), // it does come
+                 async (tab) => complains(await checks.checkHover(tab, {
+                   most: 1, patience: 5000, // it does come
+                 }),
                                           /the tooltip says/));
 });
 
