@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "risley/algebra/distributions.hpp"
 #include "risley/algebra/products.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
@@ -256,12 +257,12 @@ PointingError BeamBundle::pointing_error(const PrismTrain& believed,
 double better_probability(const PointingError& error) {
   const double total = error.errors.total, sigma = error.total_sigma_given_held;
   if (total == 0) return 0.5;  // they are the same
-  return 0.5 * std::erfc(-total / (2 * sigma) / std::sqrt(2.0));
+  return algebra::normal_tail(-total / (2 * sigma));
 }
 
 double beyond_probability(double error, double sigma, double tolerance) {
   if (!(sigma > 0)) return error > tolerance ? 1 : 0;
-  return 0.5 * std::erfc((tolerance - error) / sigma / std::sqrt(2.0));
+  return algebra::normal_tail((tolerance - error) / sigma);
 }
 
 DatumKind datum_kind(bool planes, bool stations) {

@@ -10,9 +10,9 @@
 
 #include <fmt/format.h>
 
+#include "risley/algebra/distributions.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
-#include "risley/core/chi_square.hpp"
 #include "risley/core/number_text.hpp"
 #include "risley/core/random.hpp"
 #include "risley/core/setting.hpp"
@@ -40,7 +40,7 @@ bool contradicts(const PriorTest& test) {
 /// Chi2 that chance exceeds once in a thousand times.
 double significant_chi2(double degrees_of_freedom) {
   constexpr double kNormalQuantile = 3.0902;
-  return degrees_of_freedom * chi_square_per_degree(degrees_of_freedom, kNormalQuantile);
+  return degrees_of_freedom * algebra::chi_square_per_degree(degrees_of_freedom, kNormalQuantile);
 }
 
 /// A root mean square error that a verdict judges, rad.

@@ -17,6 +17,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/saturating.hpp"
+#include "risley/core/square.hpp"
 #include "risley/optics/observation_model.hpp"
 #include "risley/parallel/parallel.hpp"
 #include "risley/trajectories/clock.hpp"

@@ -8,6 +8,7 @@
 
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
+#include "risley/core/square.hpp"
 #include "risley/optics/batch.hpp"
 
 #include "cloud/entry_checks.hpp"

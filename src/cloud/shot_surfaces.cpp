@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "risley/core/square.hpp"
 #include "risley/sensors/range_values.hpp"
 
 #include "cloud/georeference_kernel.hpp"

@@ -12,8 +12,6 @@
 #include "risley/cloud/surface_normals.hpp"
 #include "risley/recordings/observations.hpp"
 
-#include "cloud/square.hpp"
-
 namespace risley::cloud {
 
 inline bool has_return(const recordings::Observations& piece, std::size_t row) {

@@ -14,16 +14,15 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unsupported/Eigen/SpecialFunctions>
 
+#include "risley/algebra/distributions.hpp"
 #include "risley/algebra/rotation_vector.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/cloud/point_covariance.hpp"
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
-
-#include "cloud/square.hpp"
+#include "risley/core/square.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -295,8 +294,7 @@ AdjustedStation adjust_station(const std::vector<StationTarget>& targets,
       algebra::principal_axes(pose.covariance.topLeftCorner<3, 3>()).values.tail<1>().value());
   if (!(told < kLeastTold)) refuse_line();
   result.degrees_of_freedom = static_cast<int>(rows) - 6;
-  result.p_value =
-      Eigen::numext::igammac(0.5 * result.degrees_of_freedom, 0.5 * std::max(result.chi2, 0.0));
+  result.p_value = algebra::chi_square_tail(result.chi2, result.degrees_of_freedom);
   const MatrixXd left = variance - design * gain * variance;  // covariance of the residuals
   double worst = -1;
   for (Index t = 0; t < n; ++t) {

@@ -15,6 +15,7 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "risley/algebra/distributions.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/cloud/point_covariance.hpp"
 #include "risley/cloud/pointing_model.hpp"
@@ -22,9 +23,8 @@
 #include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
 #include "risley/core/setting.hpp"
+#include "risley/core/square.hpp"
 #include "risley/parallel/parallel.hpp"
-
-#include "cloud/square.hpp"
 
 namespace risley::cloud {
 namespace {
@@ -45,16 +45,6 @@ constexpr double kThickness = 0.35;
 constexpr double kOffSurface = 4;
 /// Number of points for which the trajectory's errors are evaluated: they change slowly.
 constexpr std::size_t kOfTrajectory = 24;
-
-/// The distance from 0, in sigmas, that a normal number exceeds with a probability.
-double two_sided(double probability) {
-  double low = 0, high = 40;
-  for (int i = 0; i < 200; ++i) {
-    const double middle = 0.5 * (low + high);
-    (std::erfc(middle / std::sqrt(2.0)) > probability ? low : high) = middle;
-  }
-  return 0.5 * (low + high);
-}
 
 using Place = std::array<float, 3>;
 
@@ -450,7 +440,7 @@ SurfaceChange surface_change(const CloudFile& a, const CloudFile& b, const Chang
     });
   }
   SurfaceChange change;
-  change.critical = two_sided(options.false_alarm);
+  change.critical = algebra::two_sided_normal_quantile(options.false_alarm);
   change.shared = comparison.shared();
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (without[i] == Without::surface) ++change.uneven;

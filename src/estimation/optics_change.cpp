@@ -6,8 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include <unsupported/Eigen/SpecialFunctions>
-
+#include "risley/algebra/distributions.hpp"
 #include "risley/algebra/symmetric.hpp"
 
 namespace risley::estimation {
@@ -30,13 +29,12 @@ Eigen::MatrixXd measured_combinations(const Eigen::MatrixXd& covariance) {
 constexpr double kLeastMeasured = 1e-3;
 
 /// Probability that chi-squared, over a variance factor estimated from the scatter of pieces,
-/// exceeds a value: then F's distribution.
+/// exceeds a value.
 double tail(double chi2, double combinations, const PieceScatter& scatter) {
   if (scatter.variance_factor > 1 && scatter.degrees_of_freedom > 0) {
-    return Eigen::numext::betainc(0.5 * scatter.degrees_of_freedom, 0.5 * combinations,
-                                  scatter.degrees_of_freedom / (scatter.degrees_of_freedom + chi2));
+    return algebra::f_tail(chi2, combinations, scatter.degrees_of_freedom);
   }
-  return Eigen::numext::igammac(0.5 * combinations, 0.5 * chi2);
+  return algebra::chi_square_tail(chi2, combinations);
 }
 
 }  // namespace

@@ -9,10 +9,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <unsupported/Eigen/SpecialFunctions>
 
+#include "risley/algebra/distributions.hpp"
 #include "risley/core/angle.hpp"
-#include "risley/core/chi_square.hpp"
 #include "risley/core/error.hpp"
 #include "risley/jobs/campaign.hpp"
 #include "risley/optics/parameters.hpp"
@@ -29,27 +28,9 @@ constexpr std::size_t kMostRanges = 100;
 constexpr double kTwoSided95 = 1.959963985;
 constexpr double kWithinTwoSigma = 0.954499736;
 
-/// Value that chi-square over its degrees of freedom exceeds with a probability.
-double chi2_per_degree(double degrees, double exceeded) {
-  if (!(degrees > 0)) return std::numeric_limits<double>::quiet_NaN();
-  double low = 0, high = 1;
-  const auto probability = [&](double value) {
-    return Eigen::numext::igammac(0.5 * degrees, 0.5 * degrees * value);
-  };
-  while (probability(high) > exceeded) high *= 2.0;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (probability(middle) > exceeded ? low : high) = middle;
-  }
-  return high;
-}
-
 BandedFigure mean_square(double value, double degrees) {
-  if (degrees > 1000) {  // from here on the series of the exact one grows long
-    return {value, chi_square_per_degree(degrees, -kTwoSided95),
-            chi_square_per_degree(degrees, kTwoSided95)};
-  }
-  return {value, chi2_per_degree(degrees, 0.975), chi2_per_degree(degrees, 0.025)};
+  return {value, algebra::exact_chi_square_per_degree(degrees, -kTwoSided95),
+          algebra::exact_chi_square_per_degree(degrees, kTwoSided95)};
 }
 
 /// Sums over the cells of a setting.

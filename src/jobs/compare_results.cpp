@@ -13,8 +13,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <fmt/format.h>
-#include <unsupported/Eigen/SpecialFunctions>
 
+#include "risley/algebra/distributions.hpp"
 #include "risley/algebra/named_covariance.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/angle.hpp"
@@ -151,7 +151,7 @@ ChangeTest test_of_change(const Pair& pair, const NamedCovariance& sum) {
     ++test.degrees_of_freedom;
   }
   if (test.degrees_of_freedom == 0) return test;
-  test.p_value = Eigen::numext::igammac(0.5 * test.degrees_of_freedom, 0.5 * test.chi2);
+  test.p_value = algebra::chi_square_tail(test.chi2, test.degrees_of_freedom);
   return test;
 }
 

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include <Eigen/Core>
-#include <unsupported/Eigen/SpecialFunctions>
 
+#include "risley/algebra/distributions.hpp"
 #include "risley/algebra/symmetric.hpp"
 #include "risley/core/median.hpp"
 #include "risley/core/require.hpp"
@@ -27,14 +27,6 @@ using sensors::Sensor;
 double degrees_of_freedom(std::size_t units) {
   const auto n = static_cast<double>(units);
   return std::min(0.5 * (n - 1), 0.37 * n + 0.7);
-}
-
-/// Probability of a value of Student's distribution at least so far from zero.
-double probability_beyond(double z, double degrees) {
-  if (z == 0) return 1;
-  const double z2 = z * z;
-  if (!std::isfinite(z2)) return 0;
-  return Eigen::numext::betainc(0.5 * degrees, 0.5, degrees / (degrees + z2));
 }
 
 /// A value and its sigma; NaN if the unit has none.
@@ -195,8 +187,8 @@ void judge(const std::vector<Sensor>& units, double false_alarm, Fleet& fleet) {
       unit.worst = largest_part(units[i], fleet, static_cast<Eigen::Index>(k));
       unit.worst_is_combined = true;
     }
-    unit.p_value =
-        std::min(1.0, tests * probability_beyond(unit.worst_z, degrees_of_freedom(units.size())));
+    unit.p_value = std::min(1.0, tests * algebra::two_sided_student_tail(
+                                             unit.worst_z, degrees_of_freedom(units.size())));
     unit.outlier = unit.p_value < false_alarm;
   }
 }

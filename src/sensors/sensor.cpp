@@ -9,6 +9,7 @@
 
 #include "risley/core/error.hpp"
 #include "risley/core/require.hpp"
+#include "risley/core/square.hpp"
 #include "risley/sensors/prism_sizes.hpp"
 
 namespace risley::sensors {
@@ -45,7 +46,6 @@ std::string to_string(CalibrationReference reference) {
 std::string to_string(Firing firing) { return firing == Firing::together ? "together" : "in_turn"; }
 
 double Sensor::range_variance(double range, double tan_incidence, double intensity) const {
-  const auto square = [](double x) { return x * x; };
   return square(range_noise) + square(range_noise_per_range * range) +
          square(range_noise_incidence * tan_incidence) +
          square(range_noise_weak_return) / std::max(intensity, 1.0);

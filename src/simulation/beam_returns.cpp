@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "risley/core/square.hpp"
 #include "risley/sensors/range_errors.hpp"
 
 namespace risley::simulation {
@@ -23,8 +24,6 @@ constexpr std::array<std::array<int, 2>, kRays> kPlaces{
 constexpr double kPulseLength = 0.6;
 /// Data sheets state the maximum range for this reflectivity.
 constexpr double kReflectivityOfLimits = 0.8;
-
-double square(double x) { return x * x; }
 
 }  // namespace
 

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "risley/core/chi_square.hpp"
+#include "risley/algebra/distributions.hpp"
 #include "risley/core/error.hpp"
 
 namespace risley::reproduction {
@@ -109,8 +109,8 @@ Check rms_ratio(std::string what, double ratio, double degrees_of_freedom, std::
 
 Check mean_square_ratio(std::string what, double ratio, double degrees_of_freedom,
                         std::string why) {
-  return within(std::move(what), ratio, chi_square_per_degree(degrees_of_freedom, -kBand),
-                chi_square_per_degree(degrees_of_freedom, kBand),
+  return within(std::move(what), ratio, algebra::chi_square_per_degree(degrees_of_freedom, -kBand),
+                algebra::chi_square_per_degree(degrees_of_freedom, kBand),
                 fmt::format("{}: 99.9 % band of chi-square with {:.0f} degrees of freedom", why,
                             degrees_of_freedom));
 }

@@ -9,6 +9,7 @@
 #include "risley/core/angle.hpp"
 #include "risley/core/error.hpp"
 #include "risley/core/median.hpp"
+#include "risley/core/square.hpp"
 #include "risley/core/text.hpp"
 #include "risley/io/text_table.hpp"
 
@@ -93,7 +94,6 @@ void check_order(Trajectory& trajectory) {
   std::vector<double> up_as_read, up_otherwise;  // cosine of the tilt
   for (const Eigen::Quaterniond& attitude : trajectory.attitude) {
     const Eigen::Quaterniond q = left_up_from_right_down(attitude);
-    const auto square = [](double value) { return value * value; };
     up_as_read.push_back(1 - 2 * (square(q.x()) + square(q.y())));
     up_otherwise.push_back(1 - 2 * (square(q.y()) + square(q.z())));
   }

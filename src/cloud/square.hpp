@@ -1,9 +1,0 @@
-// SPDX-FileCopyrightText: 2026 The risley authors
-// SPDX-License-Identifier: MIT
-#pragma once
-
-namespace risley::cloud {
-
-inline double square(double x) { return x * x; }
-
-}  // namespace risley::cloud
