@@ -40,13 +40,11 @@ double chi_square_tail(double chi2, double degrees) {
 }
 
 double chi_square_per_degree(double degrees, double normal_quantile) {
-  const double ninth = 2.0 / (9.0 * degrees);
-  return std::pow(std::max(0.0, 1.0 - ninth + normal_quantile * std::sqrt(ninth)), 3);
-}
-
-double exact_chi_square_per_degree(double degrees, double normal_quantile) {
   if (!(degrees > 0)) return std::numeric_limits<double>::quiet_NaN();
-  if (degrees > kManyDegrees) return chi_square_per_degree(degrees, normal_quantile);
+  if (degrees > kManyDegrees) {
+    const double ninth = 2.0 / (9.0 * degrees);
+    return std::pow(1.0 - ninth + normal_quantile * std::sqrt(ninth), 3);
+  }
   return where_falls_to([&](double value) { return chi_square_tail(degrees * value, degrees); },
                         normal_tail(normal_quantile), 0, 1);
 }

@@ -29,8 +29,8 @@ constexpr double kTwoSided95 = 1.959963985;
 constexpr double kWithinTwoSigma = 0.954499736;
 
 BandedFigure mean_square(double value, double degrees) {
-  return {value, algebra::exact_chi_square_per_degree(degrees, -kTwoSided95),
-          algebra::exact_chi_square_per_degree(degrees, kTwoSided95)};
+  return {value, algebra::chi_square_per_degree(degrees, -kTwoSided95),
+          algebra::chi_square_per_degree(degrees, kTwoSided95)};
 }
 
 /// Sums over the cells of a setting.

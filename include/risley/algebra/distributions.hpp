@@ -14,11 +14,9 @@ double two_sided_normal_quantile(double probability);
 /// Probability that chi-square of so many degrees of freedom exceeds a value.
 double chi_square_tail(double chi2, double degrees);
 /// Chi-square over its degrees of freedom where `normal_quantile` standard deviations of a normal
-/// distribution have the same probability, by Wilson and Hilferty (1931): from a thousand degrees
-/// on to 2e-6 within two, to 3e-5 within 3.5 standard deviations.
+/// distribution have the same probability; NaN without degrees of freedom. Above a thousand degrees
+/// by Wilson and Hilferty (1931): to 2e-6 within two, to 3e-5 within 3.5 standard deviations.
 double chi_square_per_degree(double degrees, double normal_quantile);
-/// As above, without approximation up to a thousand degrees; NaN without degrees of freedom.
-double exact_chi_square_per_degree(double degrees, double normal_quantile);
 
 /// Probability that chi-square of so many degrees of freedom, divided by an independent estimate of
 /// its variance factor of `factor_degrees`, exceeds a value: F's distribution.
