@@ -589,7 +589,7 @@ class CloudMaker::Work {
   const sensors::Sensor& calibration_;
   CloudSink sink_;
   const CloudOptions& options_;
-  const Progress& progress_;
+  Progress progress_;
   CloudSummary summary_;
   std::optional<SensorBelief> belief_;
   PointingModel model_;

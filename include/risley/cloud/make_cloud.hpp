@@ -85,7 +85,7 @@ using CloudSink = std::function<std::unique_ptr<CloudWriter>(const CloudHeader& 
 /// points do not depend on the number of threads.
 class CloudMaker {
  public:
-  /// All but the sink must outlive this.
+  /// Reader, calibration, options and the flag of progress must outlive this.
   /// @throws InvalidArgument for a recording of several sensors or a calibration of another one,
   /// and
   ///         for a rate or angle noise that is not above 0

@@ -40,7 +40,7 @@ struct RecordingCloud {
 class PointsOfRecording {
  public:
   /// @param options  output, provenance and the format of a file are ignored
-  /// @param progress  must outlive this
+  /// @param progress  its flag must outlive this
   /// @throws EstimationError, InvalidArgument, FileError, Cancelled
   PointsOfRecording(const CloudOfRecordingOptions& options, cloud::CloudSink sink,
                     const Progress& progress);
