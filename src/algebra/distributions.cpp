@@ -15,9 +15,10 @@ namespace {
 /// From here on the series of the exact quantile grows long.
 constexpr double kManyDegrees = 1000;
 
-/// Where a function that falls from `low` on reaches a value, to the last digit.
+/// Where a function that falls from 0 on reaches a value, to the last digit.
 template <class Function>
-double where_falls_to(const Function& falling, double value, double low, double high) {
+double where_falls_to(const Function& falling, double value) {
+  double low = 0, high = 1;
   while (falling(high) > value) high *= 2;
   for (double middle = 0.5 * (low + high); low < middle && middle < high;
        middle = 0.5 * (low + high)) {
@@ -32,7 +33,7 @@ double normal_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
 
 double two_sided_normal_quantile(double probability) {
   if (!(probability > 0)) return std::numeric_limits<double>::infinity();
-  return where_falls_to([](double z) { return 2 * normal_tail(z); }, probability, 0, 1);
+  return where_falls_to([](double z) { return 2 * normal_tail(z); }, probability);
 }
 
 double chi_square_tail(double chi2, double degrees) {
@@ -46,7 +47,7 @@ double chi_square_per_degree(double degrees, double normal_quantile) {
     return std::pow(1.0 - ninth + normal_quantile * std::sqrt(ninth), 3);
   }
   return where_falls_to([&](double value) { return chi_square_tail(degrees * value, degrees); },
-                        normal_tail(normal_quantile), 0, 1);
+                        normal_tail(normal_quantile));
 }
 
 double f_tail(double chi2, double degrees, double factor_degrees) {

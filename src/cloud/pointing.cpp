@@ -217,7 +217,6 @@ void compute_points(const PointingModel& model, const CloudHeader& header,
   }
   const Faces faces(model);
   const auto& kernel = RISLEY_KERNEL_COPIES(compute_points).at(set);
-  const auto square = [](double x) { return x * x; };
   PointArguments a;
   a.prisms = model.train.layout();
   a.emitters = model.train.emitters();

@@ -94,13 +94,15 @@ const differences = (tab, one, other) =>
 // finer for some frames.
 async function remember(tab, album) {
   const keep = (name) => tab.evaluate((name) => window.looking.remember(name), name);
-  await keep(album);
-  if ((await spaceOnes(tab)).length === 0) return;
-  await whenGood(tab, async () => {
-    await keep('again ' + album);
-    const changes = await differences(tab, album, 'again ' + album);
+  if ((await spaceOnes(tab)).length === 0) {
     await keep(album);
-    return changes;
+    return;
+  }
+  await whenGood(tab, async () => {
+    await keep('two frames before');
+    await frames(tab);
+    await keep(album);
+    return differences(tab, 'two frames before', album);
   }, (changes) => changes.every(({ same }) => same));
 }
 
